@@ -1,0 +1,56 @@
+# Needs Python >= 3.11, make and pip. `make run PYTHON=python3.12` picks another interpreter.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+USE := $(VENV)/installed
+DEV := $(VENV)/installed-dev
+
+.NOTPARALLEL:
+.PHONY: help run test check lint wheel clean
+
+help:
+	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
+	@echo "make test   the quick tests"
+	@echo "make lint   ruff, formatting and types"
+	@echo "make check  lint and every test, the slow ones too"
+	@echo "make wheel  build dist/epicycle-*.whl"
+	@echo "make clean  remove all that these made, except results/"
+
+run: $(USE)
+	$(BIN)/epicycle run collision_avoidance --set observers=3 --set disturbance=0.25 --seed 7 --out results/collision_avoidance
+
+test: $(DEV)
+	$(BIN)/python -m pytest -n 2 -q
+
+check: lint
+	$(BIN)/python -m pytest -n 2 -q -m ""
+
+lint: $(DEV)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+wheel: $(DEV)
+	rm -rf build dist
+	$(BIN)/python -m build --wheel
+	rm -rf build
+
+clean:
+	rm -rf $(VENV) build dist epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	find actors aspects models runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Two stamps on one environment; both grow stale when pyproject.toml changes.
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Epicycle needs Python 3.11 or newer: make PYTHON=python3.x")'
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(USE): pyproject.toml | $(BIN)/python
+	@echo "Installing epicycle into $(VENV) (first time only, and when pyproject.toml changes)"
+	@$(PIP) install --editable .
+	@touch $@
+
+$(DEV): pyproject.toml | $(BIN)/python
+	@echo "Installing epicycle[dev] into $(VENV) (first time only, and when pyproject.toml changes)"
+	@$(PIP) install --editable '.[dev]'
+	@touch $(USE) $@

@@ -1,0 +1,276 @@
+"""The four folders at the root install as one namespace, completely, once, and import one way."""
+
+import ast
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import textwrap
+import tomllib
+import venv
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("actors", "aspects", "models", "runner")
+CODE_FOLDERS = ("actors", "aspects", "runner")
+CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+PACKAGES = CONFIG["tool"]["setuptools"]["packages"]
+TYPINGS = ROOT / "tests" / "typings"
+
+
+def shipped_files() -> list[Path]:
+    """Return every file that belongs in the wheel, relative to the root."""
+    return sorted(
+        path.relative_to(ROOT)
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*")
+        if (path.suffix in {".py", ".yaml"} or path.name == "py.typed") and "__pycache__" not in path.parts
+    )
+
+
+def module_name(file: Path) -> str:
+    """Return the dotted name under which a file of ours is imported."""
+    parts = file.parts[:-1] if file.name == "__init__.py" else file.with_suffix("").parts
+    return ".".join(("epicycle", *parts))
+
+
+def imported_names(text: str, file: Path) -> Iterator[tuple[int, str]]:
+    """Yield the line and the absolute dotted name of everything that a module imports."""
+    package = ["epicycle", *file.parent.parts]
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            base = [*base, *(node.module.split(".") if node.module else [])]
+            for alias in node.names:
+                yield node.lineno, ".".join([*base, alias.name])
+
+
+def forbidden_imports(text: str, file: Path) -> list[str]:
+    """Return a line for each import in a module that goes the wrong way or past the name epicycle."""
+    above = CODE_FOLDERS[CODE_FOLDERS.index(file.parts[0]) + 1 :]
+    found = []
+    for line, name in imported_names(text, file):
+        first, _, rest = name.partition(".")
+        folder = rest.partition(".")[0] if first == "epicycle" else ""
+        if folder in above or first in FOLDERS:
+            found.append(f"{file.as_posix()}:{line} imports {name}")
+    return found
+
+
+MODELS = sorted(file.as_posix() for file in shipped_files() if file.suffix == ".yaml")
+
+# importlib.resources.files("epicycle.models") fails in an editable install: setuptools adds a placeholder to
+# the path of a namespace package, which is no folder. So read the path, and leave out what is none.
+WHERE = """
+    import importlib, json, sysconfig
+    from pathlib import Path
+    folders = []
+    for name in ("actors", "aspects", "models", "runner"):
+        path = importlib.import_module(f"epicycle.{name}").__path__
+        folders += [Path(entry) for entry in path if Path(entry).is_dir()]
+    home = folders[2]
+    models = sorted(f"models/{file.relative_to(home).as_posix()}" for file in home.rglob("*.yaml"))
+    site = sysconfig.get_path("purelib")
+    print(json.dumps({"site": site, "folders": [str(folder) for folder in folders], "models": models}))
+"""
+
+
+def test_packages_equal_the_tree() -> None:
+    on_disk = {".".join(("epicycle", *file.parent.parts)) for file in shipped_files()}
+    assert sorted(PACKAGES) == sorted(on_disk)
+
+
+def test_every_folder_with_code_has_an_init() -> None:
+    code = {file.parent for file in shipped_files() if file.suffix == ".py"}
+    without = [folder.as_posix() for folder in sorted(code) if not (ROOT / folder / "__init__.py").is_file()]
+    assert without == []
+
+
+def test_models_hold_yaml_only() -> None:
+    models = [file for file in shipped_files() if file.parts[0] == "models"]
+    assert [file.as_posix() for file in models if file.suffix != ".yaml"] == []
+
+
+@pytest.mark.parametrize("folder", CODE_FOLDERS)
+def test_folder_is_typed_and_says_what_it_offers(folder: str) -> None:
+    assert (ROOT / folder / "py.typed").is_file()
+    body = ast.parse((ROOT / folder / "__init__.py").read_text("utf-8")).body
+    assigned = {
+        ast.unparse(target)
+        for node in body
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
+    }
+    assert "__all__" in assigned
+
+
+def test_mypy_redirects_equal_the_tree() -> None:
+    code = {file.parent for file in shipped_files() if file.name == "__init__.py"}
+    expected = {"epicycle/__init__.pyi": ""}
+    for folder in code:
+        redirect = f"from {'.'.join(folder.parts)} import *\n"
+        expected[f"epicycle/{folder.as_posix()}/__init__.pyi"] = redirect
+    stubs = (TYPINGS / "epicycle").rglob("*.pyi")
+    found = {stub.relative_to(TYPINGS).as_posix(): stub.read_text("utf-8") for stub in stubs}
+    assert found == expected
+
+
+def test_imports_go_one_way() -> None:
+    found = [
+        problem
+        for file in shipped_files()
+        if file.suffix == ".py" and file.parts[0] in CODE_FOLDERS
+        for problem in forbidden_imports((ROOT / file).read_text("utf-8"), file)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("file", "line", "name"),
+    [
+        ("actors/flow.py", "import epicycle.aspects", "epicycle.aspects"),
+        ("actors/flow.py", "from epicycle import runner", "epicycle.runner"),
+        ("actors/flow.py", "from epicycle.aspects import Aspect", "epicycle.aspects.Aspect"),
+        ("actors/flow.py", "from .. import aspects", "epicycle.aspects"),
+        ("actors/__init__.py", "from ..runner import run", "epicycle.runner.run"),
+        ("actors/core/ports.py", "from ...aspects.core import Aspect", "epicycle.aspects.core.Aspect"),
+        ("aspects/core.py", "from epicycle.runner.engine import Director", "epicycle.runner.engine.Director"),
+        ("runner/cli.py", "import actors", "actors"),
+        ("runner/cli.py", "from models import robots", "models.robots"),
+    ],
+)
+def test_an_import_the_wrong_way_is_found(file: str, line: str, name: str) -> None:
+    assert forbidden_imports(f"if True:\n    {line}\n", Path(file)) == [f"{file}:2 imports {name}"]
+
+
+@pytest.mark.parametrize(
+    ("file", "line"),
+    [
+        ("actors/core/ports.py", "from ..core import Tag"),
+        ("actors/core/ports.py", "from . import Tag"),
+        ("aspects/core.py", "from epicycle.actors import Actor"),
+        ("runner/cli.py", "from .model import actors"),
+        ("runner/model/load.py", "from epicycle.aspects import Aspect"),
+    ],
+)
+def test_an_import_the_right_way_is_not(file: str, line: str) -> None:
+    assert forbidden_imports(line, Path(file)) == []
+
+
+def test_nothing_is_imported_twice() -> None:
+    """Look in a fresh interpreter started at the root, where a bare `import actors` would work too."""
+    script = """
+        import importlib, json, pkgutil, sys
+        for folder in ("epicycle.actors", "epicycle.aspects", "epicycle.runner"):
+            package = importlib.import_module(folder)
+            for module in pkgutil.walk_packages(package.__path__, folder + "."):
+                if not module.name.endswith("__main__"):
+                    importlib.import_module(module.name)
+        print(json.dumps({n: getattr(m, "__file__", None) for n, m in sys.modules.items()}))
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    names: dict[str, list[str]] = {}
+    for name, file in json.loads(done.stdout.splitlines()[-1]).items():
+        path = Path(file).resolve() if file else None
+        if path and path.is_relative_to(ROOT) and path.relative_to(ROOT).parts[0] in FOLDERS:
+            names.setdefault(path.relative_to(ROOT).as_posix(), []).append(name)
+    expected = {
+        file.as_posix(): [module_name(file)]
+        for file in shipped_files()
+        if file.suffix == ".py" and file.stem != "__main__"
+    }
+    assert names == expected
+
+
+def test_models_are_found_here_too(busy_folder: Path) -> None:
+    found = json.loads(run_in(busy_folder, sys.executable, "-c", textwrap.dedent(WHERE)))
+    assert found["models"] == MODELS
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the wheel from a copy, without a download and without leaving a build folder behind."""
+    source = tmp_path_factory.mktemp("source")
+    for folder in FOLDERS:
+        shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "LICENSE", "README.md"):
+        if (ROOT / name).is_file():
+            shutil.copy(ROOT / name, source)
+    target = tmp_path_factory.mktemp("wheel")
+    pip("wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", target, source)
+    (built,) = target.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the scripts folder of a fresh environment that holds the wheel and borrows our dependencies.
+
+    A .pth line lends the packages of this environment but, unlike a site folder, does not run the .pth files
+    among them: the editable install of the folders at the root stays invisible.
+    """
+    home = tmp_path_factory.mktemp("environment")
+    venv.create(home, symlinks=os.name != "nt")
+    at = {"base": str(home), "platbase": str(home)}
+    scripts = Path(sysconfig.get_path("scripts", "venv", at))
+    pip("--python", scripts / "python", "install", "--no-deps", "--no-index", wheel)
+    ours = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
+    lent = Path(sysconfig.get_path("purelib", "venv", at)) / "lent.pth"
+    lent.write_text("\n".join(sorted(ours)) + "\n", "utf-8")
+    return scripts
+
+
+@pytest.fixture
+def busy_folder(tmp_path: Path) -> Path:
+    """Return a folder whose own actors, models and so on must not get in the way."""
+    for folder in FOLDERS:
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "__init__.py").write_text(f"raise ImportError('the wrong {folder}')\n", "utf-8")
+    return tmp_path
+
+
+def pip(*arguments: object) -> None:
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def run_in(folder: Path, *command: object) -> str:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    words = [str(part) for part in command]
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_wheel_holds_every_file_and_no_other(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        found = [name for name in archive.namelist() if ".dist-info/" not in name]
+    assert sorted(found) == sorted(f"epicycle/{file.as_posix()}" for file in shipped_files())
+
+
+@pytest.mark.slow
+def test_wheel_finds_its_own_modules_and_models(installed: Path, busy_folder: Path) -> None:
+    found = json.loads(run_in(busy_folder, installed / "python", "-c", textwrap.dedent(WHERE)))
+    home = Path(found["site"]) / "epicycle"
+    assert [Path(folder) for folder in found["folders"]] == [home / folder for folder in FOLDERS]
+    assert found["models"] == MODELS
+
+
+@pytest.mark.slow
+def test_wheel_runs_the_example_beside_folders_of_the_same_names(installed: Path, busy_folder: Path) -> None:
+    run_in(busy_folder, installed / "epicycle", "run", "collision_avoidance", "--seed", "7", "--out", "out")
+    assert (busy_folder / "out" / "manifest.json").is_file()
