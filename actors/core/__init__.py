@@ -1,0 +1,49 @@
+"""What every actor is made of: ports, parameters, time, random streams, and the firing contract."""
+
+from .actor import Actor, Context, Wake, declared_ports
+from .errors import EpicycleError
+from .parameter import (
+    REQUIRED,
+    Configurable,
+    Parameter,
+    ParameterError,
+    array_parameter,
+    declared_parameters,
+    unknown_parameter,
+    variants,
+)
+from .ports import InputPort, OutputPort, PortError, accepts, type_name
+from .process import Process
+from .random import random_stream
+from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
+from .units import UnitError, convert, parse_unit
+
+__all__ = [
+    "NANOSECONDS_PER_SECOND",
+    "REQUIRED",
+    "Actor",
+    "Configurable",
+    "Context",
+    "EpicycleError",
+    "InputPort",
+    "OutputPort",
+    "Parameter",
+    "ParameterError",
+    "PortError",
+    "Process",
+    "Tag",
+    "UnitError",
+    "Wake",
+    "accepts",
+    "array_parameter",
+    "convert",
+    "declared_parameters",
+    "declared_ports",
+    "parse_unit",
+    "random_stream",
+    "to_nanoseconds",
+    "to_seconds",
+    "type_name",
+    "unknown_parameter",
+    "variants",
+]

@@ -1,0 +1,163 @@
+"""Actor: what stands in a model graph, and the contract between it and the director.
+
+The firing contract
+-------------------
+A director brings every actor through ``initialize``, any number of ``fire`` and ``wrapup``, in this order.
+
+``initialize`` is called once, before time starts.  An actor sets up its state here and may ask for wake-ups: one
+asked for at once comes at the first tag of the run, (start, 1).  Ports hold nothing yet, and nothing may be sent.
+
+``fire`` is called at a tag at which a token is present at an input or a wake-up is due, at most once per tag.  When
+it is called, every actor upstream (along connections without delay, and outputs that depend on their inputs at once)
+has finished with this tag: all tokens of the tag are there, and an absent token will not come.  In ``fire`` an actor
+may read its inputs (``port.present``, ``port.value``, ``port.tokens``), send any number of tokens, change its state
+and ask for wake-ups.  Tokens that it does not read are gone when it returns.  A token that it sends is received
+within the same tag unless the connection has a delay.
+
+``wake_in(seconds)`` and ``wake_at(seconds)`` ask for a firing later: a wake-up for the present time comes at the
+same time, one microstep on; one in the future at microstep 1.  Asking for the past means now.  A ``Wake`` can be
+cancelled; asking twice for one tag fires once.
+
+``wrapup`` is called once after the last tag, also when the run failed.  Nothing may be sent.
+
+An actor keeps all its state in itself, draws random numbers from ``random`` alone, and never looks at another actor:
+so it cannot know which aspects stand around it, and a run is a function of model and seed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from .parameter import Configurable
+from .ports import InputPort, OutputPort
+from .random import random_stream
+from .tag import Tag, to_nanoseconds, to_seconds
+
+
+class Wake:
+    """A wake-up that an actor asked for: ``due`` becomes true at its tag; ``cancel()`` before that removes it."""
+
+    __slots__ = ("cancelled", "due", "tag")
+
+    def __init__(self, tag: Tag) -> None:
+        self.tag = tag
+        self.due = False
+        self.cancelled = False
+
+    def cancel(self) -> None:
+        """Ask the director to forget it."""
+        self.cancelled = True
+
+
+class Context(Protocol):
+    """What the engine offers to an actor of a running model."""
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of the run."""
+
+    @property
+    def environment(self) -> Any:
+        """The SimPy environment; its time is in nanoseconds."""
+
+    def wake(self, actor: Actor, time: int) -> Wake:
+        """Fire ``actor`` at ``time`` (ns)."""
+
+
+class Actor(Configurable):
+    """Base of all actors: declare ``InputPort``, ``OutputPort`` and ``Parameter`` in the class, write ``fire``.
+
+    >>> class Gain(Actor):
+    ...     input = InputPort(float)
+    ...     output = OutputPort(float)
+    ...     factor = Parameter(float, 1.0, doc="what each token is multiplied by")
+    ...
+    ...     def fire(self) -> None:
+    ...         for token in self.input.tokens:
+    ...             self.output.send(self.factor * token)
+    """
+
+    # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.
+    is_source: ClassVar[bool] = False
+
+    def __init__(self, path: str, **parameters: object) -> None:
+        super().__init__(**parameters)
+        self.path = path
+        self._context: Context | None = None
+        self._streams: dict[str, np.random.Generator] = {}
+        self.inputs: dict[str, InputPort[Any]] = {}
+        self.outputs: dict[str, OutputPort[Any]] = {}
+        for name, port in declared_ports(type(self)).items():
+            bound = port.bind(self)
+            self.__dict__[name] = bound
+            if isinstance(bound, InputPort):
+                self.inputs[name] = bound
+            else:
+                self.outputs[name] = bound
+
+    def initialize(self) -> None:
+        """Called once before the first tag."""
+
+    def fire(self) -> None:
+        """Called at each tag at which there is something to do; see the firing contract."""
+        raise NotImplementedError(f"{type(self).__name__} has no fire()")
+
+    def wrapup(self) -> None:
+        """Called once after the last tag."""
+
+    def enter(self, context: Context) -> None:
+        """Engine: the actor becomes part of a run."""
+        self._context = context
+        self._streams.clear()
+
+    @property
+    def context(self) -> Context:
+        """The run that the actor is part of."""
+        if self._context is None:
+            raise RuntimeError(f"{self.path} is not part of a running model")
+        return self._context
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag."""
+        return self.context.tag
+
+    @property
+    def now(self) -> float:
+        """The present time in seconds."""
+        return to_seconds(self.context.tag.time)
+
+    @property
+    def random(self) -> np.random.Generator:
+        """The actor's own random stream."""
+        return self.random_stream("")
+
+    def random_stream(self, purpose: str) -> np.random.Generator:
+        """A random stream of the actor's for one purpose, independent of all others."""
+        if purpose not in self._streams:
+            self._streams[purpose] = random_stream(self.context.seed, self.path, purpose)
+        return self._streams[purpose]
+
+    def wake_in(self, delay: float) -> Wake:
+        """Ask to be fired after ``delay`` seconds."""
+        return self.context.wake(self, self.context.tag.time + to_nanoseconds(delay))
+
+    def wake_at(self, time: float) -> Wake:
+        """Ask to be fired at ``time`` seconds."""
+        return self.context.wake(self, to_nanoseconds(time))
+
+
+def declared_ports(cls: type) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+    """The ports of an actor class by name, those of its bases first."""
+    found: dict[str, InputPort[Any] | OutputPort[Any]] = {}
+    for base in reversed(cls.__mro__):
+        for name, value in vars(base).items():
+            if isinstance(value, (InputPort, OutputPort)):
+                found[name] = value
+    return found

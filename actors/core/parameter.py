@@ -1,0 +1,274 @@
+"""Parameters, declared once: type, unit, default, bounds and doc feed the constructor, checks and the reference."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Generic, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import EpicycleError
+from .units import UnitError, convert
+
+T = TypeVar("T")
+
+
+class ParameterError(EpicycleError):
+    """A value that a parameter does not take; the message says what it takes."""
+
+
+class _Required:
+    """The default of a parameter that has none."""
+
+    def __repr__(self) -> str:
+        return "required"
+
+
+REQUIRED: Any = _Required()
+
+
+class Parameter(Generic[T]):
+    """A declared parameter: reads as its value on an instance, as itself on the class.
+
+    ``type`` is ``float``, ``int``, ``bool``, ``str`` or a ``Configurable`` class (then the value is a mapping with a
+    ``type`` key that names one of its subclasses).  A number may come as text with a unit (``"8 m/s"``); it is
+    converted to ``unit``.  ``shape`` makes it an array of floats: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
+    """
+
+    def __init__(
+        self,
+        type: type[T],
+        default: T | None = REQUIRED,
+        *,
+        unit: str = "",
+        min: float | None = None,
+        max: float | None = None,
+        choices: Sequence[str] = (),
+        shape: tuple[int | None, ...] | None = None,
+        optional: bool = False,
+        doc: str = "",
+    ) -> None:
+        self.type: Any = type
+        self.default = default
+        self.unit = unit
+        self.min = min
+        self.max = max
+        self.choices = tuple(choices)
+        self.shape = shape
+        self.optional = optional or default is None
+        self.doc = doc
+        self.name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Parameter[T]: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> T: ...
+    def __get__(self, instance: object | None, owner: type) -> Parameter[T] | T:
+        # Values live in the instance's __dict__, which Python looks up before this; only the class gets here.
+        if instance is None:
+            return self
+        raise AttributeError(f"{owner.__name__}.{self.name} is read before it was set")
+
+    @property
+    def required(self) -> bool:
+        """Whether a value must be given."""
+        return self.default is REQUIRED
+
+    def describe_type(self) -> str:
+        """The type in words, for messages and the reference."""
+        if isinstance(self.type, type) and issubclass(self.type, Configurable):
+            return " or ".join(sorted(variants(self.type)))
+        word = {float: "number", int: "integer", bool: "true or false", str: "text"}[self.type]
+        if self.shape is None:
+            return word
+        sizes = " x ".join("n" if size is None else str(size) for size in self.shape)
+        return f"list of {sizes} {word}s"
+
+    def convert(self, value: object) -> T | None:
+        """The value to be stored; raises ``ParameterError`` with a message that follows 'NAME: '."""
+        if value is None:
+            if self.optional:
+                return None
+            raise ParameterError(f"a value is missing, expected {self._expected()}")
+        if isinstance(self.type, type) and issubclass(self.type, Configurable):
+            return build_variant(self.type, value)  # type: ignore[return-value]
+        if self.shape is not None:
+            return self._array(value)  # type: ignore[return-value]
+        result: Any = self._scalar(value)
+        return result  # type: ignore[no-any-return]
+
+    def _expected(self) -> str:
+        text = self.describe_type()
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        if self.unit and self.unit != "1":
+            text += f" in {self.unit}"
+        if self.min is not None and self.max is not None:
+            text += f" from {self.min:g} to {self.max:g}"
+        elif self.min is not None:
+            text += f" >= {self.min:g}"
+        elif self.max is not None:
+            text += f" <= {self.max:g}"
+        return text
+
+    def _scalar(self, value: object) -> object:
+        if self.type is bool:
+            if isinstance(value, (bool, np.bool_)):
+                return bool(value)
+        elif self.type is str:
+            if isinstance(value, str):
+                if self.choices and value not in self.choices:
+                    raise ParameterError(
+                        f"{value!r} is not {self._expected()}{_did_you_mean(value, self.choices)}"
+                    )
+                return value
+        elif isinstance(value, (int, float, np.integer, np.floating, str)) and not isinstance(value, bool):
+            return self._bounded(self._number(value))
+        raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+
+    def _number(self, value: Any) -> float | int:
+        if isinstance(value, str):
+            if not self.unit:
+                raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+            try:
+                value = convert(value, self.unit)
+            except UnitError as error:
+                raise ParameterError(str(error)) from None
+        if self.type is int:
+            if float(value) != math.floor(value):
+                raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+            return int(value)
+        return float(value)
+
+    def _bounded(self, value: float | int) -> float | int:
+        if math.isnan(value):
+            raise ParameterError(f"nan is not {self._expected()}")
+        if (self.min is not None and value < self.min) or (self.max is not None and value > self.max):
+            raise ParameterError(f"{value:g} is out of bounds, expected {self._expected()}")
+        return value
+
+    def _array(self, value: object) -> NDArray[np.float64]:
+        assert self.shape is not None
+        array = np.array(self._rows(value, self.shape, value), dtype=float)
+        if array.size == 0:
+            array = array.reshape([0 if size is None else size for size in self.shape])
+        array.flags.writeable = False
+        return array
+
+    def _rows(self, value: object, shape: tuple[int | None, ...], whole: object) -> object:
+        if not shape:
+            return self._scalar(value)
+        wrong = not isinstance(value, (list, tuple, np.ndarray))
+        if wrong or (shape[0] is not None and len(value) != shape[0]):  # type: ignore[arg-type]
+            raise ParameterError(f"{_shown(whole)} is not a {self._expected()}")
+        return [self._rows(item, shape[1:], whole) for item in value]  # type: ignore[attr-defined]
+
+
+def array_parameter(
+    shape: tuple[int | None, ...],
+    default: object = REQUIRED,
+    *,
+    unit: str = "",
+    min: float | None = None,
+    max: float | None = None,
+    doc: str = "",
+) -> Parameter[NDArray[np.float64]]:
+    """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
+    parameter: Parameter[Any] = Parameter(float, None, unit=unit, min=min, max=max, shape=shape, doc=doc)
+    parameter.optional = default is None
+    parameter.default = default
+    return parameter
+
+
+class Configurable:
+    """Something with declared parameters: actors, aspects and the parts that they are made of."""
+
+    # Names that the YAML uses beside parameters, which no parameter may take.
+    reserved: ClassVar[frozenset[str]] = frozenset({"type", "count"})
+
+    def __init__(self, **values: object) -> None:
+        declared = declared_parameters(type(self))
+        for name in values:
+            if name not in declared:
+                raise ParameterError(unknown_parameter(type(self), name))
+        for name, parameter in declared.items():
+            if name in values:
+                try:
+                    self.__dict__[name] = parameter.convert(values[name])
+                except ParameterError as error:
+                    raise ParameterError(f"{type(self).__name__}.{name}: {error}") from None
+            elif parameter.required:
+                raise ParameterError(f"{type(self).__name__} needs a value for {name!r}")
+            else:
+                self.__dict__[name] = _default(parameter)
+
+    def __init_subclass__(cls, **keywords: object) -> None:
+        super().__init_subclass__(**keywords)
+        for name, value in vars(cls).items():
+            if isinstance(value, Parameter) and name in cls.reserved:
+                raise TypeError(f"{cls.__name__}: a parameter may not be called {name!r}")
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={self.__dict__.get(name)!r}" for name in declared_parameters(type(self)))
+        return f"{type(self).__name__}({values})"
+
+
+def _default(parameter: Parameter[Any]) -> object:
+    if parameter.default is None or isinstance(parameter.default, Configurable):
+        return parameter.default
+    return parameter.convert(parameter.default)
+
+
+def declared_parameters(cls: type) -> dict[str, Parameter[Any]]:
+    """The parameters of a class by name, those of its bases first."""
+    found: dict[str, Parameter[Any]] = {}
+    for base in reversed(cls.__mro__):
+        for name, value in vars(base).items():
+            if isinstance(value, Parameter):
+                found[name] = value
+    return found
+
+
+def unknown_parameter(cls: type, name: str) -> str:
+    """The message for a parameter that the class does not have."""
+    return f"{cls.__name__} has no parameter {name!r}{_did_you_mean(name, declared_parameters(cls))}"
+
+
+def variants(base: type) -> dict[str, type]:
+    """The concrete classes below ``base`` by name; a class whose name starts with '_' stays hidden."""
+    found: dict[str, type] = {}
+    for child in base.__subclasses__():
+        if not child.__name__.startswith("_"):
+            found[child.__name__] = child
+        found.update(variants(child))
+    return found
+
+
+def build_variant(base: type, value: object) -> object:
+    """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance passes through."""
+    if isinstance(value, base):
+        return value
+    known = variants(base)
+    valid = ", ".join(sorted(known))
+    if not isinstance(value, Mapping) or "type" not in value:
+        raise ParameterError(f"{_shown(value)} is not a mapping with a 'type', one of {valid}")
+    name = value["type"]
+    if name not in known:
+        raise ParameterError(f"{name!r} is not one of {valid}{_did_you_mean(str(name), known)}")
+    return known[name](**{key: item for key, item in value.items() if key != "type"})
+
+
+def _did_you_mean(name: str, candidates: object) -> str:
+    close = difflib.get_close_matches(name, list(candidates), n=1)  # type: ignore[call-overload]
+    return f", did you mean {close[0]!r}?" if close else ""
+
+
+def _shown(value: object) -> str:
+    text = repr(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

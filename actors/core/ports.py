@@ -1,0 +1,177 @@
+"""Ports: the typed ends of wires.  Declared on an actor's class, bound to each of its instances.
+
+An input port holds the tokens of the present tag and nothing else: after the actor has fired they are gone.
+An output port hands a token on at once; who gets it, and through which delays and aspects, is the engine's matter.
+"""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Callable
+from copy import copy
+from typing import Any, Generic, TypeVar
+
+from .errors import EpicycleError
+
+T = TypeVar("T")
+
+
+class PortError(EpicycleError):
+    """A port was read or written in a way that its declaration or the model does not allow."""
+
+
+class _Port(Generic[T]):
+    """What both directions share: the declaration, and where the instance stands."""
+
+    direction = ""
+
+    def __init__(self, type: Any, *, multi: bool, doc: str) -> None:
+        self.type = type
+        self.multi = multi
+        self.doc = doc
+        self.name = ""
+        self.path = ""
+        self.actor: Any = None
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def bind(self, actor: Any) -> Any:
+        """The port of one instance."""
+        bound = copy(self)
+        bound.actor = actor
+        bound.path = f"{actor.path}.{self.name}"
+        return bound
+
+    def __repr__(self) -> str:
+        return f"<{self.direction} port {self.path or self.name}: {type_name(self.type)}>"
+
+
+class InputPort(_Port[T]):
+    """Where tokens arrive.
+
+    ``required``: the model is wrong when nothing is connected to it.  ``multi``: any number of connections, each a
+    channel, in the order in which they are declared.
+    """
+
+    direction = "input"
+
+    def __init__(
+        self, type: type[T] | Any, *, multi: bool = False, required: bool = True, doc: str = ""
+    ) -> None:
+        super().__init__(type, multi=multi, doc=doc)
+        self.required = required
+        self.width = 0
+        self._tokens: list[T] = []
+        self._channels: list[int] = []
+
+    def bind(self, actor: Any) -> InputPort[T]:
+        bound: InputPort[T] = super().bind(actor)
+        bound._tokens, bound._channels = [], []
+        return bound
+
+    @property
+    def present(self) -> bool:
+        """Whether a token has arrived at the present tag."""
+        return bool(self._tokens)
+
+    @property
+    def value(self) -> T:
+        """The token of the present tag, the latest if there are several; raises ``PortError`` if there is none."""
+        if not self._tokens:
+            raise PortError(f"{self.path} has no token at this tag; ask 'present' before 'value'")
+        return self._tokens[-1]
+
+    @property
+    def tokens(self) -> tuple[T, ...]:
+        """All tokens of the present tag in the order of their arrival."""
+        return tuple(self._tokens)
+
+    def by_channel(self) -> list[list[T]]:
+        """The tokens of the present tag, a list for each channel."""
+        result: list[list[T]] = [[] for _ in range(self.width)]
+        for token, channel in zip(self._tokens, self._channels, strict=True):
+            result[channel].append(token)
+        return result
+
+    def put(self, token: T, channel: int) -> None:
+        """Engine: a token arrives."""
+        self._tokens.append(token)
+        self._channels.append(channel)
+
+    def clear(self) -> None:
+        """Engine: the tag is over."""
+        self._tokens.clear()
+        self._channels.clear()
+
+
+class OutputPort(_Port[T]):
+    """Where tokens leave.
+
+    ``depends_on`` names the inputs that a token may depend on within the same tag; ``None`` means all of them, ``()``
+    none (an actor that delays), which lets the port stand in a loop.
+    """
+
+    direction = "output"
+
+    def __init__(
+        self,
+        type: type[T] | Any,
+        *,
+        multi: bool = False,
+        depends_on: tuple[str, ...] | None = None,
+        doc: str = "",
+    ) -> None:
+        super().__init__(type, multi=multi, doc=doc)
+        self.depends_on = depends_on
+        self.width = 0
+        self._emit: Callable[[T, int | None], None] = self._unbound
+
+    def bind(self, actor: Any) -> OutputPort[T]:
+        bound: OutputPort[T] = super().bind(actor)
+        bound._emit = bound._unbound
+        return bound
+
+    def _unbound(self, token: T, channel: int | None) -> None:
+        raise PortError(f"{self.path or self.name} is not part of a running model; nothing can be sent yet")
+
+    def send(self, token: T, channel: int | None = None) -> None:
+        """Send a token at the present tag: to all channels, or to the one given."""
+        self._emit(token, channel)
+
+    def connect(self, emit: Callable[[T, int | None], None]) -> None:
+        """Engine: what ``send`` does from now on."""
+        self._emit = emit
+
+
+def type_name(declared: Any) -> str:
+    """A port type as a person would write it."""
+    if declared is object or declared is Any:
+        return "any"
+    arguments = typing.get_args(declared)
+    if isinstance(declared, types.UnionType) or typing.get_origin(declared) is typing.Union:
+        return " | ".join(type_name(argument) for argument in arguments)
+    if arguments:
+        return f"{type_name(typing.get_origin(declared))}[{', '.join(type_name(a) for a in arguments)}]"
+    return getattr(declared, "__name__", str(declared))
+
+
+def accepts(wanted: Any, given: Any) -> bool:
+    """Whether every token of type ``given`` may enter a port of type ``wanted``; an int passes for a float.
+
+    ``Any`` is for actors that hand on what they get: it goes with everything.
+    """
+    if wanted in (object, Any) or given is Any or wanted == given:
+        return True
+    if isinstance(given, types.UnionType) or typing.get_origin(given) is typing.Union:
+        return all(accepts(wanted, each) for each in typing.get_args(given))
+    if isinstance(wanted, types.UnionType) or typing.get_origin(wanted) is typing.Union:
+        return any(accepts(each, given) for each in typing.get_args(wanted))
+    if wanted is float and given is int:
+        return True
+    inner, outer = typing.get_origin(given) or given, typing.get_origin(wanted) or wanted
+    if isinstance(inner, type) and isinstance(outer, type) and issubclass(inner, outer):
+        wanted_arguments, given_arguments = typing.get_args(wanted), typing.get_args(given)
+        return not wanted_arguments or wanted_arguments == given_arguments
+    return False

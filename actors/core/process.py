@@ -1,0 +1,89 @@
+"""Process: an actor written as a SimPy generator instead of ``fire``.
+
+``run()`` yields events: ``self.wait(seconds)``, ``self.read(port)``, or any SimPy event (a resource's request, a
+condition, another process).  Waits and reads resume it as a firing, at the tag and in the order in which a reactive
+actor would fire; a SimPy event resumes it when SimPy does, and what it then sends is received at the next microstep
+of that time.  Tokens that arrive while it waits for something else queue up at the port until they are read.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator
+from typing import Any, ClassVar
+
+from simpy.events import Event
+from simpy.events import Process as SimPyProcess
+
+from .actor import Actor, Wake
+from .ports import InputPort
+
+
+class Process(Actor):
+    """Base of the actors that are written as a generator ``run()``."""
+
+    is_source: ClassVar[bool] = True
+
+    def run(self) -> Generator[Event, Any, None]:
+        """The behaviour; yields events and sends tokens."""
+        raise NotImplementedError(f"{type(self).__name__} has no run()")
+
+    def initialize(self) -> None:
+        self._waits: list[tuple[Wake, Event]] = []
+        self._reads: list[tuple[str, Event]] = []
+        self._queued: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
+        start = self.wait(0.0)
+        self.process = SimPyProcess(self.environment, self._behave(start))
+
+    def _behave(self, start: Event) -> Generator[Event, Any, None]:
+        yield start
+        yield from self.run()
+
+    @property
+    def environment(self) -> Any:
+        """The SimPy environment, for resources, conditions and interrupts; its time is in nanoseconds."""
+        return self.context.environment
+
+    def wait(self, delay: float) -> Event:
+        """An event that happens in ``delay`` seconds; 0 is the next microstep."""
+        event = Event(self.environment)
+        self._waits.append((self.wake_in(delay), event))
+        return event
+
+    def read(self, port: InputPort[Any]) -> Event:
+        """An event whose value is the port's next token: at once if one is queued, or else when it arrives."""
+        event = Event(self.environment)
+        queue = self._queued[port.name]
+        if queue:
+            _settle(event, queue.popleft())
+        else:
+            self._reads.append((port.name, event))
+        return event
+
+    def fire(self) -> None:
+        for name, port in self.inputs.items():
+            self._queued[name].extend(port.tokens)
+        due = [entry for entry in self._waits if entry[0].due]
+        self._waits = [entry for entry in self._waits if not entry[0].due]
+        for _, event in due:
+            _settle(event, None)
+        # A resumed process may ask for the next token at once, so look again until no read can be served.
+        served = True
+        while served:
+            served = False
+            for entry in self._reads:
+                name, event = entry
+                if self._queued[name]:
+                    self._reads.remove(entry)
+                    _settle(event, self._queued[name].popleft())
+                    served = True
+                    break
+
+
+def _settle(event: Event, value: object) -> None:
+    """Let an event happen now, inside the firing, as SimPy's ``Environment.step`` would for its next event."""
+    event._ok = True
+    event._value = value
+    callbacks, event.callbacks = event.callbacks, None  # type: ignore[assignment]
+    for callback in callbacks or ():
+        callback(event)

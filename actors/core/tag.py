@@ -1,0 +1,40 @@
+"""Superdense time: a tag is an instant in integer nanoseconds and a microstep within that instant."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+NANOSECONDS_PER_SECOND = 1_000_000_000
+# Where time ends: about 146 years. Beyond it a time is a mistake, and int64 columns could not hold it.
+LATEST = 2**62
+
+
+class Tag(NamedTuple):
+    """A point of superdense time; tags are ordered by time, then microstep."""
+
+    time: int
+    microstep: int
+
+    @property
+    def seconds(self) -> float:
+        """The time in seconds."""
+        return to_seconds(self.time)
+
+    def __str__(self) -> str:
+        return f"({to_seconds(self.time):g} s, {self.microstep})"
+
+
+def to_nanoseconds(seconds: float) -> int:
+    """The nearest whole nanosecond; raises ``ValueError`` for NaN, infinities and times past ``LATEST``."""
+    if not math.isfinite(seconds):
+        raise ValueError(f"{seconds!r} is not a time")
+    nanoseconds = round(seconds * NANOSECONDS_PER_SECOND)
+    if abs(nanoseconds) > LATEST:
+        raise ValueError(f"{seconds!r} s is out of range, the latest time is {to_seconds(LATEST):g} s")
+    return nanoseconds
+
+
+def to_seconds(nanoseconds: int) -> float:
+    """Seconds at the edge of the house."""
+    return nanoseconds / NANOSECONDS_PER_SECOND
