@@ -1,0 +1,28 @@
+"""From YAML to results: models, simulations, pictures."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .engine import ActorError, Results, Simulation
+    from .model import Model, ModelError, load_model
+
+__all__ = ["ActorError", "Model", "ModelError", "Results", "Simulation", "load_model"]
+
+_HOMES = {
+    "ActorError": "engine",
+    "Results": "engine",
+    "Simulation": "engine",
+    "Model": "model",
+    "ModelError": "model",
+    "load_model": "model",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Loaded on first use: `epicycle --help` must not wait for NumPy and networkx.
+    if name in _HOMES:
+        return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

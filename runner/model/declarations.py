@@ -1,0 +1,392 @@
+"""What a model file says, read off its nodes: shape is checked here, meaning in ``elaborate``."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from .document import Entry, Mapping, Node, Scalar, Sequence
+from .problems import Position, Problems, did_you_mean
+
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+REDUCTIONS = ("last", "first", "min", "max", "sum", "mean", "count")
+
+MODEL_KEYS = (
+    "model",
+    "doc",
+    "include",
+    "parameters",
+    "composites",
+    "actors",
+    "connections",
+    "aspects",
+    "run",
+    "metrics",
+    "figures",
+)
+LIBRARY_KEYS = ("doc", "include", "composites")
+COMPOSITE_KEYS = ("doc", "parameters", "inputs", "outputs", "actors", "connections", "aspects")
+PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
+CONNECTION_KEYS = ("from", "to", "delay")
+RUN_KEYS = ("stop", "stop_when", "seed", "record")
+METRIC_KEYS = ("of", "take", "unit", "doc")
+
+
+@dataclass
+class Text:
+    """A piece of text and where it stands."""
+
+    text: str
+    position: Position
+
+
+@dataclass
+class ParameterText:
+    """A parameter that a model or composite declares."""
+
+    name: str
+    position: Position
+    value: Node | None = None
+    unit: str = ""
+    min: float | None = None
+    max: float | None = None
+    choices: tuple[str, ...] = ()
+    doc: str = ""
+
+
+@dataclass
+class PartText:
+    """An actor, aspect or figure: a type and values for its parameters."""
+
+    name: str
+    position: Position
+    type: Text
+    values: dict[str, Entry] = field(default_factory=dict)
+    count: Node | None = None
+    at: list[Text] = field(default_factory=list)
+    enabled: Node | None = None
+
+
+@dataclass
+class ConnectionText:
+    """One entry of ``connections``: every source is wired to every destination."""
+
+    sources: list[Text]
+    destinations: list[Text]
+    position: Position
+    delay: Node | None = None
+
+
+@dataclass
+class MetricText:
+    """A number taken from what a port sends."""
+
+    name: str
+    port: Text
+    take: str
+    unit: str
+    doc: str
+    position: Position
+
+
+@dataclass
+class CompositeText:
+    """A composite class, or the model itself, which is the outermost one."""
+
+    name: str
+    position: Position
+    doc: str = ""
+    parameters: dict[str, ParameterText] = field(default_factory=dict)
+    inputs: dict[str, Position] = field(default_factory=dict)
+    outputs: dict[str, Position] = field(default_factory=dict)
+    actors: dict[str, PartText] = field(default_factory=dict)
+    connections: list[ConnectionText] = field(default_factory=list)
+    aspects: dict[str, PartText] = field(default_factory=dict)
+
+
+@dataclass
+class ModelText:
+    """A whole model file, without what it includes."""
+
+    root: CompositeText
+    include: list[Text] = field(default_factory=list)
+    composites: dict[str, CompositeText] = field(default_factory=dict)
+    run: dict[str, Entry] = field(default_factory=dict)
+    metrics: list[MetricText] = field(default_factory=list)
+    figures: dict[str, PartText] = field(default_factory=dict)
+
+
+class DeclarationReader:
+    """Reads one file's nodes; whatever is misshapen is added to ``problems`` and left out."""
+
+    def __init__(self, problems: Problems) -> None:
+        self.problems = problems
+
+    def model(self, node: Node) -> ModelText | None:
+        """A file that is a model: it has the key ``model``."""
+        entries = self.entries(node, "the model", MODEL_KEYS)
+        if entries is None:
+            return None
+        name = "model"
+        if "model" in entries:
+            name = self.name(entries["model"].value, "the model's name") or name
+        else:
+            self.problems.add(
+                "the model has no name", node.position, "begin the file with a line like 'model: my_model'"
+            )
+        text = ModelText(self.composite(name, entries, node.position))
+        self.library(entries, text)
+        if "run" in entries:
+            text.run = self.entries(entries["run"].value, "run", RUN_KEYS) or {}
+        for key, entry in self.named(entries, "metrics"):
+            if (metric := self.metric(key, entry)) is not None:
+                text.metrics.append(metric)
+        for key, entry in self.named(entries, "figures"):
+            if (part := self.part(key, entry, "figure")) is not None:
+                text.figures[key] = part
+        return text
+
+    def included(self, node: Node) -> ModelText | None:
+        """A file of composite classes."""
+        entries = self.entries(node, "an included file", LIBRARY_KEYS)
+        if entries is None:
+            return None
+        text = ModelText(CompositeText("", node.position))
+        self.library(entries, text)
+        return text
+
+    def library(self, entries: dict[str, Entry], text: ModelText) -> None:
+        """``include`` and ``composites``, which models and included files share."""
+        if "include" in entries:
+            text.include = self.texts(entries["include"].value, "include")
+        for key, entry in self.named(entries, "composites"):
+            inner = self.entries(entry.value, f"composite {key!r}", COMPOSITE_KEYS)
+            if inner is not None:
+                text.composites[key] = self.composite(key, inner, entry.key.position)
+
+    def composite(self, name: str, entries: dict[str, Entry], position: Position) -> CompositeText:
+        """The keys that a model and a composite class share."""
+        result = CompositeText(name, position)
+        if "doc" in entries:
+            result.doc = self.text(entries["doc"].value, "doc") or ""
+        for key, entry in self.named(entries, "parameters"):
+            result.parameters[key] = self.parameter(key, entry)
+        for direction in ("inputs", "outputs"):
+            if direction in entries:
+                for port in self.texts(entries[direction].value, direction):
+                    if not NAME.match(port.text):
+                        self.problems.add(f"{port.text!r} is not a port name", port.position)
+                        continue
+                    ports = result.inputs if direction == "inputs" else result.outputs
+                    if port.text in result.inputs or port.text in result.outputs:
+                        self.problems.add(f"port {port.text!r} is declared twice", port.position)
+                    ports[port.text] = port.position
+        for key, entry in self.named(entries, "actors"):
+            if (part := self.part(key, entry, "actor")) is not None:
+                result.actors[key] = part
+                if key in result.inputs or key in result.outputs:
+                    self.problems.add(
+                        f"{key!r} is the name of an actor and of a port", entry.key.position, "rename one"
+                    )
+        if "connections" in entries:
+            for item in self.items(entries["connections"].value, "connections"):
+                if (connection := self.connection(item)) is not None:
+                    result.connections.append(connection)
+        for key, entry in self.named(entries, "aspects"):
+            if (part := self.part(key, entry, "aspect")) is not None:
+                result.aspects[key] = part
+        return result
+
+    def parameter(self, name: str, entry: Entry) -> ParameterText:
+        """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
+        result = ParameterText(name, entry.key.position)
+        if not isinstance(entry.value, Mapping):
+            result.value = entry.value
+            return result
+        inner = self.entries(entry.value, f"parameter {name!r}", PARAMETER_KEYS) or {}
+        result.value = inner["value"].value if "value" in inner else None
+        for key in ("unit", "doc"):
+            if key in inner:
+                setattr(result, key, self.text(inner[key].value, key) or "")
+        for key in ("min", "max"):
+            if key in inner:
+                node = inner[key].value
+                if isinstance(node, Scalar) and type(node.value) in (int, float):
+                    setattr(result, key, float(node.text) if isinstance(node.value, str) else node.value)
+                else:
+                    self.problems.add(f"{key} of parameter {name!r} is not a number", node.position)
+        if "choices" in inner:
+            result.choices = tuple(text.text for text in self.texts(inner["choices"].value, "choices"))
+        return result
+
+    def part(self, name: str, entry: Entry, kind: str) -> PartText | None:
+        """``name: {type: ..., ...}``."""
+        if not isinstance(entry.value, Mapping):
+            self.problems.add(
+                f"{kind} {name!r} is not a mapping",
+                entry.value.position,
+                f"write '{name}: {{type: ...}}' with the {kind}'s type and parameters",
+            )
+            return None
+        values = dict(entry.value.entries)
+        kind_entry = values.pop("type", None)
+        if kind_entry is None:
+            self.problems.add(f"{kind} {name!r} has no type", entry.key.position, "add 'type: ...'")
+            return None
+        type_name = self.text(kind_entry.value, f"the type of {name!r}")
+        if type_name is None:
+            return None
+        part = PartText(name, entry.key.position, Text(type_name, kind_entry.value.position), values)
+        if kind == "actor" and "count" in values:
+            part.count = values.pop("count").value
+        if kind == "aspect":
+            if "at" in values:
+                part.at = self.texts(values.pop("at").value, "at")
+            if "enabled" in values:
+                part.enabled = values.pop("enabled").value
+        return part
+
+    def connection(self, node: Node) -> ConnectionText | None:
+        """``a.out -> b.in, c.in`` or ``{from: ..., to: ..., delay: ...}``."""
+        if isinstance(node, Scalar):
+            text = node.value if isinstance(node.value, str) else node.text
+            left, arrow, right = text.partition("->")
+            if not arrow or "->" in right:
+                self.problems.add(
+                    f"{text!r} is not a connection", node.position, "write 'actor.port -> actor.port'"
+                )
+                return None
+            sources, destinations = self.endpoints(left, node), self.endpoints(right, node)
+            if not sources or not destinations:
+                self.problems.add(f"{text!r} connects nothing", node.position, "write 'actor.port -> actor.port'")
+                return None
+            return ConnectionText(sources, destinations, node.position)
+        entries = self.entries(node, "a connection", CONNECTION_KEYS)
+        if entries is None:
+            return None
+        for key in ("from", "to"):
+            if key not in entries:
+                self.problems.add(f"the connection has no {key!r}", node.position)
+                return None
+        return ConnectionText(
+            self.texts(entries["from"].value, "from"),
+            self.texts(entries["to"].value, "to"),
+            node.position,
+            entries["delay"].value if "delay" in entries else None,
+        )
+
+    def endpoints(self, text: str, node: Scalar) -> list[Text]:
+        """The comma-separated ports of one side; brackets around the list are allowed."""
+        text = text.strip()
+        if text.startswith("[") and text.endswith("]"):
+            text = text[1:-1]
+        found = []
+        for part in text.split(","):
+            if name := part.strip():
+                found.append(Text(name, within(node.position, name)))
+        return found
+
+    def metric(self, name: str, entry: Entry) -> MetricText | None:
+        """``name: {of: port, take: last, unit: s, doc: ...}``."""
+        inner = self.entries(entry.value, f"metric {name!r}", METRIC_KEYS)
+        if inner is None:
+            return None
+        if "of" not in inner:
+            self.problems.add(f"metric {name!r} does not say of what", entry.key.position, "add 'of: actor.port'")
+            return None
+        port = self.text(inner["of"].value, "of")
+        take = self.text(inner["take"].value, "take") if "take" in inner else "last"
+        if take is not None and take not in REDUCTIONS:
+            self.problems.add(
+                f"metric {name!r} cannot take {take!r}{did_you_mean(take, REDUCTIONS)}",
+                inner["take"].value.position,
+                f"valid reductions: {', '.join(REDUCTIONS)}",
+            )
+            return None
+        if port is None or take is None:
+            return None
+        unit = self.text(inner["unit"].value, "unit") if "unit" in inner else ""
+        doc = self.text(inner["doc"].value, "doc") if "doc" in inner else ""
+        position = inner["of"].value.position
+        return MetricText(name, Text(port, position), take, unit or "", doc or "", entry.key.position)
+
+    def entries(self, node: Node, what: str, valid: tuple[str, ...]) -> dict[str, Entry] | None:
+        """The entries of a mapping, unknown keys reported and left out; None if it is no mapping."""
+        if not isinstance(node, Mapping):
+            if isinstance(node, Scalar) and node.value is None:
+                return {}
+            self.problems.add(f"{what} is not a mapping", node.position, f"valid keys: {', '.join(valid)}")
+            return None
+        known = {}
+        for key, entry in node.entries.items():
+            if key in valid:
+                known[key] = entry
+            else:
+                self.problems.add(
+                    f"{what} has no key {key!r}{did_you_mean(key, valid)}",
+                    entry.key.position,
+                    f"valid keys: {', '.join(valid)}",
+                )
+        return known
+
+    def named(self, entries: dict[str, Entry], key: str) -> list[tuple[str, Entry]]:
+        """The entries of a mapping from names to things."""
+        if key not in entries:
+            return []
+        node = entries[key].value
+        if isinstance(node, Scalar) and node.value is None:
+            return []
+        if not isinstance(node, Mapping):
+            self.problems.add(f"{key} is not a mapping from names", node.position)
+            return []
+        found = []
+        for name, entry in node.entries.items():
+            if NAME.match(name):
+                found.append((name, entry))
+            else:
+                self.problems.add(
+                    f"{name!r} is not a name", entry.key.position, "use letters, digits and _, no digit first"
+                )
+        return found
+
+    def items(self, node: Node, what: str) -> tuple[Node, ...]:
+        if isinstance(node, Sequence):
+            return node.items
+        if isinstance(node, Scalar) and node.value is None:
+            return ()
+        self.problems.add(f"{what} is not a list", node.position)
+        return ()
+
+    def texts(self, node: Node, what: str) -> list[Text]:
+        """A text, or a list of texts."""
+        nodes = node.items if isinstance(node, Sequence) else (node,)
+        found = []
+        for item in nodes:
+            if isinstance(item, Scalar) and item.value is None:
+                continue
+            if (text := self.text(item, what)) is not None:
+                found.append(Text(text, item.position))
+        return found
+
+    def text(self, node: Node, what: str) -> str | None:
+        if isinstance(node, Scalar):
+            return node.value if isinstance(node.value, str) else node.text
+        self.problems.add(f"{what} is not a text", node.position)
+        return None
+
+    def name(self, node: Node, what: str) -> str | None:
+        text = self.text(node, what)
+        if text is not None and not NAME.match(text):
+            self.problems.add(
+                f"{what} {text!r} is not a name", node.position, "use letters, digits and _, no digit first"
+            )
+            return None
+        return text
+
+
+def within(position: Position, name: str) -> Position:
+    """The stretch of ``position`` where ``name`` stands, or all of it."""
+    start = position.source.find(name, position.column - 1)
+    if start < 0:
+        return position
+    return Position(position.file, position.line, start + 1, len(name), position.source)

@@ -1,0 +1,419 @@
+"""What expressions compute with: operators, functions and constants, each checked before it is costly."""
+
+import ast
+import math
+import operator
+from collections.abc import Callable
+from typing import Any, Final
+
+from .problems import did_you_mean
+
+MAX_STEPS = 100_000
+MAX_ELEMENTS = 100_000
+MAX_TEXT = 10_000
+MAX_INT = 2**63
+_MAX_DECIMALS = 30
+
+CONSTANTS: Final = {"pi": math.pi, "e": math.e, "inf": math.inf}
+
+
+class BudgetError(Exception):
+    """An expression costs too much."""
+
+
+class Budget:
+    """What one evaluation may still spend; a step is one part, or ten elements or characters."""
+
+    def __init__(self) -> None:
+        self._left = MAX_STEPS
+
+    def spend(self, steps: int) -> None:
+        """Take some steps off, or raise if there are not so many left."""
+        self._left -= steps
+        if self._left < 0:
+            raise BudgetError(f"this takes more than {MAX_STEPS:,} steps")
+
+    def weigh(self, value: object) -> None:
+        """Pay for a value by its size, or raise if it is too large."""
+        if isinstance(value, str):
+            _check_text(len(value))
+            self.spend(len(value) // 10)
+        elif isinstance(value, (list, tuple, dict)):
+            self.spend(_size(value) // 10)
+
+
+def _size(value: object) -> int:
+    """Count the elements at all levels, shared ones as often as they appear; a text counts by its length."""
+    size = 0
+    stack = [value]
+    while stack:
+        item = stack.pop()
+        if isinstance(item, str):
+            size += len(item) // 10
+        elif isinstance(item, (list, tuple, dict)):
+            size += len(item)
+            _check_elements(size)
+            stack += item.values() if isinstance(item, dict) else item
+    _check_elements(size)
+    return size
+
+
+def _check_text(length: int) -> None:
+    if length > MAX_TEXT:
+        raise BudgetError(f"a text of more than {MAX_TEXT:,} characters is too long")
+
+
+def _check_elements(count: int) -> None:
+    if count > MAX_ELEMENTS:
+        raise BudgetError(f"a list of more than {MAX_ELEMENTS:,} elements is too long")
+
+
+def check_result(value: object) -> None:
+    """Raise if the value that an expression hands out is too large or has a NaN in it."""
+    if isinstance(value, str):
+        _check_text(len(value))
+    elif isinstance(value, (list, tuple, dict)):
+        _size(value)
+    stack = [value]
+    while stack:
+        item = stack.pop()
+        if isinstance(item, float) and math.isnan(item):
+            raise ValueError("the result is not a number (NaN)")
+        if isinstance(item, int):
+            _checked(item)
+        elif isinstance(item, (list, tuple, dict)):
+            stack += item.values() if isinstance(item, dict) else item
+
+
+_KINDS: Final[tuple[tuple[type | tuple[type, ...], str], ...]] = (
+    (bool, "a truth value"),  # before int, which it is, too
+    ((int, float), "a number"),
+    (str, "a text"),
+    ((list, tuple), "a list"),
+    (dict, "a dict"),
+)
+
+
+def kind_of(value: object) -> str:
+    """Return what kind of thing a value is, in words."""
+    if value is None:
+        return "null"
+    for kind, word in _KINDS:
+        if isinstance(value, kind):
+            return word
+    return f"a value of type {type(value).__name__}"
+
+
+def text_of(value: object) -> str:
+    """Return a value as it stands in a text: `true`, `null`, `3`, `2.5`, `[1, 'a']`."""
+    parts: list[str] = []
+    _write(value, parts, 0, is_inner=False)
+    return "".join(parts)
+
+
+def _write(value: object, parts: list[str], length: int, *, is_inner: bool) -> int:
+    """Append the pieces of a value; return the length so far, which must not outgrow the limit on the way."""
+    if isinstance(value, (list, tuple, dict)):
+        is_dict = isinstance(value, dict)
+        keys: list[object] = list(value) if isinstance(value, dict) else [None] * len(value)
+        values = value.values() if isinstance(value, dict) else value
+        parts.append("{" if is_dict else "[")
+        for index, (key, item) in enumerate(zip(keys, values, strict=True)):
+            start = (", " if index else "") + (f"{key!r}: " if is_dict else "")
+            parts.append(start)
+            length = _write(item, parts, length + len(start), is_inner=True)
+        parts.append("}" if is_dict else "]")
+        return length + 2
+    if value is None:
+        text = "null"
+    elif isinstance(value, bool):
+        text = "true" if value else "false"
+    elif isinstance(value, float):
+        text = float.__repr__(value)  # also for subclasses that show their type
+    elif isinstance(value, str) and is_inner:
+        text = repr(value)
+    else:
+        text = str(value)
+    _check_text(length + len(text))
+    parts.append(text)
+    return length + len(text)
+
+
+# --- operators ----------------------------------------------------------------------------------------
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float))
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, (list, tuple))
+
+
+def _checked(result: Any, *operands: Any) -> Any:
+    """Return the result if it is a real number of bearable size, and infinite only if an operand was."""
+    if isinstance(result, complex):
+        raise ValueError("the result is not a real number")
+    if isinstance(result, int):
+        if abs(result) > MAX_INT:
+            raise OverflowError
+    elif math.isnan(result):
+        raise ValueError("the result is not a number (NaN)")
+    elif math.isinf(result) and not any(isinstance(x, float) and math.isinf(x) for x in operands):
+        raise OverflowError
+    return result
+
+
+def _arithmetic(sign: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    def apply(left: Any, right: Any) -> Any:
+        if not (_is_number(left) and _is_number(right)):
+            raise TypeError(f"{sign} needs two numbers, not {kind_of(left)} and {kind_of(right)}")
+        return _checked(function(left, right), left, right)
+
+    return apply
+
+
+def _add(left: Any, right: Any) -> Any:
+    if _is_number(left) and _is_number(right):
+        return _checked(left + right, left, right)
+    if isinstance(left, str) and isinstance(right, str):
+        _check_text(len(left) + len(right))
+        return left + right
+    if _is_list(left) and _is_list(right):
+        _check_elements(len(left) + len(right))
+        return [*left, *right]
+    raise TypeError(f"+ needs two numbers, two texts or two lists, not {kind_of(left)} and {kind_of(right)}")
+
+
+def _multiply(left: Any, right: Any) -> Any:
+    if _is_number(left) and _is_number(right):
+        return _checked(left * right, left, right)
+    whole, times = (right, left) if isinstance(left, int) else (left, right)
+    if isinstance(times, int) and isinstance(whole, str):
+        _check_text(len(whole) * times)
+        return whole * times
+    if isinstance(times, int) and _is_list(whole):
+        _check_elements(len(whole) * times)
+        return list(whole) * times
+    raise TypeError(
+        f"* needs two numbers, or a text or list and a whole number, not {kind_of(left)} and {kind_of(right)}"
+    )
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    # An int of b bits to the power n has at least (b - 1) * n bits: known before it is computed.
+    if isinstance(base, int) and isinstance(exponent, int) and (base.bit_length() - 1) * exponent > 64:
+        raise OverflowError
+    return base**exponent
+
+
+def _ordering(sign: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], bool]:
+    def apply(left: Any, right: Any) -> bool:
+        for is_kind in (_is_number, _is_text, _is_list):
+            if is_kind(left) and is_kind(right):
+                return bool(function(left, right))
+        raise TypeError(f"{sign} cannot compare {kind_of(left)} with {kind_of(right)}")
+
+    return apply
+
+
+def _contains(item: Any, whole: Any) -> bool:
+    if isinstance(whole, str) and not isinstance(item, str):
+        raise TypeError(f"'in' looks for a text in a text, not for {kind_of(item)}")
+    if isinstance(whole, dict):
+        return isinstance(item, str) and item in whole
+    if not isinstance(whole, (str, list, tuple)):
+        raise TypeError(f"'in' needs a list, dict or text on its right, not {kind_of(whole)}")
+    return item in whole
+
+
+def _signed(sign: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def apply(value: Any) -> Any:
+        if not _is_number(value):
+            raise TypeError(f"{sign} needs a number, not {kind_of(value)}")
+        return function(value)
+
+    return apply
+
+
+UNARY: Final[dict[type[ast.unaryop], Callable[[Any], Any]]] = {
+    ast.USub: _signed("-", operator.neg),
+    ast.UAdd: _signed("+", operator.pos),
+}
+BINARY: Final[dict[type[ast.operator], Callable[[Any, Any], Any]]] = {
+    ast.Add: _add,
+    ast.Sub: _arithmetic("-", operator.sub),
+    ast.Mult: _multiply,
+    ast.Div: _arithmetic("/", operator.truediv),
+    ast.FloorDiv: _arithmetic("//", operator.floordiv),
+    ast.Mod: _arithmetic("%", operator.mod),
+    ast.Pow: _arithmetic("**", _power),
+}
+COMPARE: Final[dict[type[ast.cmpop], Callable[[Any, Any], bool]]] = {
+    ast.Eq: lambda left, right: bool(left == right),
+    ast.NotEq: lambda left, right: bool(left != right),
+    ast.Lt: _ordering("<", operator.lt),
+    ast.LtE: _ordering("<=", operator.le),
+    ast.Gt: _ordering(">", operator.gt),
+    ast.GtE: _ordering(">=", operator.ge),
+    ast.In: _contains,
+    ast.NotIn: lambda item, whole: not _contains(item, whole),
+}
+
+
+def subscript(whole: Any, index: object) -> Any:
+    """Return `whole[index]`: an element of a list, a character of a text, or the value of a key."""
+    if isinstance(whole, dict):
+        if not isinstance(index, str):
+            raise TypeError(f"a dict is asked by a text, not by {kind_of(index)}")
+        if index not in whole:
+            keys = [str(key) for key in whole]
+            guess = did_you_mean(index, keys) or ","
+            raise ValueError(f"there is no key {index!r}{guess} known keys: {', '.join(sorted(keys)[:20])}")
+        return whole[index]
+    if not isinstance(whole, (list, tuple, str)):
+        raise TypeError(f"{kind_of(whole)} has no elements")
+    if type(index) is not int:
+        raise TypeError(f"{kind_of(whole)} is indexed by a whole number, not by {kind_of(index)}")
+    if not -len(whole) <= index < len(whole):
+        raise ValueError(f"there is no element {index}: there are {len(whole)}, the first is 0")
+    return whole[index]
+
+
+# --- functions ----------------------------------------------------------------------------------------
+
+
+def _check_arity(name: str, count: int, least: int, most: float) -> None:
+    if not least <= count <= most:
+        wanted = f"at least {least}" if most == math.inf else f"{least} to {most}"
+        wanted = f"{least}" if least == most else wanted
+        raise TypeError(f"{name} takes {wanted} value{'' if wanted.endswith('1') else 's'}, not {count}")
+
+
+def _numeric(name: str, function: Callable[..., Any], least: int = 1, most: float = 1) -> Callable[..., Any]:
+    """Return a function of numbers that explains itself."""
+
+    def call(*values: Any) -> Any:
+        _check_arity(name, len(values), least, most)
+        for value in values:
+            if not _is_number(value):
+                raise TypeError(f"{name} needs numbers, not {kind_of(value)}")
+        try:
+            result = function(*values)
+        except ValueError:
+            raise ValueError(f"{name} is not defined for {', '.join(map(str, values))}") from None
+        return _checked(result, *values)
+
+    return call
+
+
+def _of_one(name: str, function: Callable[[Any], Any]) -> Callable[..., Any]:
+    def call(*values: Any) -> Any:
+        _check_arity(name, len(values), 1, 1)
+        return function(values[0])
+
+    return call
+
+
+def _round(value: Any, decimals: Any = None) -> Any:
+    if decimals is None:
+        return round(value)
+    if not isinstance(decimals, int) or abs(decimals) > _MAX_DECIMALS:
+        raise TypeError(f"round takes a whole number of decimals up to {_MAX_DECIMALS}, not {decimals}")
+    return round(value, decimals)
+
+
+def _range(*values: Any) -> list[int]:
+    _check_arity("range", len(values), 1, 3)
+    for value in values:
+        if not isinstance(value, int):
+            shown = text_of(value) if isinstance(value, float) else kind_of(value)
+            raise TypeError(f"range needs whole numbers, not {shown}")
+    if len(values) == 3 and values[2] == 0:
+        raise ValueError("range needs a step other than 0")
+    numbers = range(*values)
+    _check_elements(len(numbers))
+    return list(numbers)
+
+
+def _len(value: Any) -> int:
+    if not isinstance(value, (list, tuple, str, dict)):
+        raise TypeError(f"{kind_of(value)} has no length")
+    return len(value)
+
+
+def _needs_list(name: str, value: Any) -> list[Any]:
+    if not _is_list(value):
+        raise TypeError(f"{name} needs a list, not {kind_of(value)}")
+    return list(value)
+
+
+def _sum(value: Any) -> Any:
+    items = _needs_list("sum", value)
+    for item in items:
+        if not _is_number(item):
+            raise TypeError(f"sum needs a list of numbers, this one has {kind_of(item)} in it")
+    return _checked(sum(items), *items)
+
+
+def _ordered(name: str, items: list[Any]) -> list[Any]:
+    """Return the items if they can be put in an order."""
+    if not any(all(map(is_kind, items)) for is_kind in (_is_number, _is_text, _is_list)):
+        raise TypeError(f"{name} cannot compare {' with '.join(sorted({kind_of(item) for item in items}))}")
+    return items
+
+
+def _extreme(name: str, function: Callable[[list[Any]], Any]) -> Callable[..., Any]:
+    def call(*values: Any) -> Any:
+        _check_arity(name, len(values), 1, math.inf)
+        items = _ordered(name, _needs_list(name, values[0]) if len(values) == 1 else list(values))
+        if not items:
+            raise ValueError(f"{name} of an empty list")
+        return function(items)
+
+    return call
+
+
+def _converted(kind: type[int] | type[float], words: str) -> Callable[[Any], Any]:
+    def convert(value: Any) -> Any:
+        if not isinstance(value, (int, float, str)):
+            raise TypeError(f"{kind_of(value)} cannot become {words}")
+        try:
+            result = kind(value)
+        except ValueError:
+            raise ValueError(f"{value!r} is not {words}") from None
+        return result if isinstance(value, str) and math.isinf(result) else _checked(result, value)
+
+    return convert
+
+
+FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
+    "abs": _numeric("abs", abs),
+    "min": _extreme("min", min),
+    "max": _extreme("max", max),
+    "sum": _of_one("sum", _sum),
+    "len": _of_one("len", _len),
+    "range": _range,
+    "round": _numeric("round", _round, 1, 2),
+    "floor": _numeric("floor", math.floor),
+    "ceil": _numeric("ceil", math.ceil),
+    "sqrt": _numeric("sqrt", math.sqrt),
+    "exp": _numeric("exp", math.exp),
+    "log": _numeric("log", math.log, 1, 2),
+    "sin": _numeric("sin", math.sin),
+    "cos": _numeric("cos", math.cos),
+    "tan": _numeric("tan", math.tan),
+    "atan2": _numeric("atan2", math.atan2, 2, 2),
+    "hypot": _numeric("hypot", math.hypot, 1, math.inf),
+    "radians": _numeric("radians", math.radians),
+    "degrees": _numeric("degrees", math.degrees),
+    "int": _of_one("int", _converted(int, "a whole number")),
+    "float": _of_one("float", _converted(float, "a number")),
+    "str": _of_one("str", text_of),
+    "bool": _of_one("bool", bool),
+    "sorted": _of_one("sorted", lambda value: sorted(_ordered("sorted", _needs_list("sorted", value)))),
+}

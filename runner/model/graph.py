@@ -1,0 +1,171 @@
+"""The model graph: every port of every actor and composite as a node, every connection as an edge.
+
+It is a networkx multigraph that validation, scheduling, weaving and drawing read.  A *wire* is a way through it from
+an actor's output port, through any composite ports, to an actor's input port.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import networkx as nx
+
+from epicycle.actors import Actor, InputPort, OutputPort
+
+from .problems import Position
+
+
+@dataclass(frozen=True, eq=False)
+class Hop:
+    """One edge of the graph: a connection between two ports, as declared."""
+
+    source: str
+    destination: str
+    delay: int | None  # ns; None: within the tag
+    position: Position | None
+    order: int
+
+    def __str__(self) -> str:
+        return f"{self.source} -> {self.destination}"
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A way from an output port to an input port."""
+
+    source: OutputPort[Any]
+    destination: InputPort[Any]
+    hops: tuple[Hop, ...]
+
+    @property
+    def immediate(self) -> bool:
+        """Whether a token arrives within the tag in which it is sent."""
+        return all(hop.delay is None for hop in self.hops)
+
+
+class ModelGraph:
+    """The flattened graph of one model."""
+
+    def __init__(self) -> None:
+        self.ports: Any = nx.MultiDiGraph()
+        self.actors: dict[str, Actor] = {}
+        self.positions: dict[str, Position] = {}
+        self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
+        self._order = 0
+
+    def add_actor(self, actor: Actor, position: Position | None) -> None:
+        """Add an actor and its ports."""
+        self.actors[actor.path] = actor
+        if position is not None:
+            self.positions[actor.path] = position
+        for port in (*actor.inputs.values(), *actor.outputs.values()):
+            self.ports.add_node(port.path, port=port, direction=port.direction)
+
+    def add_composite_port(self, path: str, direction: str, position: Position | None) -> None:
+        """Add a port of a composite; tokens only pass through it."""
+        self.ports.add_node(path, port=None, direction=direction)
+        if position is not None:
+            self.positions[path] = position
+
+    def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
+        """Add one connection between two ports."""
+        hop = Hop(source, destination, delay, position, self._order)
+        self._order += 1
+        self.ports.add_edge(source, destination, key=hop.order, hop=hop)
+
+    def direction(self, path: str) -> str:
+        """``input`` or ``output``."""
+        direction: str = self.ports.nodes[path]["direction"]
+        return direction
+
+    def outgoing(self, path: str) -> list[Hop]:
+        """The connections that leave a port, in the order of their declaration."""
+        return sorted((data["hop"] for *_, data in self.ports.out_edges(path, data=True)), key=_order)
+
+    def incoming(self, path: str) -> list[Hop]:
+        """The connections that enter a port, in the order of their declaration."""
+        return sorted((data["hop"] for *_, data in self.ports.in_edges(path, data=True)), key=_order)
+
+    def wires_from(self, port: OutputPort[Any]) -> list[Wire]:
+        """All wires that begin at an output port."""
+        return [
+            Wire(port, self.ports.nodes[hops[-1].destination]["port"], hops)
+            for hops in self._ways(port.path, forward=True)
+            if isinstance(self.ports.nodes[hops[-1].destination]["port"], InputPort)
+        ]
+
+    def wires_to(self, port: InputPort[Any]) -> list[Wire]:
+        """All wires that end at an input port; their order is that of the port's channels."""
+        return [
+            Wire(self.ports.nodes[hops[0].source]["port"], port, hops)
+            for hops in self._ways(port.path, forward=False)
+            if isinstance(self.ports.nodes[hops[0].source]["port"], OutputPort)
+        ]
+
+    def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
+        for hop in self.outgoing(path) if forward else self.incoming(path):
+            far = hop.destination if forward else hop.source
+            if self.ports.nodes[far]["port"] is not None:
+                yield (hop,)
+                continue
+            for rest in self._ways(far, forward=forward):
+                yield (hop, *rest) if forward else (*rest, hop)
+
+    def wires(self) -> Iterator[Wire]:
+        """All wires of the model."""
+        for actor in self.actors.values():
+            for port in actor.outputs.values():
+                yield from self.wires_from(port)
+
+    def source_of(self, path: str) -> list[OutputPort[Any]]:
+        """The actors' output ports behind a port: itself, or what feeds a composite's output."""
+        port = self.ports.nodes[path]["port"]
+        if isinstance(port, OutputPort):
+            return [port]
+        return [found for hop in self.incoming(path) for found in self.source_of(hop.source)]
+
+    def immediate_dependencies(self) -> Any:
+        """The directed graph of what must be known first within a tag: actors' ports only, composites left out.
+
+        An edge from an output to an input is a wire without delay, one from an input to an output of an actor says
+        that the output depends on the input within the tag.
+        """
+        graph: Any = nx.DiGraph()
+        for actor in self.actors.values():
+            graph.add_nodes_from(port.path for port in (*actor.inputs.values(), *actor.outputs.values()))
+            for output in actor.outputs.values():
+                names = actor.inputs if output.depends_on is None else output.depends_on
+                graph.add_edges_from((actor.inputs[name].path, output.path) for name in names)
+        for wire in self.wires():
+            if wire.immediate:
+                graph.add_edge(wire.source.path, wire.destination.path, wire=wire)
+        return graph
+
+    def firing_order(self) -> dict[str, int]:
+        """The rank of each actor: within a tag, lower ranks fire first.
+
+        Depth as in Ptolemy II: of an input, one more than the outputs that reach it within the tag; of an output,
+        the largest of the inputs that it depends on; of an actor, the smallest of its outputs, or the largest of its
+        inputs if it has no outputs.  Actors of equal depth rank in the order of their declaration.  Raises
+        ``networkx.NetworkXUnfeasible`` if there is a loop without delay.
+        """
+        graph = self.immediate_dependencies()
+        depth: dict[str, int] = {}
+        for path in nx.topological_sort(graph):
+            step = 1 if isinstance(self.ports.nodes[path]["port"], InputPort) else 0
+            depth[path] = max((depth[before] + step for before in graph.predecessors(path)), default=0)
+
+        def actor_depth(actor: Actor) -> int:
+            if actor.outputs:
+                return min(depth[port.path] for port in actor.outputs.values())
+            return max((depth[port.path] for port in actor.inputs.values()), default=0)
+
+        # sorted() is stable, so declaration order decides ties.
+        ranked = sorted(self.actors, key=lambda path: actor_depth(self.actors[path]))
+        return {path: rank for rank, path in enumerate(ranked)}
+
+
+def _order(hop: Hop) -> int:
+    return hop.order

@@ -1,0 +1,126 @@
+"""Finding and reading models: a path, or the name of a packaged model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from pathlib import Path
+
+from .declarations import CompositeText, DeclarationReader, ModelText
+from .document import read
+from .elaborate import Elaborator, Model
+from .problems import Problems, did_you_mean
+from .settings import change_aspect, parse_setting, without
+
+MAX_INCLUDES = 200
+
+
+def model_folders() -> list[Path]:
+    """The folders of packaged models.
+
+    A namespace package's ``__path__`` is read, because ``importlib.resources`` fails on it in an editable install.
+    """
+    package = import_module("epicycle.models")
+    return [Path(entry) for entry in package.__path__ if Path(entry).is_dir()]
+
+
+def packaged_models() -> dict[str, Path]:
+    """The packaged models by name."""
+    found = {}
+    for folder in model_folders():
+        for path in sorted(folder.glob("*.yaml")):
+            found[path.stem] = path
+    return found
+
+
+def find_model(name: str, problems: Problems) -> Path | None:
+    """The file of a model: a path if it looks like one, otherwise a packaged model's name."""
+    if name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name:
+        return Path(name)
+    known = packaged_models()
+    if name not in known:
+        problems.add(
+            f"there is no packaged model {name!r}{did_you_mean(name, list(known))}",
+            None,
+            f"packaged models: {', '.join(known) or 'none'}; a path to a file ends in .yaml",
+        )
+        return None
+    return known[name]
+
+
+def load_model(
+    name: str | Path,
+    *,
+    set: Iterable[str] = (),  # noqa: A002 - the option's name
+    aspects: Iterable[str] = (),
+    without_aspects: Iterable[str] = (),
+) -> Model:
+    """Read, change and check a model; raises ``ModelError`` with all that is wrong."""
+    problems = Problems()
+    settings = [found for text in set if (found := parse_setting(text, problems)) is not None]
+    path = find_model(str(name), problems)
+    if path is None:
+        problems.raise_if_any()
+        raise AssertionError("a model that is not found is a problem")
+    node = read(path, problems)
+    if node is None:
+        problems.raise_if_any()
+        raise AssertionError("a file that cannot be read is a problem")
+    reader = DeclarationReader(problems)
+    text = reader.model(node)
+    if text is None:
+        problems.raise_if_any()
+        raise AssertionError("a model that is no mapping is a problem")
+    composites = _composites(text, path, reader, problems)
+    for change in without_aspects:
+        without(text, change, problems)
+    for change in aspects:
+        change_aspect(text, change, problems)
+    model = Elaborator(text, composites, settings, problems).model()
+    problems.raise_if_any()
+    return model
+
+
+def _composites(
+    text: ModelText, path: Path, reader: DeclarationReader, problems: Problems
+) -> dict[str, CompositeText]:
+    """The composite classes of a model and of all that it includes."""
+    # Included files must lie in or below the model's folder: a model cannot make us read other files.
+    root = path.parent.resolve()
+    composites: dict[str, CompositeText] = {}
+    seen: dict[Path, None] = {path.resolve(): None}
+    waiting = [(text, path)]
+    while waiting:
+        current, where = waiting.pop(0)
+        for name, composite in current.composites.items():
+            if name in composites:
+                first = composites[name].position
+                problems.add(
+                    f"composite {name!r} is defined twice",
+                    composite.position,
+                    f"the first definition is at {first.file}:{first.line}",
+                )
+            composites.setdefault(name, composite)
+        for include in current.include:
+            target = (where.parent / include.text).resolve()
+            if not target.is_relative_to(root) or target.suffix not in (".yaml", ".yml"):
+                problems.add(
+                    f"{include.text!r} cannot be included",
+                    include.position,
+                    "included files are .yaml files in or below the model's folder",
+                )
+                continue
+            if target in seen:
+                continue
+            seen[target] = None
+            if len(seen) > MAX_INCLUDES:
+                problems.add(f"more than {MAX_INCLUDES} files are included", include.position)
+                return composites
+            if not target.is_file():
+                problems.add(f"the included file {include.text!r} does not exist", include.position)
+                continue
+            node = read(target, problems, str(where.parent / include.text))
+            inner = reader.included(node) if node is not None else None
+            if inner is not None:
+                waiting.append((inner, target))
+    return composites

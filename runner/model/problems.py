@@ -1,0 +1,187 @@
+"""What is wrong with a model, said so that it can be mended: where, what, and what would be right."""
+
+import difflib
+import unicodedata
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from epicycle.actors import EpicycleError
+
+MAX_PROBLEMS = 100
+MAX_SOURCE_WIDTH = 120
+_CUT = "..."
+_MAX_NAME = 200  # comparing names takes quadratic time; nobody mistypes a name this long
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A stretch of one line of a file; line and column count from 1, `source` is the whole line."""
+
+    file: str
+    line: int
+    column: int
+    length: int
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong, where it stands, and what may help."""
+
+    message: str
+    position: Position | None = None
+    help: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        head = f"error: {visible(self.message)}"
+        lines = [head]
+        if (at := self.position) is not None:
+            source, carets = _excerpt(at)
+            gutter = max(5, len(str(at.line)))
+            lines = [
+                f"{visible(at.file)}:{at.line}:{at.column}: {head}",
+                f"{at.line:>{gutter}} | {source}".rstrip(),
+                f"{'':>{gutter}} | {carets}",
+            ]
+        lines += [f"   help: {visible(line)}" for line in self.help]
+        return "\n".join(lines)
+
+
+class ModelError(EpicycleError):
+    """A model that cannot be used, with every problem found in it; `more` counts those that were left out."""
+
+    def __init__(self, problems: Iterable[Problem], more: int = 0) -> None:
+        self.problems = tuple(problems)
+        self.more = more
+        super().__init__(self.problems, more)  # args are what pickle and copy rebuild the error from
+
+    def __str__(self) -> str:
+        parts = [str(problem) for problem in self.problems]
+        if self.more:
+            parts.append(f"... and {self.more} more")
+        text = "\n\n".join(parts)
+        count = len(self.problems) + self.more
+        if count > 1:
+            files = dict.fromkeys(visible(p.position.file) for p in self.problems if p.position is not None)
+            text += f"\n{count} errors" + (f" in {', '.join(files)}" if files else "")
+        return text
+
+
+class Problems:
+    """Collects problems, so that one run shows them all; identical ones count once, 100 are kept."""
+
+    def __init__(self) -> None:
+        self._kept: dict[Problem, None] = {}
+        self._left_out: set[int] = set()  # hashes will do: this is only a count
+
+    def __len__(self) -> int:
+        return len(self._kept) + len(self._left_out)
+
+    def __bool__(self) -> bool:
+        """True for any collector, as `problems or Problems()` must not lose an empty one; ask len()."""
+        return True
+
+    @property
+    def found(self) -> tuple[Problem, ...]:
+        """The problems kept so far, in the order they were found."""
+        return tuple(self._kept)
+
+    def add(self, message: str, position: Position | None = None, *hints: str) -> None:
+        """Note a problem; each hint becomes a line of help."""
+        problem = Problem(message, position, hints)
+        if problem in self._kept:
+            return
+        if len(self._kept) < MAX_PROBLEMS:
+            self._kept[problem] = None
+        else:
+            self._left_out.add(hash(problem))
+
+    def raise_if_any(self) -> None:
+        """Raise all problems as one ModelError, if there are any."""
+        if self._kept:
+            raise ModelError(self._kept, len(self._left_out))
+
+
+def nearest(name: str, candidates: Iterable[str]) -> str | None:
+    """Return the candidate that `name` was probably meant to be, or None if no one is near."""
+    if len(name) > _MAX_NAME:
+        return None
+    by_folded: dict[str, str] = {}
+    for candidate in candidates:
+        if candidate != name and len(candidate) <= _MAX_NAME:
+            by_folded.setdefault(candidate.casefold(), candidate)
+    found = difflib.get_close_matches(name.casefold(), by_folded, n=1)
+    return by_folded[found[0]] if found else None
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """Return ", did you mean 'x'?" for the nearest candidate x, or nothing; to end a message with."""
+    found = nearest(name, candidates)
+    return "" if found is None else f", did you mean {found!r}?"
+
+
+def visible(text: str) -> str:
+    """Return the text with everything a terminal would obey or hide written as an escape."""
+    return text if text.isprintable() else "".join(map(_visible_character, text))
+
+
+def _visible_character(character: str) -> str:
+    if character.isprintable():
+        return character
+    return character.encode("unicode_escape").decode("ascii")
+
+
+def _cell(character: str) -> tuple[str, int]:
+    """Return how one character of a source line is shown, and how many columns that takes."""
+    if character == "\t":
+        return "    ", 4
+    shown = _visible_character(character)
+    if len(shown) > 1 or shown.isascii():
+        return shown, len(shown)
+    if unicodedata.category(shown) in ("Mn", "Me"):
+        return shown, 0
+    return shown, 2 if unicodedata.east_asian_width(shown) in "WF" else 1
+
+
+def _excerpt(at: Position) -> tuple[str, str]:
+    """Return the source line, cut to a bearable width around the place, and the carets that go below it."""
+    start = min(max(at.column - 1, 0), len(at.source))
+    # A file may be one line of megabytes: only what can be shown is looked at.
+    first = max(0, start - MAX_SOURCE_WIDTH)
+    cells = [_cell(character) for character in at.source[first : start + 2 * MAX_SOURCE_WIDTH]]
+    start -= first
+    whole = first == 0 and len(cells) == len(at.source)
+    low, high = 0, len(cells)
+    if not whole or _width(cells) > MAX_SOURCE_WIDTH:
+        room = MAX_SOURCE_WIDTH - 2 * len(_CUT)
+        low = _reach_left(cells, start, room // 3)
+        high = _reach_right(cells, low, room)
+        low = _reach_left(cells, high, room)  # near the end of the line, the left side takes what is over
+    cut_left = _CUT if first or low else ""
+    cut_right = _CUT if first + high < len(at.source) else ""
+    source = cut_left + "".join(shown for shown, _ in cells[low:high]) + cut_right
+    before = len(cut_left) + _width(cells[low:start])
+    end = min(start + max(at.length, 1), high)
+    return source, " " * before + "^" * max(_width(cells[start:end]), 1)
+
+
+def _width(cells: list[tuple[str, int]]) -> int:
+    return sum(width for _, width in cells)
+
+
+def _reach_left(cells: list[tuple[str, int]], end: int, room: int) -> int:
+    """Return the least index from which the cells up to `end` fit into the room."""
+    index = end
+    while index > 0 and cells[index - 1][1] <= room:
+        index -= 1
+        room -= cells[index][1]
+    return index
+
+
+def _reach_right(cells: list[tuple[str, int]], start: int, room: int) -> int:
+    """Return the greatest index up to which the cells from `start` fit into the room."""
+    index = start
+    while index < len(cells) and cells[index][1] <= room:
+        room -= cells[index][1]
+        index += 1
+    return index

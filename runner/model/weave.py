@@ -1,0 +1,69 @@
+"""From aspect declarations to aspects that stand at ports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from epicycle.aspects import Aspect
+
+from .declarations import Text
+from .graph import ModelGraph
+from .patterns import PatternError, select
+from .problems import Problems, nearest
+
+
+@dataclass
+class WovenAspect:
+    """An aspect of a model and the ports at which it stands, in the graph's order."""
+
+    name: str
+    aspect: Aspect
+    ports: list[str]
+
+
+def select_ports(
+    graph: ModelGraph, name: str, aspect: type[Aspect], scope: str, pointcuts: list[Text], problems: Problems
+) -> list[str]:
+    """The ports that the pointcuts of an aspect select; a pointcut that selects none is a problem.
+
+    ``scope`` is the composite in which the aspect is declared, whose inside its pointcuts are relative to.
+    """
+    chosen: dict[str, None] = {}
+    for pointcut in pointcuts:
+        full = f"{scope}.{pointcut.text}" if scope else pointcut.text
+        try:
+            found = select(full, graph.ports.nodes)
+        except PatternError as error:
+            problems.add(f"aspect {name}: {pointcut.text!r} is no pointcut: {error}", pointcut.position)
+            continue
+        fitting = [port for port in found if graph.direction(port) in aspect.stands_at]
+        if not found and not _array_is_empty(full, graph):
+            close = nearest(full, list(graph.ports.nodes))
+            problems.add(
+                f"aspect {name}: {pointcut.text!r} matches no port"
+                + (f", did you mean {close!r}?" if close else ""),
+                pointcut.position,
+                _valid_ends(full, graph),
+            )
+        elif found and not fitting:
+            problems.add(
+                f"aspect {name}: {aspect.__name__} stands at {' or '.join(sorted(aspect.stands_at))} ports, "
+                f"but {found[0]} is an {graph.direction(found[0])} port",
+                pointcut.position,
+            )
+        chosen.update(dict.fromkeys(fitting))
+    order = {path: index for index, path in enumerate(graph.ports.nodes)}
+    return sorted(chosen, key=order.__getitem__)
+
+
+def _valid_ends(pattern: str, graph: ModelGraph) -> str:
+    """Port names that exist at the pattern's depth, to choose from."""
+    depth = pattern.count(".")
+    ends = sorted({path.rpartition(".")[2] for path in graph.ports.nodes if path.count(".") == depth})
+    return f"ports at this depth: {', '.join(ends)}" if ends else "no port has so many dots"
+
+
+def _array_is_empty(pattern: str, graph: ModelGraph) -> bool:
+    """Whether the pattern speaks of an array that has no instances: then matching nothing is right."""
+    base = pattern.split("[")[0]
+    return base in graph.empty_arrays and "[" in pattern
