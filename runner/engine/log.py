@@ -1,0 +1,109 @@
+"""The event log: every send and every act of an aspect, in order, and the digest of them all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import EpicycleError, Tag, to_seconds
+
+from .encoding import canonical, plain
+
+COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
+FORMATS = (".parquet", ".csv", ".jsonl")
+
+
+class LogError(EpicycleError):
+    """A log that cannot be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One line of the event log; ``event`` is "send" or what an aspect did, ``channel`` is None for all channels."""
+
+    tag: Tag
+    event: str
+    actor: str
+    port: str
+    channel: int | None
+    aspect: str
+    value: Any
+
+    def row(self) -> tuple[float, int, str, str, str, int | None, str, str]:
+        """The record in the columns of a file; the value is JSON text."""
+        return (
+            to_seconds(self.tag.time),
+            self.tag.microstep,
+            self.event,
+            self.actor,
+            self.port,
+            self.channel,
+            self.aspect,
+            json.dumps(plain(self.value)),
+        )
+
+
+class EventLog:
+    """Counts and digests every record, and keeps them if asked to."""
+
+    def __init__(self, keep: bool = False) -> None:
+        self.records: list[Record] = []
+        self.count = 0
+        self._keep = keep
+        self._hash = hashlib.sha256()
+        self._heads: dict[tuple[str, str, str, str], bytes] = {}
+
+    def add(
+        self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any
+    ) -> None:
+        """Append a record."""
+        self.count += 1
+        names = (event, actor, port, aspect)
+        head = self._heads.get(names)
+        if head is None:
+            head = self._heads[names] = b"".join(canonical(name) for name in names)
+        self._hash.update(canonical(tag.time) + canonical(tag.microstep) + head + canonical(channel))
+        self._hash.update(canonical(value))
+        if self._keep:
+            self.records.append(Record(tag, event, actor, port, channel, aspect, value))
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over all records so far, as hexadecimal text."""
+        return self._hash.hexdigest()
+
+
+def check_log_path(path: Path) -> None:
+    """Raise ``LogError`` early, before a run whose log could not be written."""
+    if path.suffix not in FORMATS:
+        raise LogError(f"{path} is no log file: its name must end in {', '.join(FORMATS)}")
+    if not path.parent.is_dir():
+        raise LogError(f"{path} cannot be written: there is no folder {path.parent}")
+
+
+def write_log(records: list[Record], path: Path) -> None:
+    """Write records as Parquet, CSV or JSON lines, by the ending of the file's name."""
+    rows = (record.row() for record in records)
+    if path.suffix == ".jsonl":
+        with path.open("w", encoding="utf-8") as file:
+            for row in rows:
+                values = dict(zip(COLUMNS, row, strict=True)) | {"value": json.loads(row[-1])}
+                file.write(json.dumps(values) + "\n")
+    elif path.suffix == ".csv":
+        import csv
+
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(COLUMNS)
+            writer.writerows(rows)
+    else:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        columns = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
+        types = (pa.float64(), pa.int64(), pa.string(), pa.string(), pa.string(), pa.int64(), pa.string(), pa.string())
+        arrays = [pa.array(column, type=kind) for column, kind in zip(columns, types, strict=True)]
+        pq.write_table(pa.table(arrays, names=list(COLUMNS)), path)
