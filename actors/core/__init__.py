@@ -9,6 +9,7 @@ from .parameter import (
     ParameterError,
     array_parameter,
     declared_parameters,
+    texts_parameter,
     unknown_parameter,
     variants,
 )
@@ -41,6 +42,7 @@ __all__ = [
     "declared_ports",
     "parse_unit",
     "random_stream",
+    "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
     "type_name",

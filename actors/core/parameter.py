@@ -87,6 +87,8 @@ class Parameter(Generic[T]):
         word = {float: "number", int: "integer", bool: "true or false", str: "text"}[self.type]
         if self.shape is None:
             return word
+        if self.type is str:
+            return "list of texts"
         sizes = " x ".join("n" if size is None else str(size) for size in self.shape)
         return f"list of {sizes} {word}s"
 
@@ -98,6 +100,9 @@ class Parameter(Generic[T]):
             raise ParameterError(f"a value is missing, expected {self._expected()}")
         if isinstance(self.type, type) and issubclass(self.type, Configurable):
             return build_variant(self.type, value)  # type: ignore[return-value]
+        if self.shape is not None and self.type is str:
+            texts = [value] if isinstance(value, str) else self._rows(value, self.shape, value)
+            return tuple(texts)  # type: ignore[arg-type, return-value]
         if self.shape is not None:
             return self._array(value)  # type: ignore[return-value]
         result: Any = self._scalar(value)
@@ -181,6 +186,14 @@ def array_parameter(
 ) -> Parameter[NDArray[np.float64]]:
     """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
     parameter: Parameter[Any] = Parameter(float, None, unit=unit, min=min, max=max, shape=shape, doc=doc)
+    parameter.optional = default is None
+    parameter.default = default
+    return parameter
+
+
+def texts_parameter(default: object = REQUIRED, *, doc: str = "") -> Parameter[tuple[str, ...]]:
+    """A parameter whose value is a list of texts; a single text counts as a list of one."""
+    parameter: Parameter[Any] = Parameter(str, shape=(None,), doc=doc)
     parameter.optional = default is None
     parameter.default = default
     return parameter
