@@ -32,6 +32,7 @@ class Simulation:
         self.signals = {name: Signal(name) for name in model.record}
         self._listeners: dict[str, list[Callable[[Any], None]]] = {}
         self._stop_asked = False
+        self._wall_time = 0.0
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
         self._listen()
         self._wire()
@@ -188,7 +189,11 @@ class Simulation:
         finally:
             for actor in actors:
                 self._call(actor, "wrapup")
-        reason = "stop_when" if self._stop_asked else "stop time" if stop is not None else "no events left"
+            self._wall_time = time.perf_counter() - started
+        return self.results("stop_when" if self._stop_asked else "stop time" if stop is not None else "no events left")
+
+    def results(self, stopped: str) -> Results:
+        """What there is so far; after a failed run, what was recorded until then."""
         return Results(
             model=self.model.name,
             seed=self.seed,
@@ -197,10 +202,10 @@ class Simulation:
             aspects=self._counts(),
             signals=self.signals,
             log=self.log,
-            end=to_seconds(director.last.time),
-            stopped=reason,
-            firings=director.firings,
-            wall_time=time.perf_counter() - started,
+            end=to_seconds(self.director.last.time),
+            stopped=stopped,
+            firings=self.director.firings,
+            wall_time=self._wall_time,
         )
 
     def _call(self, actor: Actor, method: str) -> None:

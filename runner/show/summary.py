@@ -1,0 +1,77 @@
+"""The summary of a run: a table for people, an object for programs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from ..engine import Results, plain
+from ..model import Model
+
+
+def summary_object(results: Results) -> dict[str, Any]:
+    """What ``--json`` prints; NaN and infinities become null, which JSON lacks."""
+    return finite(
+        {
+            "model": results.model,
+            "seed": results.seed,
+            "parameters": {name: plain(value) for name, value in results.parameters.items()},
+            "metrics": {name: plain(value) for name, value in results.metrics.items()},
+            "aspects": results.aspects,
+            "stopped": results.stopped,
+            "end": results.end,
+            "events": results.events,
+            "wall_time": round(results.wall_time, 6),
+            "digest": results.digest,
+        }
+    )
+
+
+def finite(value: Any) -> Any:
+    """The same with every number that is not finite replaced by None."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def summary_table(model: Model, results: Results) -> Group:
+    """What a person sees at the end of a run."""
+    head = Text.assemble(
+        (results.model, "bold"), f"  seed {results.seed}, {results.end:g} s of model time, ended by {results.stopped}"
+    )
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    table.add_column("metric")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    table.add_column("", style="dim")
+    for metric in model.metrics:
+        table.add_row(metric.name, shown(results.metrics[metric.name]), metric.unit, metric.doc)
+    for name, counts in results.aspects.items():
+        woven = next(each for each in model.aspects if each.name == name)
+        for event, count in counts.items():
+            where = f"by {type(woven.aspect).__name__} at {len(woven.ports)} ports"
+            table.add_row(f"{name}: {event}", str(count), "", where)
+    table.add_row("events", f"{results.events}", "", "sends and acts of aspects in the event log")
+    table.add_row("firings", f"{results.firings}", "", "of actors")
+    table.add_row("wall time", f"{results.wall_time:.3f}", "s", "of initialisation and run")
+    table.add_row("digest", results.digest[:16] + "...", "", "SHA-256 of the event log, shortened")
+    return Group(head, table)
+
+
+def shown(value: Any) -> str:
+    """A metric's value in few characters."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}" if abs(value) < 1e5 else f"{value:.6g}"
+    return str(plain(value))
