@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except BrokenPipeError:
         # Whoever read our output has gone; point stdout elsewhere so that Python's own flush stays quiet.
-        sys.stdout = None  # type: ignore[assignment]
+        sys.stdout = None
         return FAILED
     except OSError as error:
         complain(f"error: {error}")
@@ -56,10 +56,16 @@ def parser() -> argparse.ArgumentParser:
     )
     commands = top.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="run a model", description="Run a model once and report what came of it.")
+    run = commands.add_parser(
+        "run", help="run a model", description="Run a model once and report what came of it."
+    )
     add_model(run)
-    run.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
-    run.add_argument("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)")
+    run.add_argument(
+        "--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)"
+    )
+    run.add_argument(
+        "--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"
+    )
     run.add_argument(
         "--out",
         metavar="DIR",
@@ -72,7 +78,9 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
     run.set_defaults(command=run_command)
 
-    validate = commands.add_parser("validate", help="check a model", description="Check a model without running it.")
+    validate = commands.add_parser(
+        "validate", help="check a model", description="Check a model without running it."
+    )
     add_model(validate)
     validate.set_defaults(command=validate_command)
 
@@ -83,7 +91,9 @@ def parser() -> argparse.ArgumentParser:
 
 def add_model(command: argparse.ArgumentParser) -> None:
     """The options that say which model is meant, and what to change in it."""
-    command.add_argument("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model")
+    command.add_argument(
+        "model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"
+    )
     command.add_argument(
         "--set",
         metavar="PATH=VALUE",

@@ -145,11 +145,15 @@ class Parameter(Generic[T]):
                 value = convert(value, self.unit)
             except UnitError as error:
                 raise ParameterError(str(error)) from None
-        if self.type is int:
-            if float(value) != math.floor(value):
-                raise ParameterError(f"{_shown(value)} is not {self._expected()}")
-            return int(value)
-        return float(value)
+        try:
+            number = float(value)
+        except OverflowError:
+            raise ParameterError(f"{_shown(value)} is too large, expected {self._expected()}") from None
+        if self.type is float:
+            return number
+        if not number.is_integer():  # nor are nan and the infinities
+            raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+        return int(value)
 
     def _bounded(self, value: float | int) -> float | int:
         if math.isnan(value):
@@ -256,6 +260,7 @@ def unknown_parameter(cls: type, name: str) -> str:
 def variants(base: type) -> dict[str, type]:
     """The concrete classes below ``base`` by name; a class whose name starts with '_' stays hidden."""
     found: dict[str, type] = {}
+    child: type
     for child in base.__subclasses__():
         if not child.__name__.startswith("_"):
             found[child.__name__] = child
@@ -272,8 +277,8 @@ def build_variant(base: type, value: object) -> object:
     if not isinstance(value, Mapping) or "type" not in value:
         raise ParameterError(f"{_shown(value)} is not a mapping with a 'type', one of {valid}")
     name = value["type"]
-    if name not in known:
-        raise ParameterError(f"{name!r} is not one of {valid}{_did_you_mean(str(name), known)}")
+    if not isinstance(name, str) or name not in known:
+        raise ParameterError(f"{_shown(name)} is not one of {valid}{_did_you_mean(str(name), known)}")
     return known[name](**{key: item for key, item in value.items() if key != "type"})
 
 

@@ -10,7 +10,7 @@ import types
 import typing
 from collections.abc import Callable
 from copy import copy
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, overload
 
 from .errors import EpicycleError
 
@@ -115,9 +115,22 @@ class OutputPort(_Port[T]):
 
     direction = "output"
 
+    @overload
+    def __init__(
+        self, type: type[T], *, multi: bool = ..., depends_on: tuple[str, ...] | None = ..., doc: str = ...
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: OutputPort[Any],
+        type: object,
+        *,
+        multi: bool = ...,
+        depends_on: tuple[str, ...] | None = ...,
+        doc: str = ...,
+    ) -> None: ...
     def __init__(
         self,
-        type: type[T] | Any,
+        type: Any,
         *,
         multi: bool = False,
         depends_on: tuple[str, ...] | None = None,
@@ -134,7 +147,9 @@ class OutputPort(_Port[T]):
         return bound
 
     def _unbound(self, token: T, channel: int | None) -> None:
-        raise PortError(f"{self.path or self.name} is not part of a running model; nothing can be sent yet")
+        raise PortError(
+            f"{self.path or self.name} cannot send now: tokens are sent in fire() or run() of a running model"
+        )
 
     def send(self, token: T, channel: int | None = None) -> None:
         """Send a token at the present tag: to all channels, or to the one given."""

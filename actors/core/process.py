@@ -3,7 +3,8 @@
 ``run()`` yields events: ``self.wait(seconds)``, ``self.read(port)``, or any SimPy event (a resource's request, a
 condition, another process).  Waits and reads resume it as a firing, at the tag and in the order in which a reactive
 actor would fire; a SimPy event resumes it when SimPy does, and what it then sends is received at the next microstep
-of that time.  Tokens that arrive while it waits for something else queue up at the port until they are read.
+of that time.  Tokens that arrive while it waits for something else queue up at the port until they are read; a read
+that lost a race (``read | wait``) or was interrupted takes no token unless it is waited for again.
 """
 
 from __future__ import annotations
@@ -32,12 +33,17 @@ class Process(Actor):
         self._waits: list[tuple[Wake, Event]] = []
         self._reads: list[tuple[str, Event]] = []
         self._queued: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
+        self.failure: Exception | None = None
         start = self.wait(0.0)
         self.process = SimPyProcess(self.environment, self._behave(start))
 
     def _behave(self, start: Event) -> Generator[Event, Any, None]:
         yield start
-        yield from self.run()
+        try:
+            yield from self.run()
+        except Exception as error:
+            self.failure = error  # SimPy raises a copy of it later, from which the actor cannot be told
+            raise
 
     @property
     def environment(self) -> Any:
@@ -57,6 +63,7 @@ class Process(Actor):
         if queue:
             _settle(event, queue.popleft())
         else:
+            event.callbacks = _Listeners()
             self._reads.append((port.name, event))
         return event
 
@@ -68,16 +75,36 @@ class Process(Actor):
         for _, event in due:
             _settle(event, None)
         # A resumed process may ask for the next token at once, so look again until no read can be served.
-        served = True
-        while served:
-            served = False
-            for entry in self._reads:
-                name, event = entry
-                if self._queued[name]:
-                    self._reads.remove(entry)
-                    _settle(event, self._queued[name].popleft())
-                    served = True
-                    break
+        while (entry := self._next_read()) is not None:
+            self._reads.remove(entry)
+            name, event = entry
+            _settle(event, self._queued[name].popleft())
+        if self.failure is not None:
+            raise self.failure
+
+    def _next_read(self) -> tuple[str, Event] | None:
+        """The first read that a queued token can be given to."""
+        for name, event in self._reads:
+            if self._queued[name] and not getattr(event.callbacks, "deserted", False):
+                return name, event
+        return None
+
+
+class _Listeners(list[Any]):
+    """The callbacks of a read, which remember that somebody has waited for it and does no longer.
+
+    A condition and an interrupt take their callback away; without this, the read would swallow the next token.
+    """
+
+    deserted = False
+
+    def append(self, callback: Any) -> None:
+        self.deserted = False
+        super().append(callback)
+
+    def remove(self, callback: Any) -> None:
+        super().remove(callback)
+        self.deserted = not self
 
 
 def _settle(event: Event, value: object) -> None:

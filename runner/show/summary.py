@@ -15,7 +15,7 @@ from ..model import Model
 
 def summary_object(results: Results) -> dict[str, Any]:
     """What ``--json`` prints; NaN and infinities become null, which JSON lacks."""
-    return finite(
+    result: dict[str, Any] = finite(
         {
             "model": results.model,
             "seed": results.seed,
@@ -29,6 +29,7 @@ def summary_object(results: Results) -> dict[str, Any]:
             "digest": results.digest,
         }
     )
+    return result
 
 
 def finite(value: Any) -> Any:
@@ -45,7 +46,8 @@ def finite(value: Any) -> Any:
 def summary_table(model: Model, results: Results) -> Group:
     """What a person sees at the end of a run."""
     head = Text.assemble(
-        (results.model, "bold"), f"  seed {results.seed}, {results.end:g} s of model time, ended by {results.stopped}"
+        (results.model, "bold"),
+        f"  seed {results.seed}, {results.end:g} s of model time, ended by {results.stopped}",
     )
     table = Table(box=None, pad_edge=False, header_style="dim")
     table.add_column("metric")

@@ -1,0 +1,181 @@
+"""`epicycle run` on the packaged scenario: the same bits every time, and aspects that only do what they say."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SHORT = ("--set", "observers=2", "--until", "1.5", "--seed", "7")
+
+
+def epicycle(
+    *arguments: str, cwd: Path | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "epicycle.runner.cli", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**os.environ, **environment},
+        timeout=300,
+        check=False,
+    )
+
+
+def run_json(*arguments: str, **keywords: Any) -> dict[str, Any]:
+    """What `epicycle run ... --json` printed."""
+    done = epicycle("run", "collision_avoidance", *arguments, "--json", **keywords)
+    assert done.returncode == 0, done.stderr
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+def read_log(path: Path) -> list[dict[str, Any]]:
+    """The records of a JSON-lines log."""
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def test_digest_is_the_same_for_every_hash_seed_and_folder(tmp_path: Path) -> None:
+    arguments = (*SHORT, "--set", "disturbance=0.5")
+    digests = {
+        run_json(*arguments, cwd=folder, PYTHONHASHSEED=seed)["digest"]
+        for folder, seed in ((None, "0"), (tmp_path, "1"), (tmp_path, "random"))
+    }
+    assert len(digests) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_seed_gives_other_digest() -> None:
+    assert run_json(*SHORT)["digest"] != run_json(*SHORT[:-1], "8")["digest"]
+
+
+def test_aspects_at_zero_leave_no_trace() -> None:
+    zero = run_json(*SHORT, "--set", "disturbance=0")
+    without = run_json(*SHORT, "--without", "packet_loss", "--without", "measurement_failure")
+    assert zero["digest"] == without["digest"]
+    assert zero["aspects"] == {"packet_loss": {"dropped": 0}, "measurement_failure": {"failed": 0}}
+    assert without["aspects"] == {}
+
+
+def test_removing_an_aspect_moves_no_other_stream(tmp_path: Path) -> None:
+    both, one = tmp_path / "both.jsonl", tmp_path / "one.jsonl"
+    run_json(*SHORT, "--set", "disturbance=0.5", "--log", str(both))
+    run_json(*SHORT, "--set", "disturbance=0.5", "--without", "packet_loss", "--log", str(one))
+
+    def failures(path: Path) -> list[tuple[float, str]]:
+        return [
+            (row["time"], row["actor"]) for row in read_log(path) if row["aspect"] == "measurement_failure"
+        ]
+
+    assert failures(both) == failures(one) != []
+
+
+def test_packet_loss_spares_own_measurements(tmp_path: Path) -> None:
+    log = tmp_path / "log.jsonl"
+    result = run_json(*SHORT, "--aspect", "packet_loss=PacketLoss,probability=0.9", "--log", str(log))
+    rows = read_log(log)
+    dropped = [row for row in rows if row["aspect"]]
+    assert len(dropped) == result["aspects"]["packet_loss"]["dropped"] > 0
+    assert {row["port"] for row in dropped} == {"peer_plan", "peer_measurement"}
+    for row in dropped:  # what is lost at a robot comes from another one
+        assert row["event"] == "dropped"
+        assert row["value"]["robot"] != row["actor"]
+    estimates = [row for row in rows if row["port"] == "estimate"]
+    assert len(estimates) == 3 * 16
+    for row in estimates:  # 16 ticks of three robots: each fused at least its own measurement
+        assert row["actor"].removesuffix(".estimator") in row["value"]["sources"]
+    assert any(len(row["value"]["sources"]) < 3 for row in estimates)
+
+
+def test_run_writes_its_folder(tmp_path: Path) -> None:
+    done = epicycle("run", "collision_avoidance", *SHORT, "--out", "here", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == [
+        "manifest.json",
+        "signals.parquet",
+        "trajectories.png",
+    ]
+    manifest = json.loads((tmp_path / "here" / "manifest.json").read_text())
+    assert manifest["digest"] == run_json(*SHORT)["digest"]
+    assert manifest["command"] == ["epicycle", "run", "collision_avoidance", *SHORT, "--out", "here"]
+    assert (tmp_path / "here" / "trajectories.png").read_bytes().startswith(b"\x89PNG")
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(tmp_path / "here" / "signals.parquet").to_pydict()
+    main = [v for s, f, v in zip(table["signal"], table["field"], table["value"], strict=True)
+            if s == "main.state" and f == "position[0]"]  # fmt: skip
+    assert main[0] == 30.0
+    assert len(main) == 16
+    for word in ("arrival_time", "min_obstacle_distance", "packet_loss: dropped", "events", "wall time"):
+        assert word in done.stdout
+
+
+@pytest.mark.parametrize("ending", [".jsonl", ".csv", ".parquet"])
+def test_log_formats(tmp_path: Path, ending: str) -> None:
+    log = tmp_path / f"log{ending}"
+    result = run_json("--set", "observers=1", "--until", "0.2", "--log", str(log))
+    if ending == ".parquet":
+        import pyarrow.parquet as pq
+
+        table = pq.read_table(log)
+        assert table.column_names[:2] == ["time", "microstep"]
+        assert table.num_rows == result["events"]
+    else:
+        header = 1 if ending == ".csv" else 0
+        assert len(log.read_text().splitlines()) == result["events"] + header
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ("run", "colision_avoidance"),
+            ("error: there is no packaged model 'colision_avoidance', did you mean 'collision_avoidance'?\n"
+            "   help: packaged models: collision_avoidance; a path to a file ends in .yaml\n"),
+        ),
+        (
+            ("run", "collision_avoidance", "--set", "observer=3"),
+            ("command line:1:7: error: 'observer' sets no parameter, did you mean 'observers'?\n"
+            "    1 | --set observer=3\n"
+            "      |       ^^^^^^^^^^\n"),
+        ),
+        (
+            ("run", "collision_avoidance", "--without", "packet_los"),
+            ("command line:1:11: error: the model has no aspect 'packet_los', did you mean 'packet_loss'?\n"
+            "    1 | --without packet_los\n"
+            "      |           ^^^^^^^^^^\n"
+            "   help: its aspects: packet_loss, measurement_failure\n"),
+        ),
+        (
+            ("run", "collision_avoidance", "--log", "log.txt"),
+            "error: log.txt is no log file: its name must end in .parquet, .csv, .jsonl\n",
+        ),
+        (
+            ("run", "collision_avoidance", "--until", "3 m"),
+            "error: '3 m' is a length, expected a time in s\n",
+        ),
+    ],
+)
+def test_bad_command_lines(arguments: tuple[str, ...], message: str) -> None:
+    done = epicycle(*arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", message)
+
+
+def test_help_loads_nothing_heavy() -> None:
+    done = epicycle("--help")
+    assert done.returncode == 0
+    probe = (
+        "import sys\n"
+        "from epicycle.runner.cli import parser\n"
+        "parser()\n"
+        "print([m for m in ('numpy', 'networkx', 'rich', 'numba', 'yaml', 'simpy') if m in sys.modules])"
+    )
+    loaded = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert loaded.stdout.strip() == "[]"
