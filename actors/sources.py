@@ -8,7 +8,7 @@ from .core import Actor, OutputPort, Parameter, to_nanoseconds
 
 
 class Clock(Actor):
-    """Ticks for ever, at exact multiples of its period: tick k comes ``offset + k * period`` after the start."""
+    """Ticks for ever, without drift: tick k comes ``offset + k * period`` after the start."""
 
     is_source: ClassVar[bool] = True
 

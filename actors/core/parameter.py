@@ -112,6 +112,8 @@ class Parameter(Generic[T]):
         text = self.describe_type()
         if self.choices:
             return f"one of {', '.join(self.choices)}"
+        if text in ("number", "integer", "text") or self.shape is not None:
+            text = f"an {text}" if text == "integer" else f"a {text}"
         if self.unit and self.unit != "1":
             text += f" in {self.unit}"
         if self.min is not None and self.max is not None:
@@ -129,9 +131,7 @@ class Parameter(Generic[T]):
         elif self.type is str:
             if isinstance(value, str):
                 if self.choices and value not in self.choices:
-                    raise ParameterError(
-                        f"{value!r} is not {self._expected()}{_did_you_mean(value, self.choices)}"
-                    )
+                    raise ParameterError(f"{value!r} is not {self._expected()}{_did_you_mean(value, self.choices)}")
                 return value
         elif isinstance(value, (int, float, np.integer, np.floating, str)) and not isinstance(value, bool):
             return self._bounded(self._number(value))
@@ -175,7 +175,7 @@ class Parameter(Generic[T]):
             return self._scalar(value)
         wrong = not isinstance(value, (list, tuple, np.ndarray))
         if wrong or (shape[0] is not None and len(value) != shape[0]):  # type: ignore[arg-type]
-            raise ParameterError(f"{_shown(whole)} is not a {self._expected()}")
+            raise ParameterError(f"{_shown(whole)} is not {self._expected()}")
         return [self._rows(item, shape[1:], whole) for item in value]  # type: ignore[attr-defined]
 
 
@@ -288,5 +288,7 @@ def _did_you_mean(name: str, candidates: object) -> str:
 
 
 def _shown(value: object) -> str:
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
     text = repr(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -57,9 +57,13 @@ class InputPort(_Port[T]):
 
     direction = "input"
 
+    @overload
+    def __init__(self, type: type[T], *, multi: bool = ..., required: bool = ..., doc: str = ...) -> None: ...
+    @overload  # unions and other types that are no classes
     def __init__(
-        self, type: type[T] | Any, *, multi: bool = False, required: bool = True, doc: str = ""
-    ) -> None:
+        self: InputPort[Any], type: object, *, multi: bool = ..., required: bool = ..., doc: str = ...
+    ) -> None: ...
+    def __init__(self, type: Any, *, multi: bool = False, required: bool = True, doc: str = "") -> None:
         super().__init__(type, multi=multi, doc=doc)
         self.required = required
         self.width = 0
@@ -158,6 +162,10 @@ class OutputPort(_Port[T]):
     def connect(self, emit: Callable[[T, int | None], None]) -> None:
         """Engine: what ``send`` does from now on."""
         self._emit = emit
+
+    def disconnect(self) -> None:
+        """Engine: from now on nothing can be sent."""
+        self._emit = self._unbound
 
 
 def type_name(declared: Any) -> str:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Generator
 from typing import Any, ClassVar
+from weakref import ReferenceType, ref
 
 from simpy.events import Event
 from simpy.events import Process as SimPyProcess
@@ -31,7 +32,8 @@ class Process(Actor):
 
     def initialize(self) -> None:
         self._waits: list[tuple[Wake, Event]] = []
-        self._reads: list[tuple[str, Event]] = []
+        # Weak, so that a read that lost a race is forgotten as soon as the process has.
+        self._reads: list[tuple[str, ReferenceType[Event]]] = []
         self._queued: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
         self.failure: Exception | None = None
         start = self.wait(0.0)
@@ -64,7 +66,7 @@ class Process(Actor):
             _settle(event, queue.popleft())
         else:
             event.callbacks = _Listeners()
-            self._reads.append((port.name, event))
+            self._reads.append((port.name, ref(event)))
         return event
 
     def fire(self) -> None:
@@ -76,16 +78,18 @@ class Process(Actor):
             _settle(event, None)
         # A resumed process may ask for the next token at once, so look again until no read can be served.
         while (entry := self._next_read()) is not None:
-            self._reads.remove(entry)
             name, event = entry
             _settle(event, self._queued[name].popleft())
         if self.failure is not None:
             raise self.failure
 
     def _next_read(self) -> tuple[str, Event] | None:
-        """The first read that a queued token can be given to."""
-        for name, event in self._reads:
-            if self._queued[name] and not getattr(event.callbacks, "deserted", False):
+        """Take the first read that a queued token can be given to."""
+        self._reads = [entry for entry in self._reads if entry[1]() is not None]
+        for index, (name, reference) in enumerate(self._reads):
+            event = reference()
+            if event is not None and self._queued[name] and not getattr(event.callbacks, "deserted", False):
+                del self._reads[index]
                 return name, event
         return None
 

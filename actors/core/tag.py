@@ -29,10 +29,11 @@ def to_nanoseconds(seconds: float) -> int:
     """The nearest whole nanosecond; raises ``ValueError`` for NaN, infinities and times past ``LATEST``."""
     if not math.isfinite(seconds):
         raise ValueError(f"{seconds!r} is not a time")
-    nanoseconds = round(seconds * NANOSECONDS_PER_SECOND)
+    # Compared first as floats: the product may be infinite, which has no whole number.
+    nanoseconds = seconds * NANOSECONDS_PER_SECOND
     if abs(nanoseconds) > LATEST:
         raise ValueError(f"{seconds!r} s is out of range, the latest time is {to_seconds(LATEST):g} s")
-    return nanoseconds
+    return round(nanoseconds)
 
 
 def to_seconds(nanoseconds: int) -> float:

@@ -328,6 +328,8 @@ def _is_turns_for_radians(first: str, second: str) -> bool:
 
 def _expected(text: str, unit: Unit) -> str:
     kind = _kind(text, unit)
+    if text == "1":
+        return f"expected {kind}"
     return f"expected {kind}" if kind.endswith(f" in {text}") else f"expected {kind} in {text}"
 
 

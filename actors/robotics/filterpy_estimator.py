@@ -1,0 +1,135 @@
+"""FilterPy's filters in the place of the compiled one: slower, but others to compare with."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..core import EpicycleError, Parameter
+from .estimator import _Estimator
+from .messages import RANGE, Array, Measurement
+
+# FilterPy's EnsembleKalmanFilter is left out: it draws from numpy's global random state, so no run could be
+# repeated.
+LINEAR = ("KalmanFilter", "SquareRootKalmanFilter")
+NONLINEAR = ("ExtendedKalmanFilter", "UnscentedKalmanFilter", "CubatureKalmanFilter")
+
+
+class FilterError(EpicycleError):
+    """A filter that cannot use the measurements it is given."""
+
+
+class FilterPyEstimator(_Estimator):
+    """A filter of FilterPy with the model of ``UnscentedEstimator``; fuses one measurement after another.
+
+    ``KalmanFilter`` and ``SquareRootKalmanFilter`` are linear and take relative positions only.
+    """
+
+    filter = Parameter(
+        str, "UnscentedKalmanFilter", choices=NONLINEAR + LINEAR, doc="class of filterpy.kalman to be used"
+    )
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._filter = _make_filter(self.filter)
+        # The cubature filter alone wants columns.
+        column = self.filter == "CubatureKalmanFilter"
+        self._filter.x = np.array(self.prior_mean).reshape((4, 1) if column else 4)
+        self._filter.P = np.diag(self.prior_variance)
+
+    def _predict(self, elapsed: float) -> None:
+        self._filter.Q = self._process_noise * (elapsed / self.period)
+        if self.filter in ("UnscentedKalmanFilter", "CubatureKalmanFilter"):
+            self._filter.predict(dt=elapsed)
+        else:
+            self._filter.F = _transition(elapsed)
+            self._filter.predict()
+
+    def _update(self, measurements: list[Measurement]) -> bool:
+        noises = self._noises(measurements)
+        before = np.array(self._filter.x), np.array(self._filter.P)
+        for each, (xx, xy, yy) in zip(measurements, noises, strict=True):
+            ranged = each.kind == RANGE
+            self._fuse(each, np.array([[xx]]) if ranged else np.array([[xx, xy], [xy, yy]]))
+        if np.isfinite(self._filter.x).all() and np.isfinite(self._filter.P).all():
+            return True
+        self._filter.x, self._filter.P = before
+        return False
+
+    def _fuse(self, measurement: Measurement, noise: Array) -> None:
+        observer, ranged = measurement.observer, measurement.kind == RANGE
+        used = self._filter
+
+        def observe(state: Array) -> Array:
+            offset = state[:2] - observer
+            return np.array([math.hypot(offset[0], offset[1])]) if ranged else np.array(offset)
+
+        def slope(state: Array) -> Array:
+            if not ranged:
+                return np.eye(2, 4)
+            offset = state[:2] - observer
+            return np.array([[*(offset / max(math.hypot(offset[0], offset[1]), 1e-9)), 0.0, 0.0]])
+
+        if self.filter in LINEAR:
+            if ranged:
+                raise FilterError(
+                    f"{self.path}: FilterPy's {self.filter} is linear and cannot fuse a range (from "
+                    f"{measurement.robot}); set 'filter' to one of {', '.join(NONLINEAR)}, "
+                    "or the sensor's 'kind' to relative_position"
+                )
+            position = measurement.value + observer
+            if self.filter == "SquareRootKalmanFilter":
+                used.update(position, np.linalg.cholesky(noise))
+            else:
+                used.update(position, R=noise)
+        elif self.filter == "ExtendedKalmanFilter":
+            used.update(measurement.value, slope, observe, R=noise)
+        elif self.filter == "UnscentedKalmanFilter":
+            # Its points stay where the prediction left them; a second update needs them around the first
+            # one's result.
+            used.sigmas_f = used.points_fn.sigma_points(used.x, used.P)
+            used.update(measurement.value, R=noise, hx=observe)
+        else:
+            # It keeps the propagated points, which hold no process noise; draw them from the prediction
+            # instead.
+            from filterpy.kalman import spherical_radial_sigmas
+
+            used.sigmas_f = spherical_radial_sigmas(used.x, used.P)
+            used.sigmas_h = np.zeros((len(used.sigmas_f), len(measurement.value)))
+            used.hx = observe
+            used.update(measurement.value[:, np.newaxis], R=noise)
+
+    def _state(self) -> tuple[Array, Array]:
+        covariance = np.array(self._filter.P)
+        return np.array(self._filter.x).ravel(), 0.5 * (covariance + covariance.T)
+
+
+def _make_filter(name: str) -> Any:
+    from filterpy import kalman  # takes seconds, so only when it is used
+
+    if name == "UnscentedKalmanFilter":
+        points = kalman.JulierSigmaPoints(4, kappa=0.0)
+        made = kalman.UnscentedKalmanFilter(4, 2, 1.0, hx=_unused, fx=_move, points=points)
+    elif name == "CubatureKalmanFilter":
+        made = kalman.CubatureKalmanFilter(4, 2, 1.0, hx=_unused, fx=_move)
+    else:
+        made = getattr(kalman, name)(4, 2)
+        if name != "ExtendedKalmanFilter":
+            made.H = np.eye(2, 4)
+    return made
+
+
+def _transition(elapsed: float) -> Array:
+    matrix = np.eye(4)
+    matrix[0, 2] = matrix[1, 3] = elapsed
+    return matrix
+
+
+def _move(state: Array, elapsed: float) -> Array:
+    return np.array([*(state[:2] + elapsed * state[2:]), *state[2:]])
+
+
+def _unused(state: Array) -> Array:
+    raise NotImplementedError("every update brings its own measurement function")

@@ -1,0 +1,199 @@
+"""The unscented Kalman filter on arrays (Julier & Uhlmann; paper section II.B): sigma points, prediction, update."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .compiled import kernel
+from .typing import Array
+
+RELATIVE_POSITION = 0
+RANGE = 1
+
+
+@kernel
+def _root(covariance: Array) -> Array:
+    """Lower Cholesky factor; a pivot that rounding made negative counts as zero."""
+    size = covariance.shape[0]
+    root = np.zeros((size, size))
+    for i in range(size):
+        for j in range(i + 1):
+            total = covariance[i, j]
+            for k in range(j):
+                total -= root[i, k] * root[j, k]
+            if i == j:
+                root[i, i] = math.sqrt(max(total, 0.0))
+            elif root[j, j] > 0.0:
+                root[i, j] = total / root[j, j]
+    return root
+
+
+@kernel
+def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, Array]:
+    """The 2n + 1 points (M, n) and weights (M,): the mean, then mean +- columns of sqrt((n + kappa) C)."""
+    size = mean.shape[0]
+    root = _root(covariance)
+    scale = math.sqrt(size + kappa)
+    points = np.empty((2 * size + 1, size))
+    weights = np.full(2 * size + 1, 0.5 / (size + kappa))
+    weights[0] = kappa / (size + kappa)
+    points[0] = mean
+    for i in range(size):
+        for j in range(size):
+            points[1 + i, j] = mean[j] + scale * root[j, i]
+            points[1 + size + i, j] = mean[j] - scale * root[j, i]
+    return points, weights
+
+
+@kernel
+def _product(a: Array, b: Array) -> Array:
+    """a @ b summed in index order, so that no BLAS decides the last bits."""
+    result = np.zeros((a.shape[0], b.shape[1]))
+    for i in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            for j in range(b.shape[1]):
+                result[i, j] += a[i, k] * b[k, j]
+    return result
+
+
+@kernel
+def constant_velocity(period: float) -> Array:
+    """Transition of eq. (1) for the state (x, y, vx, vy)."""
+    transition = np.eye(4)
+    transition[0, 2] = period
+    transition[1, 3] = period
+    return transition
+
+
+@kernel
+def predict(mean: Array, covariance: Array, transition: Array, process_noise: Array) -> tuple[Array, Array]:
+    """One step of a linear model; the unscented transform of a linear map is exact, so it is written out."""
+    size = mean.shape[0]
+    predicted = np.zeros(size)
+    for i in range(size):
+        for j in range(size):
+            predicted[i] += transition[i, j] * mean[j]
+    spread = _product(_product(transition, covariance), transition.T) + process_noise
+    return predicted, 0.5 * (spread + spread.T)
+
+
+@kernel
+def measurement_noise(points: Array, weights: Array, kinds: Array, observers: Array, deviations: Array) -> Array:
+    """Covariances (m, 3) as (xx, xy, yy) of m measurements of a target at ``points`` (M, n); of a range xx counts.
+
+    A relative position has deviation ``deviations[m, 0]`` (sigma_d) on the line of sight and ``deviations[m, 1]``
+    (sigma_b) across it, so its covariance depends on where the target is.  It is averaged over the points.  With
+    the sigma points it is the expected covariance: near a target whose direction is uncertain the ellipse is
+    rounder than the one turned along the mean, which would let the large deviation leak into the small one.  With
+    the mean as the only point it is that ellipse.
+    """
+    noises = np.zeros((kinds.shape[0], 3))
+    for m in range(kinds.shape[0]):
+        a, b = deviations[m, 0] ** 2, deviations[m, 1] ** 2
+        if kinds[m] == RANGE:
+            noises[m, 0] = a
+            continue
+        for i in range(points.shape[0]):
+            dx, dy = points[i, 0] - observers[m, 0], points[i, 1] - observers[m, 1]
+            length = math.hypot(dx, dy)
+            nx, ny = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
+            noises[m, 0] += weights[i] * (a * nx * nx + b * ny * ny)
+            noises[m, 1] += weights[i] * (a - b) * nx * ny
+            noises[m, 2] += weights[i] * (a * ny * ny + b * nx * nx)
+    return noises
+
+
+@kernel
+def update(
+    mean: Array,
+    covariance: Array,
+    kappa: float,
+    kinds: Array,
+    observers: Array,
+    values: Array,
+    noises: Array,
+) -> tuple[Array, Array]:
+    """Fuse m measurements at once: kinds (m,), observers' positions (m, 2), values (m, 2), noises (m, 3).
+
+    Stacking them makes the result independent of their order up to rounding.  The posterior covariance is built as
+    sum_i w_i e_i e_i^T + K R K^T with e_i = (x_i - x) - K (z_i - z), which is C - K S K^T written so that rounding
+    cannot make it indefinite (weights are not negative for kappa >= 0).
+    """
+    size = mean.shape[0]
+    points, weights = sigma_points(mean, covariance, kappa)
+    count = points.shape[0]
+    rows = 0
+    for m in range(kinds.shape[0]):
+        rows += 1 if kinds[m] == RANGE else 2
+    if rows == 0:
+        return mean.copy(), covariance.copy()
+    noise = np.zeros((rows, rows))
+    images = np.empty((count, rows))
+    observed = np.empty(rows)
+    row = 0
+    for m in range(kinds.shape[0]):
+        kind = int(kinds[m])
+        noise[row, row] = noises[m, 0]
+        observed[row] = values[m, 0]
+        if kind == RANGE:
+            for i in range(count):
+                images[i, row] = math.hypot(points[i, 0] - observers[m, 0], points[i, 1] - observers[m, 1])
+            row += 1
+        else:
+            noise[row, row + 1] = noise[row + 1, row] = noises[m, 1]
+            noise[row + 1, row + 1] = noises[m, 2]
+            observed[row + 1] = values[m, 1]
+            for i in range(count):
+                images[i, row] = points[i, 0] - observers[m, 0]
+                images[i, row + 1] = points[i, 1] - observers[m, 1]
+            row += 2
+    expected = np.zeros(rows)
+    for i in range(count):
+        for k in range(rows):
+            expected[k] += weights[i] * images[i, k]
+    innovation_covariance = noise.copy()
+    cross = np.zeros((size, rows))
+    for i in range(count):
+        for k in range(rows):
+            for j in range(rows):
+                innovation_covariance[k, j] += weights[i] * (images[i, k] - expected[k]) * (images[i, j] - expected[j])
+            for j in range(size):
+                cross[j, k] += weights[i] * (points[i, j] - mean[j]) * (images[i, k] - expected[k])
+    gain = _gain(innovation_covariance, cross)
+    updated = mean.copy()
+    for j in range(size):
+        for k in range(rows):
+            updated[j] += gain[j, k] * (observed[k] - expected[k])
+    spread = _product(_product(gain, noise), gain.T)
+    error = np.empty(size)
+    for i in range(count):
+        for j in range(size):
+            error[j] = points[i, j] - mean[j]
+            for k in range(rows):
+                error[j] -= gain[j, k] * (images[i, k] - expected[k])
+        for j in range(size):
+            for k in range(size):
+                spread[j, k] += weights[i] * error[j] * error[k]
+    return updated, 0.5 * (spread + spread.T)
+
+
+@kernel
+def _gain(innovation_covariance: Array, cross: Array) -> Array:
+    """cross @ inverse(innovation_covariance) by its Cholesky factor; a direction without variance gains nothing."""
+    root = _root(innovation_covariance)
+    rows = root.shape[0]
+    gain = np.empty(cross.shape)
+    for j in range(cross.shape[0]):
+        for k in range(rows):
+            total = cross[j, k]
+            for m in range(k):
+                total -= root[k, m] * gain[j, m]
+            gain[j, k] = total / root[k, k] if root[k, k] > 0.0 else 0.0
+        for k in range(rows - 1, -1, -1):
+            total = gain[j, k]
+            for m in range(k + 1, rows):
+                total -= root[m, k] * gain[j, m]
+            gain[j, k] = total / root[k, k] if root[k, k] > 0.0 else 0.0
+    return gain

@@ -1,0 +1,60 @@
+"""What a robot wants: the objectives of eqs. (2) and (5)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..core import Configurable, Parameter, array_parameter
+from .messages import Array
+
+if TYPE_CHECKING:
+    from .numerics.horizon import HorizonProblem
+
+
+class Objective(Configurable):
+    """Base of the objectives: fills in the objective's fields of a horizon problem."""
+
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
+        """The problem with this objective.
+
+        ``points`` (M, 2) and ``weights`` (M,) are the target's sigma points at the end of the horizon (M = 0
+        while no target is known), ``peers`` (n, 2) where the other robots will be then.
+        """
+        raise NotImplementedError
+
+
+class ReachGoal(Objective):
+    """Eq. (2): the sum of the squared distances to a goal over the horizon."""
+
+    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to go")
+
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
+        from .numerics.horizon import REACH_GOAL
+
+        return problem._replace(objective=REACH_GOAL, goal=np.array(self.goal))
+
+
+class Inform(Objective):
+    """Eq. (5): what range measurements at the end of the horizon tell, less a penalty for distance."""
+
+    range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: farther from the target than this is penalised")
+    penalty = Parameter(float, 0.001, min=0, doc="gamma: the penalty for each metre too far, at each step")
+    variance = Parameter(float, 2.0, unit="m^2", min=1e-9, doc="eta: variance of the predicted ranges")
+    joint = Parameter(bool, True, doc="count what all robots measure together; false: what this one measures")
+
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
+        from .numerics.horizon import INFORM
+        from .numerics.mutual_information import pairwise_distance
+
+        others = peers if self.joint else np.empty((0, 2))
+        return problem._replace(
+            objective=INFORM,
+            sigma_positions=points,
+            sigma_weights=weights,
+            others_distance=pairwise_distance(points, others, self.variance),
+            measurement_variance=self.variance,
+            range_penalty=self.penalty,
+            measurement_range=self.range,
+        )

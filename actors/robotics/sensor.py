@@ -1,0 +1,51 @@
+"""What a robot sees of the target."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..core import Actor, InputPort, OutputPort, Parameter
+from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, enclosing
+
+
+class Sensor(Actor):
+    """Measures the target's relative position, or its distance, with normal noise (Table II).
+
+    The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both
+    of its components are drawn at every firing, whether used or not, so that neither ``kind`` nor
+    ``max_range`` moves the noise of later measurements.
+    """
+
+    robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
+    target = InputPort(BodyState, doc="where the target is")
+    measurement = OutputPort(Measurement, doc="sent at tags where both are known and the target is in range")
+
+    kind = Parameter(str, RELATIVE_POSITION, choices=(RELATIVE_POSITION, RANGE), doc="what is measured")
+    along = Parameter(float, 0.2, unit="m", min=0, doc="standard deviation along the line of sight, sigma_d")
+    across = Parameter(float, 2.0, unit="m", min=0, doc="standard deviation across the line of sight, sigma_b")
+    max_range: Parameter[float | None] = Parameter(
+        float, None, unit="m", min=0, doc="no measurement beyond this distance; none: no limit"
+    )
+    robot_name = Parameter(str, "", doc="name in the measurement; empty: the path of what the sensor stands in")
+
+    def initialize(self) -> None:
+        self._name = self.robot_name or enclosing(self.path)
+
+    def fire(self) -> None:
+        error_along, error_across = self.random_stream("noise").normal(size=2)
+        if not (self.robot.present and self.target.present):
+            return
+        observer = self.robot.value.position
+        offset = self.target.value.position - observer
+        distance = math.hypot(offset[0], offset[1])
+        if self.max_range is not None and distance > self.max_range:
+            return
+        direction = offset / distance if distance > 0.0 else np.array([1.0, 0.0])
+        if self.kind == RANGE:
+            value = np.array([distance + self.along * error_along])
+        else:
+            athwart = np.array([-direction[1], direction[0]])
+            value = offset + self.along * error_along * direction + self.across * error_across * athwart
+        self.measurement.send(Measurement(self._name, observer, self.kind, value, self.along, self.across))

@@ -1,0 +1,261 @@
+"""The controller: timing, memory, and that nothing makes it fail."""
+
+import logging
+import sys
+
+import numpy as np
+import pytest
+from harness import Harness
+from scenario import _Recorder, play
+
+from epicycle.actors import (
+    BodyState,
+    Casadi,
+    EpicycleError,
+    Estimate,
+    Inform,
+    ParameterError,
+    Plan,
+    ReachGoal,
+    RobustController,
+)
+
+
+def state(x: float = 30.0, y: float = 0.0, vx: float = 0.0, vy: float = 0.0) -> BodyState:
+    return BodyState(np.array([x, y]), np.array([vx, vy]))
+
+
+def estimate(x: float = 12.0, y: float = 2.0, spread: float = 0.1) -> Estimate:
+    return Estimate(np.array([x, y, -1.0, 0.0]), spread * np.eye(4), ("main",))
+
+
+def plan(robot: str, time: float, x: float = 20.0, y: float = 2.0, controls: object = None) -> Plan:
+    return Plan(robot, time, state(x, y), np.zeros((11, 2)) if controls is None else np.array(controls))
+
+
+def make(**parameters: object) -> tuple[Harness, _Recorder]:
+    recorder = _Recorder()
+    return Harness(RobustController("main.controller", solver=recorder, **parameters)), recorder
+
+
+def test_it_drives_to_the_goal_and_says_so() -> None:
+    harness, _ = make()
+    harness.fire(0.0, trigger=0, state=state())
+    control = harness.last("control")
+    assert control[0] == pytest.approx(-8.0, rel=0.01)
+    assert abs(control[1]) < 1e-3
+    sent = harness.last("plan")
+    assert (sent.robot, sent.time, sent.controls.shape) == ("main", 0.0, (11, 2))
+    assert sent.controls[0].tolist() == [0.0, 0.0]  # nothing was being applied yet
+    assert sent.controls[1].tolist() == control.tolist()
+    assert (harness.last("violation"), harness.last("infeasible")) == (0.0, 0)
+    assert harness.last("iterations") > 0
+    harness.fire(0.1, trigger=1, state=state())
+    assert harness.last("plan").controls[0].tolist() == control.tolist()
+
+
+def test_without_trigger_it_listens_only() -> None:
+    harness, recorder = make()
+    harness.fire(0.0, state=state(), estimate=estimate(), peer_plans=[plan("b", 0.0)])
+    assert recorder.records == []
+    harness.fire(0.1, trigger=1, state=state())
+    problem = recorder.records[0][0]
+    assert len(problem.obstacle_mean) == len(problem.peer_mean) == 1
+    # The estimate is one period old, so step 1 lies two periods ahead of it.
+    assert problem.obstacle_mean[0, 0] == pytest.approx([12.0 - 0.2, 2.0])
+
+
+def test_before_anything_is_known_there_is_nobody_to_avoid() -> None:
+    for objective in (ReachGoal(), Inform()):
+        harness, recorder = make(objective=objective)
+        harness.fire(0.0, trigger=0, state=state())
+        problem = recorder.records[0][0]
+        assert problem.obstacle_mean.shape == (0, 10, 2)
+        assert problem.peer_mean.shape == (0, 10, 2)
+        assert np.isfinite(harness.last("control")).all()
+
+
+def test_first_state_of_the_problem_follows_the_applied_control() -> None:
+    harness, recorder = make()
+    harness.fire(0.0, trigger=0, state=state())
+    applied = harness.last("control")
+    harness.fire(0.1, trigger=1, state=state(29.0, 1.0, 2.0, 3.0))
+    problem = recorder.records[1][0]
+    assert problem.position == pytest.approx([29.2, 1.3])
+    assert problem.velocity == pytest.approx(np.array([2.0, 3.0]) + 0.1 * applied)
+
+
+def test_peers_present_at_the_very_first_firing_count() -> None:
+    harness, recorder = make()
+    harness.fire(0.0, trigger=0, state=state(), peer_plans=[plan("b", 0.0), plan("a", 0.0, y=5.0)])
+    problem = recorder.records[0][0]
+    assert problem.peer_mean[:, 0, 1].tolist() == [5.0, 2.0]  # sorted by name
+    assert problem.peer_distance[0] == pytest.approx(2.0 + 2.0 * (0.2 + 0.4 * np.arange(1, 11)))
+
+
+@pytest.mark.parametrize(("now", "lost"), [(0.0, 0), (0.1, 0), (0.2, 1), (0.3, 2), (1.5, 14)])
+def test_distance_to_a_silent_peer_grows_from_the_second_period_on(now: float, lost: int) -> None:
+    harness, recorder = make()
+    controls = np.tile([[1.0, 0.0]], (11, 1))
+    harness.fire(now, trigger=0, state=state(), peer_plans=[plan("b", 0.0, controls=controls)])
+    problem = recorder.records[0][0]
+    assert problem.peer_distance[0] == pytest.approx(2.0 + 2.0 * (0.2 + 0.4 * np.arange(1, 11) + 0.4 * lost))
+    place, speed, driven = np.array([20.0, 2.0]), np.zeros(2), []
+    for k in range(30):
+        place, speed = place + 0.1 * speed, speed + 0.1 * (controls[k] if k < 11 else np.zeros(2))
+        driven.append(place)
+    age = round(now * 10)
+    assert problem.peer_mean[0] == pytest.approx(np.array(driven[age : age + 10]))
+
+
+def test_the_latest_plan_counts_whatever_the_order_of_arrival() -> None:
+    harness, recorder = make()
+    harness.fire(0.2, trigger=0, state=state(), peer_plans=[plan("b", 0.1, y=7.0), plan("b", 0.0, y=2.0)])
+    assert recorder.records[0][0].peer_mean[0, 0, 1] == 7.0
+
+
+def test_its_own_plan_is_ignored() -> None:
+    harness, recorder = make()
+    harness.fire(0.1, trigger=0, state=state(), peer_plans=[plan("main", 0.0)])
+    assert len(recorder.records[0][0].peer_mean) == 0
+
+
+def test_tube_binds_where_the_standing_plan_reaches() -> None:
+    harness, recorder = make()
+    harness.fire(0.0, trigger=0, state=state())
+    harness.fire(0.1, trigger=1, state=state())
+    harness.fire(0.4, trigger=4, state=state())
+    first, second, third = (record[0] for record in recorder.records)
+    assert np.isinf(first.tube_radius).all()
+    assert second.tube_radius[:9] == pytest.approx(0.2 + 0.4 * np.arange(1, 10))
+    assert np.isinf(second.tube_radius[9])
+    assert np.isinf(third.tube_radius).tolist() == [False] * 7 + [True] * 3
+    assert recorder.records[1][1][0, :9].tolist() == recorder.records[0][2].controls[1:].tolist()
+    assert recorder.records[2][1][0, :7].tolist() == recorder.records[1][2].controls[3:].tolist()
+
+
+def test_tube_time_in_seconds() -> None:
+    harness, recorder = make(tube_time="seconds")
+    harness.fire(0.0, trigger=0, state=state(), peer_plans=[plan("b", 0.0)])
+    assert recorder.records[0][0].peer_distance[0, [0, 9]] == pytest.approx([2.0 + 0.48, 2.0 + 1.2])
+
+
+def test_covariance_noise_widens_the_prediction() -> None:
+    plain, wide = make(), make(covariance_noise=True)
+    for harness, _ in (plain, wide):
+        harness.fire(0.0, trigger=0, state=state(), estimate=estimate())
+    a, b = (recorder.records[0][0].obstacle_covariance[0] for _, recorder in (plain, wide))
+    assert a[0] == pytest.approx([0.1 + 0.01 * 0.1, 0.0, 0.1 + 0.01 * 0.1])
+    assert b[0, 0] == pytest.approx(a[0, 0] + 0.002)
+    assert b[9, 0] > a[9, 0] + 0.5
+
+
+def test_inform_counts_the_others_only_if_joint() -> None:
+    for joint in (True, False):
+        harness, recorder = make(objective=Inform(joint=joint))
+        harness.fire(0.0, trigger=0, state=state(), estimate=estimate(), peer_plans=[plan("b", 0.0)])
+        problem = recorder.records[0][0]
+        assert problem.others_distance.any() == joint
+        # The points lie at the end of the horizon, one second on.
+        assert problem.sigma_weights @ problem.sigma_positions == pytest.approx([11.0, 2.0])
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_is_ignored_and_the_last_good_stays(bad: float) -> None:
+    harness, recorder = make()
+    harness.fire(0.0, trigger=0, state=state(), estimate=estimate(), peer_plans=[plan("b", 0.0)])
+    worse = [
+        Plan("b", 0.1, state(bad), np.zeros((11, 2))),
+        Plan("b", 0.1, state(), np.full((11, 2), bad)),
+        Plan("b", bad, state(), np.zeros((11, 2))),
+        Plan("b", 0.1, state(), np.zeros((0, 2))),
+        Plan("b", 0.1, state(), np.zeros(2)),
+    ]
+    harness.fire(0.1, trigger=1, state=state(), estimate=estimate(bad), peer_plans=worse)
+    problem = recorder.records[1][0]
+    assert problem.obstacle_mean[0, 0] == pytest.approx([12.0 - 0.2, 2.0])
+    assert problem.peer_mean[0, 0] == pytest.approx([20.0, 2.0])
+    assert np.isfinite(harness.last("control")).all()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_without_a_finite_own_state_the_control_is_zero(bad: float) -> None:
+    harness, _ = make()
+    harness.fire(0.0, trigger=0, state=state())
+    harness.fire(0.1, trigger=1, state=state(vx=bad))
+    assert harness.last("control").tolist() == [0.0, 0.0]
+    assert len(harness.tokens("plan")) == 1
+    harness.fire(0.2, trigger=2)
+    assert harness.last("control").tolist() == [0.0, 0.0]
+    harness.fire(0.3, trigger=3, state=state())
+    assert harness.last("plan").controls[0].tolist() == [0.0, 0.0]
+    assert np.isfinite(harness.last("control")).all()
+
+
+@pytest.mark.parametrize("objective", [ReachGoal(), Inform(range=5)])
+def test_wild_but_finite_input_gives_a_finite_control_within_the_limit(objective: object) -> None:
+    random = np.random.default_rng(23)
+    for trial in range(60):
+        harness, _ = make(objective=objective)
+        for step in range(3):
+            size = 10.0 ** random.uniform(-12, 12 if trial % 2 else 2, size=8)
+            numbers = random.normal(size=8) * size
+            root = random.normal(size=(4, 4)) * 10.0 ** random.uniform(-6, 4)
+            harness.fire(
+                step / 10,
+                trigger=step,
+                state=BodyState(numbers[:2], numbers[2:4]),
+                estimate=Estimate(numbers[4:], root @ root.T),
+                peer_plans=[Plan("b", 0.0, BodyState(numbers[2:4], numbers[4:6]), random.normal(size=(11, 2)))],
+            )
+            control = harness.last("control")
+            assert np.isfinite(control).all()
+            assert np.hypot(*control) <= 8.0 * (1 + 1e-9)
+            assert not np.isnan(harness.last("violation"))
+
+
+def test_on_top_of_target_and_peer_it_stays_calm() -> None:
+    harness, _ = make()
+    there = state(12.0, 2.0)
+    harness.fire(0.0, trigger=0, state=there, estimate=estimate(), peer_plans=[plan("b", 0.0, 12.0, 2.0)])
+    assert np.isfinite(harness.last("control")).all()
+    assert harness.last("violation") > 0.0
+    assert harness.last("infeasible") == 1
+
+
+def test_same_run_same_bits() -> None:
+    first, second = (play(2, 10.0, 0.25, seed=4, steps=30) for _ in range(2))
+    assert first[1].tobytes() == second[1].tobytes()
+    for (_, _, a), (_, _, b) in zip(first[0], second[0], strict=True):
+        assert a.controls.tobytes() == b.controls.tobytes()
+    assert play(2, 10.0, 0.25, seed=5, steps=30)[1].tobytes() != first[1].tobytes()
+
+
+def test_missing_casadi_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(EpicycleError, match=r"pip install 'epicycle\[casadi\]'"):
+        Harness(RobustController("main.controller", solver=Casadi()))
+
+
+def test_casadi_in_the_place_of_the_barrier_method() -> None:
+    _, ours = play(1, 30.0, 0.0, seed=2, steps=8)
+    records, theirs = play(1, 30.0, 0.0, seed=2, steps=8, solver=Casadi())
+    assert len(records) == 16
+    assert theirs[:, 0] == pytest.approx(ours[:, 0], abs=0.05)  # the main robot has one way to go
+
+
+def test_parts_can_be_given_as_mappings() -> None:
+    made = RobustController("c", objective={"type": "Inform", "range": "10 m"}, solver={"type": "Barrier"})
+    assert isinstance(made.objective, Inform)
+    assert made.objective.range == 10.0
+    with pytest.raises(ParameterError, match="horizon"):
+        RobustController("c", horizon=2)
+
+
+def test_compiling_is_announced_only_if_it_takes_long(caplog: pytest.LogCaptureFixture) -> None:
+    from epicycle.actors.robotics.numerics.warm_up import compile_kernels
+
+    caplog.set_level(logging.INFO, "epicycle")
+    compile_kernels()  # done already in this process, or quick from the cache
+    compile_kernels()
+    assert len(caplog.records) <= 1

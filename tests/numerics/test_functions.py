@@ -1,0 +1,225 @@
+"""Terms, mutual information, objective and reachability against definitions and finite differences."""
+
+import importlib
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+PREFIX = "epicycle.actors.robotics.numerics."
+barrier = importlib.import_module(PREFIX + "barrier")
+horizon = importlib.import_module(PREFIX + "horizon")
+information = importlib.import_module(PREFIX + "mutual_information")
+reachability = importlib.import_module(PREFIX + "reachability")
+terms = importlib.import_module(PREFIX + "terms")
+ukf = importlib.import_module(PREFIX + "ukf")
+
+Six = tuple[float, float, float, float, float, float]
+
+
+def check_derivatives(function: Callable[[float, float], Six], x: float, y: float, tolerance: float = 1e-6) -> None:
+    """Gradient against differences of values, Hessian against differences of gradients."""
+    step = 1e-5
+    _, gx, gy, hxx, hxy, hyy = function(x, y)
+    by_x = (np.array(function(x + step, y)) - function(x - step, y)) / (2 * step)
+    by_y = (np.array(function(x, y + step)) - function(x, y - step)) / (2 * step)
+    scale = tolerance * (1.0 + max(map(abs, (gx, gy, hxx, hxy, hyy))))
+    assert [gx, gy] == pytest.approx([by_x[0], by_y[0]], abs=scale)
+    assert [hxx, hxy, hyy] == pytest.approx([by_x[1], by_x[2], by_y[2]], abs=scale)
+    assert by_x[2] == pytest.approx(by_y[1], abs=scale)
+
+
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(17)
+
+
+def spread(random: np.random.Generator, size: int) -> np.ndarray:
+    root = random.normal(size=(size, size))
+    return root @ root.T + 0.05 * np.eye(size)
+
+
+def test_terms(random: np.random.Generator) -> None:
+    for _ in range(200):
+        x, y, cx, cy = random.normal(scale=5.0, size=4)
+        c = spread(random, 2)
+        check_derivatives(lambda x, y, cx=cx, cy=cy: terms.stay_near(x, y, cx, cy, 1.5), x, y, 1e-5)
+        check_derivatives(lambda x, y, cx=cx, cy=cy: terms.keep_away(x, y, cx, cy, 1.5), x, y, 1e-5)
+
+        def uncertain(x: float, y: float, cx: float = cx, cy: float = cy, c: np.ndarray = c) -> Six:
+            return terms.keep_away_uncertain(x, y, cx, cy, c[0, 0], c[0, 1], c[1, 1], 2.0, 2.0)
+
+        if np.hypot(x - cx, y - cy) > 0.3:
+            check_derivatives(uncertain, x, y, 1e-5)
+        n = np.array([x - cx, y - cy]) / np.hypot(x - cx, y - cy)
+        value = 2.0 - np.hypot(x - cx, y - cy) + 2.0 * np.sqrt(n @ c @ n)
+        assert uncertain(x, y)[0] == pytest.approx(value, abs=1e-12)
+
+
+def information_by_definition(own: np.ndarray, others: np.ndarray, points: np.ndarray, weights: np.ndarray) -> float:
+    """Eq. (5) as it is written, without the density's constant; variance 2."""
+    robots = np.vstack([own[np.newaxis], others])
+    ranges = np.linalg.norm(points[:, np.newaxis] - robots, axis=2)  # (M, robots)
+    squares = ((ranges[:, np.newaxis] - ranges) ** 2).sum(axis=2)
+    return float(-(weights * np.log((weights * np.exp(-squares / 4.0)).sum(axis=1)))[weights > 0].sum())
+
+
+@pytest.mark.parametrize("kappa", [0.0, 1.0])
+def test_mutual_information(random: np.random.Generator, kappa: float) -> None:
+    for _ in range(50):
+        state = random.normal(scale=3.0, size=4)
+        points, weights = ukf.sigma_points(state, spread(random, 4), kappa)
+        points = np.ascontiguousarray(points[:, :2])
+        others = random.normal(scale=10.0, size=(int(random.integers(0, 4)), 2))
+        own = random.normal(scale=10.0, size=2)
+        distance = information.pairwise_distance(points, others, 2.0)
+
+        def negative(
+            x: float, y: float, p: np.ndarray = points, w: np.ndarray = weights, d: np.ndarray = distance
+        ) -> Six:
+            return information.negative_information(x, y, p, w, d, 2.0)
+
+        expected = -information_by_definition(own, others, points, weights)
+        assert negative(*own)[0] == pytest.approx(expected, abs=1e-12)
+        check_derivatives(negative, *own, tolerance=1e-5)
+
+
+def inform_problem(random: np.random.Generator, steps: int = 10, reach: float = 8.0) -> "horizon.HorizonProblem":
+    """A free robot that is to inform itself about a target near the origin."""
+    state, covariance = np.array([0.0, 0.0, 1.0, 0.5]), spread(random, 4)
+    points, weights = ukf.sigma_points(state, covariance, 0.0)
+    means, covariances = reachability.propagate(state, covariance, ukf.constant_velocity(0.1), np.zeros((4, 4)), steps)
+    points = np.ascontiguousarray(points[:, :2])
+    return horizon.HorizonProblem(
+        period=0.1,
+        position=np.array([6.0, 5.0]),
+        velocity=np.zeros(2),
+        max_speed=16.0,
+        max_acceleration=16.0,
+        tube_centre=np.zeros((steps, 2)),
+        tube_radius=np.full(steps, np.inf),
+        safe_distance=0.1,
+        margin=0.0,
+        obstacle_mean=means[np.newaxis],
+        obstacle_covariance=covariances[np.newaxis],
+        peer_mean=np.empty((0, steps, 2)),
+        peer_distance=np.empty((0, steps)),
+        objective=horizon.INFORM,
+        goal=np.zeros(2),
+        sigma_positions=points,
+        sigma_weights=weights,
+        others_distance=np.zeros((9, 9)),
+        measurement_variance=2.0,
+        range_penalty=0.001,
+        measurement_range=reach,
+    )
+
+
+def objective_by_definition(problem: "horizon.HorizonProblem", controls: np.ndarray) -> float:
+    """Eqs. (2) and (5) in numpy."""
+    places = horizon.trajectory(problem.position, problem.velocity, controls, problem.period, len(controls))
+    if problem.objective == horizon.REACH_GOAL:
+        return float(((places - problem.goal) ** 2).sum())
+    excess = np.linalg.norm(places - problem.obstacle_mean[0], axis=1) - problem.measurement_range
+    informed = information_by_definition(places[-1], np.empty((0, 2)), problem.sigma_positions, problem.sigma_weights)
+    return float(-informed + problem.range_penalty * np.maximum(excess, 0.0).sum())
+
+
+def solve(problem: "horizon.HorizonProblem", start: np.ndarray | None = None) -> "barrier.Solution":
+    start = np.zeros((len(problem.tube_radius), 2)) if start is None else start
+    return barrier.solve(problem, start[np.newaxis].copy())
+
+
+@pytest.mark.parametrize("reach", [8.0, 3.0])
+def test_the_reported_objective_is_the_papers(random: np.random.Generator, reach: float) -> None:
+    for _ in range(10):
+        problem = inform_problem(random, reach=reach)
+        solution = solve(problem)
+        expected = objective_by_definition(problem, solution.controls)
+        assert solution.objective == pytest.approx(expected, abs=1e-9)
+        goal = problem._replace(objective=horizon.REACH_GOAL)
+        solution = solve(goal)
+        assert solution.objective == pytest.approx(objective_by_definition(goal, solution.controls), abs=1e-9)
+
+
+def test_an_observer_gains_information(random: np.random.Generator) -> None:
+    """The sign of I in eq. (5): a plan must not know less in the end than standing still does."""
+    for _ in range(10):
+        problem = inform_problem(random)
+        still = objective_by_definition(problem, np.zeros((10, 2)))
+        assert objective_by_definition(problem, solve(problem).controls) < still
+
+
+@pytest.mark.parametrize("kind", ["goal", "inform"])
+def test_solution_is_stationary(random: np.random.Generator, kind: str) -> None:
+    """The whole objective by finite differences: no small step within the limits improves the plan found."""
+    problem = inform_problem(random, steps=6)._replace(max_speed=1e3, max_acceleration=1e3)
+    if kind == "goal":
+        problem = problem._replace(objective=horizon.REACH_GOAL, goal=np.array([8.0, 5.0]))
+    solution = solve(problem)
+    value = objective_by_definition(problem, solution.controls)
+    gap = 1e-4 * max(1.0, abs(value))
+    for _ in range(200):
+        step = random.normal(size=(6, 2))
+        trial = solution.controls + step * random.choice([1e-3, 1e-2, 0.1])
+        assert objective_by_definition(problem, trial) > value - gap
+
+
+def test_violations_are_the_papers(random: np.random.Generator) -> None:
+    problem = inform_problem(random)._replace(
+        safe_distance=2.0,
+        margin=2.0,
+        peer_mean=random.normal(size=(2, 10, 2)),
+        peer_distance=np.full((2, 10), 3.0),
+        tube_centre=random.normal(size=(10, 2)),
+        tube_radius=np.linspace(0.6, 4.2, 10),
+    )
+    controls = random.normal(size=(10, 2))
+    places = horizon.trajectory(problem.position, problem.velocity, controls, 0.1, 10)
+    away = places - problem.obstacle_mean[0]
+    n = away / np.linalg.norm(away, axis=1)[:, np.newaxis]
+    xx, xy, yy = problem.obstacle_covariance[0].T
+    sigma = np.sqrt(n[:, 0] ** 2 * xx + 2 * n[:, 0] * n[:, 1] * xy + n[:, 1] ** 2 * yy)
+    expected = [
+        np.linalg.norm(places - problem.tube_centre, axis=1) - problem.tube_radius,
+        2.0 - np.linalg.norm(away, axis=1) + 2.0 * sigma,
+        *(3.0 - np.linalg.norm(places - mean, axis=1) for mean in problem.peer_mean),
+    ]
+    found = barrier.violations(problem, controls)
+    assert (found[:, :2] == -np.inf).all()  # decided before the first control acts
+    assert found[:, 2:] == pytest.approx(np.array(expected)[:, 2:], abs=1e-12)
+
+
+def test_planned_positions_are_those_driven(random: np.random.Generator) -> None:
+    for elapsed in (0, 1, 3, 9, 25):
+        controls = random.normal(size=(11, 2))
+        place, speed = random.normal(size=2), random.normal(size=2)
+        found = reachability.planned_positions(place, speed, controls, 0.1, elapsed, 10)
+        driven = []
+        for k in range(elapsed + 10):
+            place, speed = place + 0.1 * speed, speed + 0.1 * (controls[k] if k < 11 else 0.0)
+            driven.append(place)
+        assert found == pytest.approx(np.array(driven[elapsed:]), abs=1e-12)
+
+
+def test_trajectory_starts_at_step_one(random: np.random.Generator) -> None:
+    controls = random.normal(size=(4, 2))
+    places = horizon.trajectory(np.array([1.0, 2.0]), np.array([3.0, 4.0]), controls, 0.5, 4)
+    assert places[:2] == pytest.approx(np.array([[1.0, 2.0], [2.5, 4.0]]))
+    assert places[2] == pytest.approx(places[1] + 0.5 * (np.array([3.0, 4.0]) + 0.5 * controls[0]))
+
+
+def test_tube_radius_in_steps_and_seconds() -> None:
+    assert reachability.tube_radius(0.2, 0.4, 1.0, 10)[[0, 9]] == pytest.approx([0.6, 4.2])
+    assert reachability.tube_radius(0.2, 0.4, 0.1, 10)[[0, 9]] == pytest.approx([0.24, 0.6])
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_propagate_is_repeated_prediction(random: np.random.Generator, noise: float) -> None:
+    mean, covariance = random.normal(size=4), spread(random, 4)
+    transition, q = ukf.constant_velocity(0.1), noise * np.diag([0.002, 0.002, 0.4, 0.4])
+    means, covariances = reachability.propagate(mean, covariance, transition, q, 10)
+    for row, spread_row in zip(means, covariances, strict=True):
+        mean, covariance = ukf.predict(mean, covariance, transition, q)
+        assert row == pytest.approx(mean[:2], abs=1e-12)
+        assert spread_row == pytest.approx([covariance[0, 0], covariance[0, 1], covariance[1, 1]], abs=1e-12)
