@@ -106,4 +106,3 @@ class MeasurementAspect(Aspect):
     """An aspect of what leaves an output port."""
 
     stands_at: ClassVar[frozenset[str]] = frozenset({"output"})
-

@@ -1,10 +1,11 @@
 """The paper's main comparison: mean arrival time against the number of observers, at two disturbance levels.
 
     python benchmarks/arrival_times.py [--runs 40] [--range 30] [--levels 0,0.5] [--observers 0,1,2,3,4] [--jobs 2]
+        [--first-seed 0] [--set PATH=VALUE ...]
 
 Prints a Markdown table: mean arrival time with its standard error, smallest distances over all runs, runs that came
 within 2 m of the obstacle or of another robot, runs that never arrived (counted apart, never averaged in), and the
-mean number of the main robot's plans that broke a constraint.  Seeds are 0, 1, 2, ...; every condition uses the same.
+mean number of the main robot's plans that broke a constraint.  Seeds count from --first-seed; every condition uses the same.
 """
 
 from __future__ import annotations
@@ -13,20 +14,26 @@ import argparse
 import math
 import os
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from statistics import fmean, stdev
 from typing import Any
 
 Condition = tuple[float, float, int]
 
 
-def run(condition: Condition, seed: int) -> dict[str, Any]:
+def run(condition: Condition, settings: list[str], seed: int) -> dict[str, Any]:
     """The metrics of one run."""
     from epicycle.runner import Simulation, load_model
 
     measurement_range, level, observers = condition
     model = load_model(
         "collision_avoidance",
-        set=[f"measurement_range={measurement_range}", f"disturbance={level}", f"observers={observers}"],
+        set=[
+            f"measurement_range={measurement_range}",
+            f"disturbance={level}",
+            f"observers={observers}",
+            *settings,
+        ],
     )
     return Simulation(model, seed=seed).run().metrics
 
@@ -61,13 +68,13 @@ HEAD = """\
 
 def main() -> None:
     """Run all conditions and print the table."""
-    options = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--runs", type=int, default=40)
     options.add_argument("--range", dest="ranges", default="30")
     options.add_argument("--levels", default="0,0.5")
     options.add_argument("--observers", default="0,1,2,3,4")
+    options.add_argument("--first-seed", type=int, default=0)
+    options.add_argument("--set", dest="settings", action="append", default=[])
     options.add_argument("--jobs", type=int, default=os.cpu_count())
     given = options.parse_args()
     conditions: list[Condition] = [
@@ -79,7 +86,8 @@ def main() -> None:
     print(HEAD, flush=True)
     with ProcessPoolExecutor(given.jobs) as pool:
         for condition in conditions:
-            runs = list(pool.map(run, [condition] * given.runs, range(given.runs)))
+            seeds = range(given.first_seed, given.first_seed + given.runs)
+            runs = list(pool.map(partial(run, condition, given.settings), seeds))
             print(row(condition, runs), flush=True)
 
 

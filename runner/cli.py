@@ -56,31 +56,21 @@ def parser() -> argparse.ArgumentParser:
     )
     commands = top.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser(
-        "run", help="run a model", description="Run a model once and report what came of it."
-    )
+    run = commands.add_parser("run", help="run a model", description="Run a model once and report what came of it.")
     add_model(run)
-    run.add_argument(
-        "--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)"
-    )
-    run.add_argument(
-        "--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"
-    )
+    run.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
+    run.add_argument("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)")
     run.add_argument(
         "--out",
         metavar="DIR",
         type=Path,
         help="folder for manifest, signals and figures (default: results/MODEL; with --json: none)",
     )
-    run.add_argument(
-        "--log", metavar="FILE", type=Path, help="write the event log to FILE (.parquet, .csv or .jsonl)"
-    )
+    run.add_argument("--log", metavar="FILE", type=Path, help="write the event log to FILE (.parquet, .csv or .jsonl)")
     run.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
     run.set_defaults(command=run_command)
 
-    validate = commands.add_parser(
-        "validate", help="check a model", description="Check a model without running it."
-    )
+    validate = commands.add_parser("validate", help="check a model", description="Check a model without running it.")
     add_model(validate)
     validate.set_defaults(command=validate_command)
 
@@ -91,9 +81,7 @@ def parser() -> argparse.ArgumentParser:
 
 def add_model(command: argparse.ArgumentParser) -> None:
     """The options that say which model is meant, and what to change in it."""
-    command.add_argument(
-        "model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"
-    )
+    command.add_argument("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model")
     command.add_argument(
         "--set",
         metavar="PATH=VALUE",
@@ -126,9 +114,7 @@ def load(options: argparse.Namespace) -> tuple[Model, dict[str, Any]]:
     from .model import Problems, load_model
     from .show import figures_of
 
-    model = load_model(
-        options.model, set=options.set, aspects=options.aspect, without_aspects=options.without
-    )
+    model = load_model(options.model, set=options.set, aspects=options.aspect, without_aspects=options.without)
     problems = Problems()
     figures = figures_of(model, problems)
     problems.raise_if_any()
@@ -185,9 +171,7 @@ def validate_command(options: argparse.Namespace, given: list[str]) -> int:
     """``epicycle validate``."""
     model, _ = load(options)
     wires = sum(1 for _ in model.graph.wires())
-    print(
-        f"{options.model} is valid: {len(model.graph.actors)} actors, {wires} wires, {len(model.aspects)} aspects"
-    )
+    print(f"{options.model} is valid: {len(model.graph.actors)} actors, {wires} wires, {len(model.aspects)} aspects")
     return DONE
 
 

@@ -25,9 +25,7 @@ def test_scenario_runs_for_any_number_of_observers(observers: int) -> None:
     results = Simulation(model, seed=3).run(until=1.0)
     for name, signal in results.signals.items():
         if name.endswith(".state"):
-            assert all(
-                math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity)
-            )
+            assert all(math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity))
 
 
 def test_scenario_parameters_reach_every_robot() -> None:

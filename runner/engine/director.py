@@ -24,18 +24,21 @@ token; and tokens that an actor does not read do not stay in the port.
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Callable
 from itertools import count
-from typing import Any
+from typing import Any, cast
 
 import simpy
+from simpy.events import EventPriority
 
-from epicycle.actors import Actor, EpicycleError, InputPort, Tag, Wake
+from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake
 
 MAX_MICROSTEPS = 100_000
+MAX_STEPS = 1_000_000  # of SimPy at one instant
 _START = 0
 # After all of SimPy's own events of an instant (priorities 0 and 1).
-_LAST = 2
+_LAST = cast(EventPriority, 2)
 
 
 class ActorError(EpicycleError):
@@ -55,7 +58,7 @@ class ActorError(EpicycleError):
 
 
 class LoopError(EpicycleError):
-    """Time stands still: too many microsteps at one instant."""
+    """Time stands still: too many microsteps at one instant, or too many events of SimPy's."""
 
     def __init__(self, time: int, actors: tuple[str, ...]) -> None:
         super().__init__(time, actors)
@@ -63,10 +66,12 @@ class LoopError(EpicycleError):
         self.actors = actors
 
     def __str__(self) -> str:
+        head = f"time stands still at {self.time / 1e9:g} s: more than "
+        if not self.actors:
+            return head + f"{MAX_STEPS:,} SimPy events; a process waits again and again for no time at all"
         names = ", ".join(self.actors)
-        return (
-            f"time stands still at {self.time / 1e9:g} s: more than {MAX_MICROSTEPS:,} microsteps; "
-            f"the last actors that fired: {names}; give their loop a delay above zero"
+        return head + (
+            f"{MAX_MICROSTEPS:,} microsteps; the last actors that fired: {names}; give their loop a delay above zero"
         )
 
 
@@ -86,17 +91,17 @@ class Director:
         self._wakes: dict[tuple[int, int, int], list[Wake]] = {}
         self._alarms: set[int] = set()
         self._firing = False
+        self._stop_after: Tag | None = None
         self._recent: list[str] = []
-        # Asked between tags: True ends the run.
-        self.finished: Callable[[], bool] = _never
 
     @property
     def tag(self) -> Tag:
         """The present tag: outside of firings (a process that SimPy resumed), the first not handled yet."""
         if self._firing:
             return self.last
-        now = int(self.environment.now)
-        return Tag(now, self.last.microstep + 1 if now == self.last.time else 1)
+        # SimPy's time need not be whole; what comes between two nanoseconds belongs to the later one.
+        now = math.ceil(self.environment.now)
+        return Tag(now, 1) if now > self.last.time else Tag(self.last.time, self.last.microstep + 1)
 
     # -- what actors and aspects ask for --------------------------------------------------------------------------
 
@@ -119,6 +124,11 @@ class Director:
         tag = Tag(now.time + delay, 1) if delay > 0 else Tag(now.time, now.microstep + 1)
         self._enter(tag, -1, lambda: deliver(token))
 
+    def stop_after_this_tag(self) -> None:
+        """End the run when the present tag has been handled."""
+        if self._stop_after is None:
+            self._stop_after = self.tag
+
     def _tag_at(self, time: int) -> Tag:
         """The tag of a wake-up for ``time``."""
         now = self.tag
@@ -140,77 +150,107 @@ class Director:
             self._alarms.add(tag.time)
             alarm = self.environment.event()
             alarm._ok, alarm._value = True, None
-            alarm.callbacks.append(self._instant)
+            alarm.callbacks.append(lambda _: self._instant(tag.time))
             self.environment.schedule(alarm, priority=_LAST, delay=tag.time - self.environment.now)
 
     # -- time -----------------------------------------------------------------------------------------------------
 
-    def _instant(self, _: Any) -> None:
+    def _instant(self, now: int) -> None:
         """Handle every tag of the present instant."""
-        now = int(self.environment.now)
         agenda = self._agenda
         self._firing = True
         try:
             while agenda and agenda[0][0] == now:
                 _, microstep, rank, _, what = heapq.heappop(agenda)
-                if microstep != self.last.microstep or now != self.last.time:
-                    if self.finished():
+                tag = self.last
+                if microstep != tag.microstep or now != tag.time:
+                    tag = Tag(now, microstep)
+                    if self._stop_after is not None and tag > self._stop_after:
                         # The entry stays undone: the run ends here.
                         return
-                    self.last = Tag(now, microstep)
-                    if microstep > MAX_MICROSTEPS:
-                        raise LoopError(now, tuple(dict.fromkeys(self._recent)))
-                if not isinstance(what, Actor):
+                if isinstance(what, Actor):
+                    key = (now, microstep, rank)
+                    self._wanted.discard(key)
+                    if self._is_idle(what, key):
+                        continue
+                self.last = tag
+                if microstep > MAX_MICROSTEPS:
+                    raise LoopError(now, tuple(dict.fromkeys(self._recent)))
+                if isinstance(what, Actor):
+                    self._fire(what)
+                else:
                     what()
-                    continue
-                key = (now, microstep, rank)
-                self._wanted.discard(key)
-                self._fire(what, key)
         finally:
             self._firing = False
             self._alarms.discard(now)
 
-    def _fire(self, actor: Actor, key: tuple[int, int, int]) -> None:
+    def _is_idle(self, actor: Actor, key: tuple[int, int, int]) -> bool:
+        """Make the wake-ups of a firing due; true if all were cancelled and there is nothing else to fire for."""
         wakes = self._wakes.pop(key, None)
-        if wakes is not None:
-            due = False
-            for wake in wakes:
-                wake.due = not wake.cancelled
-                due = due or wake.due
-            if not due and not any(port.present for port in actor.inputs.values()):
-                return
+        if wakes is None:
+            return False
+        due = False
+        for wake in wakes:
+            wake.due = not wake.cancelled
+            due = due or wake.due
+        return not due and not any(port.present for port in actor.inputs.values())
+
+    def _fire(self, actor: Actor) -> None:
         self.firings += 1
-        if key[1] > MAX_MICROSTEPS - 10:
+        if self.last.microstep > MAX_MICROSTEPS - 10:
             self._recent.append(actor.path)
         try:
             actor.fire()
-        except EpicycleError:
+        except ActorError:  # of an aspect on the way of a token
             raise
         except Exception as error:
-            raise ActorError(actor.path, self.tag, "fire()", describe(error)) from error
+            doing = "run()" if isinstance(actor, Process) else "fire()"
+            raise ActorError(actor.path, self.last, doing, describe(error)) from error
         for port in actor.inputs.values():
             port.clear()
 
-    def run(self, stop: int | None, progress: Callable[[float], None] | None = None) -> None:
-        """Handle events up to and including ``stop`` (ns), until none is left, or until ``finished`` says so."""
+    def run(self, stop: int | None, actors: list[Actor], progress: Callable[[float], None] | None = None) -> str:
+        """Handle events up to and including ``stop`` (ns), until none is left, or until a stop was asked for.
+
+        Returns why it ended.
+        """
         environment = self.environment
-        steps = 0
-        while (upcoming := environment.peek()) != float("inf"):
+        steps = here = 0
+        now: float = _START
+        while (upcoming := environment.peek()) != math.inf:
+            if self._stop_after is not None and max(upcoming, self.last.time) > self._stop_after.time:
+                break
             if stop is not None and upcoming > stop:
+                return "stop time"
+            try:
+                environment.step()
+            except (ActorError, LoopError):
+                raise
+            except Exception as error:
+                raise self._of_process(error, actors) from error
+            if self._stop_after is not None and self.last >= self._stop_after:
                 break
-            environment.step()
-            if self.finished():
-                break
+            here = here + 1 if upcoming == now else 0
+            now = upcoming
+            if here > MAX_STEPS:
+                raise LoopError(self.tag.time, ())
             steps += 1
             if progress is not None and steps % 16 == 0:
-                progress(environment.now / 1e9)
+                progress(now / 1e9)
+        return "no events left" if self._stop_after is None else "stop_when"
+
+    def _of_process(self, error: Exception, actors: list[Actor]) -> ActorError:
+        """The error of a process that SimPy resumed: from there, no firing says whose it was."""
+        for actor in actors:
+            failure = actor.failure if isinstance(actor, Process) else None
+            if failure is not None:
+                return ActorError(actor.path, self.tag, "run()", describe(failure))
+        return ActorError("a SimPy process", self.tag, "its generator", describe(error.__cause__ or error))
 
 
 def describe(error: BaseException) -> str:
-    """An exception in one line."""
+    """An exception in one line; our own explain themselves without their type."""
     text = str(error).strip()
+    if isinstance(error, EpicycleError):
+        return text
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
-
-
-def _never() -> bool:
-    return False

@@ -1,12 +1,14 @@
 """Tokens as plain data and as canonical bytes, for the event log and its digest.
 
-A token may be a number, a text, None, a list or tuple, a mapping with text keys, a NumPy array, or a dataclass of
-these.  Anything else is logged by its ``repr``, which must then not contain an address.
+A token may be a number, a text, None, a list or tuple, a set, a mapping with text keys, a NumPy array, or a dataclass
+of these.  Anything else is logged by its ``repr``; if that tells an address instead of a value, it is refused.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
+import re
 import struct
 from collections.abc import Iterator
 from functools import cache
@@ -14,9 +16,20 @@ from typing import Any
 
 import numpy as np
 
+from epicycle.actors import EpicycleError
+
 _DOUBLE = struct.Struct("<d").pack
 _INTEGER = struct.Struct("<q").pack
 _COUNT = struct.Struct("<I").pack
+
+
+# A NaN has many bit patterns, and machines differ in which one an operation gives.
+_NAN = struct.pack("<Q", 0x7FF8000000000000)
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
+
+
+class TokenError(EpicycleError):
+    """A token that cannot be logged."""
 
 
 @cache
@@ -29,30 +42,36 @@ def plain(token: Any) -> Any:
     """A token as JSON-like data: numbers, texts, lists and dicts."""
     if token is None or isinstance(token, (bool, int, float, str)):
         return token
-    if isinstance(token, np.ndarray):
-        return token.tolist()
-    if isinstance(token, np.generic):
-        return token.item()
+    if isinstance(token, (np.ndarray, np.generic)):
+        value = token.tolist()
+        return value if token.dtype.kind in "biufSU" and not isinstance(value, (bytes, np.generic)) else plain(value)
     if isinstance(token, (list, tuple)):
         return [plain(item) for item in token]
+    if isinstance(token, (set, frozenset)):
+        return [plain(item) for item in sorted(token, key=canonical)]
     if isinstance(token, dict):
         return {str(key): plain(item) for key, item in token.items()}
     if dataclasses.is_dataclass(token) and not isinstance(token, type):
         return {name: plain(getattr(token, name)) for name in field_names(type(token))}
-    return repr(token)
+    return _shown(token)
 
 
 def canonical(token: Any) -> bytes:
     """A token as bytes: equal tokens give equal bytes on every machine, and no two kinds are confused."""
     if isinstance(token, float):
-        return b"f" + _DOUBLE(token)
+        return b"f" + (_NAN if math.isnan(token) else _DOUBLE(token))
     if isinstance(token, np.ndarray):
+        if token.dtype.kind not in "biuf":
+            return b"A" + canonical(token.dtype.str) + canonical(token.tolist())
         array = np.ascontiguousarray(token)
+        if array.dtype.kind == "f" and np.isnan(array).any():
+            array = np.where(np.isnan(array), array.dtype.type(np.nan), array)
         shape = b"".join(_COUNT(size) for size in array.shape)
         return b"a" + array.dtype.str.encode() + _COUNT(array.ndim) + shape + array.tobytes()
     if dataclasses.is_dataclass(token) and not isinstance(token, type):
         names = field_names(type(token))
-        return b"d" + b"".join(_named(name, getattr(token, name)) for name in names) + b";"
+        head = b"d" + _text(type(token).__qualname__) + _COUNT(len(names))
+        return head + b"".join(_named(name, getattr(token, name)) for name in names)
     if token is None:
         return b"n"
     if isinstance(token, bool):
@@ -64,12 +83,25 @@ def canonical(token: Any) -> bytes:
     if isinstance(token, str):
         return b"s" + _text(token)
     if isinstance(token, np.generic):
-        return canonical(token.item())
+        item = token.item()
+        return b"r" + _text(_shown(token)) if isinstance(item, np.generic) else canonical(item)
     if isinstance(token, (list, tuple)):
         return b"l" + _COUNT(len(token)) + b"".join(canonical(item) for item in token)
     if isinstance(token, dict):
-        return b"m" + _COUNT(len(token)) + b"".join(_named(str(key), item) for key, item in token.items())
-    return b"r" + _text(repr(token))
+        return b"m" + _COUNT(len(token)) + b"".join(sorted(canonical(k) + canonical(v) for k, v in token.items()))
+    if isinstance(token, (set, frozenset)):
+        return b"e" + _COUNT(len(token)) + b"".join(sorted(map(canonical, token)))
+    return b"r" + _text(_shown(token))
+
+
+def _shown(token: Any) -> str:
+    text = repr(token)
+    if _ADDRESS.search(text):
+        raise TokenError(
+            f"a token of type {type(token).__name__} has no value that could be logged: make it a dataclass, "
+            "or give it a __repr__ that shows what is in it"
+        )
+    return text
 
 
 def _text(text: str) -> bytes:
@@ -83,8 +115,11 @@ def _named(name: str, value: Any) -> bytes:
 
 def scalars(token: Any, field: str = "") -> Iterator[tuple[str, float]]:
     """The numbers inside a token with the names of their places, e.g. ``("position[0]", 1.5)``."""
-    if isinstance(token, (bool, int, float, np.generic)):
-        yield field, float(token)
+    if isinstance(token, (bool, int, float, np.number, np.bool_)) and not isinstance(token, np.complexfloating):
+        try:
+            yield field, float(token)
+        except OverflowError:  # an int beyond all floats
+            yield field, float("inf") if token > 0 else float("-inf")
     elif isinstance(token, (np.ndarray, list, tuple)):
         for index, item in enumerate(token):
             yield from scalars(item, f"{field}[{index}]")

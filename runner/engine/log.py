@@ -56,9 +56,7 @@ class EventLog:
         self._hash = hashlib.sha256()
         self._heads: dict[tuple[str, str, str, str], bytes] = {}
 
-    def add(
-        self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any
-    ) -> None:
+    def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
         self.count += 1
         names = (event, actor, port, aspect)
@@ -104,6 +102,15 @@ def write_log(records: list[Record], path: Path) -> None:
         import pyarrow.parquet as pq
 
         columns = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
-        types = (pa.float64(), pa.int64(), pa.string(), pa.string(), pa.string(), pa.int64(), pa.string(), pa.string())
+        types = (
+            pa.float64(),
+            pa.int64(),
+            pa.string(),
+            pa.string(),
+            pa.string(),
+            pa.int64(),
+            pa.string(),
+            pa.string(),
+        )
         arrays = [pa.array(column, type=kind) for column, kind in zip(columns, types, strict=True)]
         pq.write_table(pa.table(arrays, names=list(COLUMNS)), path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,7 +39,7 @@ class Reduction:
         self.take = take
         self.count = 0
         self._value: Any = None
-        self._total = 0.0
+        self._total: Any = 0
 
     def add(self, token: Any) -> None:
         """Take in a token."""
@@ -48,9 +49,9 @@ class Reduction:
         elif self._value is None or self.take == "last":
             self._value = token
         elif self.take == "min":
-            self._value = min(self._value, token)
+            self._value = _nan_or(min, self._value, token)
         elif self.take == "max":
-            self._value = max(self._value, token)
+            self._value = _nan_or(max, self._value, token)
 
     @property
     def value(self) -> Any:
@@ -58,12 +59,17 @@ class Reduction:
         if self.take == "count":
             return self.count
         if self.take == "sum":
-            return self._total if self._total != math.floor(self._total) else int(self._total)
+            return self._total
         if self.count == 0:
             return None
         if self.take == "mean":
             return self._total / self.count
         return self._value
+
+
+def _nan_or(choose: Callable[..., Any], first: Any, second: Any) -> Any:
+    """The lesser or greater of two numbers; if one of them is NaN there is no such thing, whatever the order."""
+    return math.nan if math.isnan(first) or math.isnan(second) else choose(first, second)
 
 
 @dataclass

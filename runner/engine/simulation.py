@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, Tag, to_seconds
+from epicycle.actors import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    PortError,
+    Tag,
+    to_nanoseconds,
+    to_seconds,
+)
 from epicycle.aspects import JoinPoint
 
-from ..model import Hop, Model
+from ..model import Hop, Model, WovenAspect
 from .director import ActorError, Director, describe
 from .log import EventLog
 from .results import Reduction, Results, Signal
 
 Deliver = Callable[[Any], None]
+Emit = Callable[[Any, int | None], None]
 
 
 class Simulation:
@@ -26,14 +37,19 @@ class Simulation:
     def __init__(self, model: Model, *, seed: int | None = None, keep_log: bool = False) -> None:
         self.model = model
         self.seed = model.seed if seed is None else seed
+        if self.seed < 0:
+            raise ValueError(f"a seed is a whole number from 0 up, not {self.seed}")
         self.log = EventLog(keep_log)
         self.director = Director(model.graph.firing_order(), self.seed)
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
         self.signals = {name: Signal(name) for name in model.record}
-        self._listeners: dict[str, list[Callable[[Any], None]]] = {}
-        self._stop_asked = False
-        self._wall_time = 0.0
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
+        self._listeners: dict[str, list[Deliver]] = {}
+        self._woven_at: dict[str, list[WovenAspect]] = {}
+        self._emits: list[tuple[OutputPort[Any], Emit]] = []
+        self._points_at: dict[tuple[str, str], JoinPoint] = {}
+        self._has_run = False
+        self._started = 0.0
         self._listen()
         self._wire()
 
@@ -56,27 +72,32 @@ class Simulation:
     # -- wiring ---------------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        """Let recorders, metrics and the stop rule hear what ports send."""
-        for name, port in self.model.record.items():
-            signal = self.signals[name]
-            self._hear(port, lambda token, signal=signal: signal.add(self.director.tag, token))
+        """Let recorders, metrics and the stop rule hear what leaves the ports of actors and composites."""
+        for name, signal in self.signals.items():
+            self._hear(name, partial(self._record, signal))
         for metric, reduction in self._reductions:
-            for port in metric.ports:
-                self._hear(port, reduction.add)
-        for port in self.model.stop_when:
-            self._hear(port, self._ask_to_stop)
+            for path in metric.ports:
+                self._hear(path, reduction.add)
+        for path in self.model.stop_when:
+            self._hear(path, self._ask_to_stop)
 
-    def _hear(self, port: OutputPort[Any], listener: Callable[[Any], None]) -> None:
-        self._listeners.setdefault(port.path, []).append(listener)
+    def _hear(self, path: str, listener: Deliver) -> None:
+        self._listeners.setdefault(path, []).append(listener)
+
+    def _record(self, signal: Signal, token: Any) -> None:
+        signal.add(self.director.tag, token)
 
     def _ask_to_stop(self, token: Any) -> None:
         if token:
-            self._stop_asked = True
+            self.director.stop_after_this_tag()
 
     def _wire(self) -> None:
-        """Give every output port its way to the ports behind it, through delays and join points."""
+        """Find the ways from every output port to the ports behind it, through delays and join points."""
         graph = self.model.graph
-        # A port's channels are its wires in declaration order; the same order on both sides of a composite port.
+        for woven in self.model.aspects:
+            for path in woven.ports:
+                self._woven_at.setdefault(path, []).append(woven)
+        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
         channels: dict[tuple[Hop, ...], int] = {}
         for actor in graph.actors.values():
             for port in actor.inputs.values():
@@ -85,43 +106,42 @@ class Simulation:
                 channels.update({wire.hops: channel for channel, wire in enumerate(wires)})
         for actor in graph.actors.values():
             for output in actor.outputs.values():
-                self._connect(output, channels)
+                self._emits.append((output, self._emit(output, channels)))
 
-    def _connect(self, port: OutputPort[Any], channels: dict[tuple[Hop, ...], int]) -> None:
-        ways = self._branches(port.path, (), channels)
+    def _emit(self, port: OutputPort[Any], channels: dict[tuple[Hop, ...], int]) -> Emit:
+        """What ``port.send`` does."""
+        everywhere = _all(self._listeners.get(port.path, []) + self._branches(port.path, (), channels))
+        heard = _all(self._listeners.get(port.path, []))
+        ways = [self._way(wire.hops, channels[wire.hops]) for wire in self.model.graph.wires_from(port)]
         port.width = len(ways)
         log, director, path, name = self.log.add, self.director, port.actor.path, port.name
-        listeners = self._listeners.get(port.path, [])
 
         def emit_one(token: Any, channel: int | None) -> None:
-            log(director.tag, "send", path, name, channel, "", token)
-            for listener in listeners:
-                listener(token)
             if channel is None:
-                for way in ways:
-                    way(token)
-            else:
-                ways[channel](token)
+                log(director.tag, "send", path, name, None, "", token)
+                everywhere(token)
+                return
+            if not 0 <= channel < len(ways):
+                raise PortError(f"{port.path} has {len(ways)} channels from 0 on, there is no channel {channel}")
+            log(director.tag, "send", path, name, channel, "", token)
+            heard(token)
+            ways[channel](token)
 
         # An aspect at an output stands before the send itself: what it drops has not been sent.
-        points = [woven for woven in self.model.aspects if port.path in woven.ports]
-        if not points:
-            port.connect(emit_one)
-            return
-        # The channel of a send travels past the aspects in this cell, for a token may be forwarded later.
+        if port.path not in self._woven_at:
+            return emit_one
         entries: dict[int | None, Deliver] = {}
 
         def emit_woven(token: Any, channel: int | None) -> None:
             entry = entries.get(channel)
             if entry is None:
+                # The channel of a send travels past the aspects in this closure, for they may forward it later.
                 entry = entries[channel] = self._woven(port.path, lambda passed: emit_one(passed, channel))
             entry(token)
 
-        port.connect(emit_woven)
+        return emit_woven
 
-    def _branches(
-        self, path: str, hops: tuple[Hop, ...], channels: dict[tuple[Hop, ...], int]
-    ) -> list[Deliver]:
+    def _branches(self, path: str, hops: tuple[Hop, ...], channels: dict[tuple[Hop, ...], int]) -> list[Deliver]:
         """The ways onward from a port, one for each connection that leaves it."""
         graph = self.model.graph
         ways = []
@@ -131,12 +151,21 @@ class Simulation:
             if isinstance(port, InputPort):
                 onward = self._put(port, channels[taken])
             else:
-                onward = _all(self._branches(far, taken, channels))
-            onward = self._woven(far, onward)
-            if hop.delay is not None:
-                onward = self._delayed(hop.delay, onward)
-            ways.append(onward)
+                onward = _all(self._listeners.get(far, []) + self._branches(far, taken, channels))
+            ways.append(self._over(hop, onward))
         return ways
+
+    def _way(self, hops: tuple[Hop, ...], channel: int) -> Deliver:
+        """The way along one wire alone, for tokens that are sent to one channel."""
+        onward = self._put(self.model.graph.ports.nodes[hops[-1].destination]["port"], channel)
+        for hop in reversed(hops):
+            onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]))
+        return onward
+
+    def _over(self, hop: Hop, onward: Deliver) -> Deliver:
+        """One connection: its delay, and the aspects at its far end."""
+        onward = self._woven(hop.destination, onward)
+        return onward if hop.delay is None else self._delayed(hop.delay, onward)
 
     def _put(self, port: InputPort[Any], channel: int) -> Deliver:
         put = self.director.put
@@ -148,52 +177,70 @@ class Simulation:
 
     def _woven(self, path: str, onward: Deliver) -> Deliver:
         """``onward`` with the aspects that stand at a port before it, the first declared outermost."""
-        for woven in reversed(self.model.aspects):
-            if path not in woven.ports:
-                continue
-            onward = self._through(woven.name, woven.aspect.pass_token, path, onward)
+        for woven in reversed(self._woven_at.get(path, [])):
+            onward = self._through(woven, path, onward)
         return onward
 
-    def _through(self, name: str, pass_token: Callable[[Any, JoinPoint], None], path: str, onward: Deliver) -> Deliver:
-        point = self._point(name, path, onward)
-        return lambda token: pass_token(token, point)
+    def _through(self, woven: WovenAspect, path: str, onward: Deliver) -> Deliver:
+        point, pass_token = self._point(woven.name, path, onward), woven.aspect.pass_token
+
+        def through(token: Any) -> None:
+            try:
+                pass_token(token, point)
+            except EpicycleError:
+                raise
+            except Exception as error:
+                raise ActorError(
+                    f"aspect {woven.name}", self.tag, f"pass_token() at {path}", describe(error)
+                ) from error
+
+        return through
 
     def _point(self, name: str, path: str, onward: Deliver) -> JoinPoint:
         point = JoinPoint(name, path, self, onward)
-        for other in self.points[name]:
-            if other.port == path:  # another connection of the same port: one stream, one memory
-                point.random, point.memory, point.counts = other.random, other.memory, other.counts
-                return point
-        self.points[name].append(point)
+        first = self._points_at.setdefault((name, path), point)
+        if first is point:
+            self.points[name].append(point)
+        else:  # another connection of the same port: one stream, one memory
+            point.random, point.memory, point.counts = first.random, first.memory, first.counts
         return point
 
     # -- running --------------------------------------------------------------------------------------------------
 
-    def run(
-        self, *, until: float | None = None, progress: Callable[[float], None] | None = None
-    ) -> Results:
+    def run(self, *, until: float | None = None, progress: Callable[[float], None] | None = None) -> Results:
         """Run to the end and return what came of it; an exception in an actor is raised as ``ActorError``."""
-        stop = self.model.stop if until is None else round(until * 1e9)
+        if self._has_run:
+            raise RuntimeError("a Simulation runs once: make another one for another run")
+        self._has_run = True
+        stop = self.model.stop if until is None else to_nanoseconds(until)
         actors = list(self.model.graph.actors.values())
         director = self.director
-        director.finished = lambda: self._stop_asked
         for actor in actors:
             actor.enter(director)
-        started = time.perf_counter()
+            for port in actor.inputs.values():
+                port.clear()  # of what a failed run has left there
+        self._started = time.perf_counter()
+        begun: list[Actor] = []
         try:
             for actor in actors:
                 self._call(actor, "initialize")
-            director.run(stop, progress)
+                begun.append(actor)
+            # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
+            for output, emit in self._emits:
+                output.connect(emit)
+            stopped = director.run(stop, actors, progress)
         except ActorError as error:
             raise self._placed(error) from error.__cause__
         finally:
-            for actor in actors:
-                self._call(actor, "wrapup")
-            self._wall_time = time.perf_counter() - started
-        return self.results("stop_when" if self._stop_asked else "stop time" if stop is not None else "no events left")
+            for output, _ in self._emits:
+                output.disconnect()
+            late = self._wrap_up(begun)
+        if late is not None:
+            raise self._placed(late) from late.__cause__
+        return self.results(stopped)
 
     def results(self, stopped: str) -> Results:
-        """What there is so far; after a failed run, what was recorded until then."""
+        """What has come of the run so far; ``stopped`` says why it is over."""
         return Results(
             model=self.model.name,
             seed=self.seed,
@@ -205,14 +252,22 @@ class Simulation:
             end=to_seconds(self.director.last.time),
             stopped=stopped,
             firings=self.director.firings,
-            wall_time=self._wall_time,
+            wall_time=time.perf_counter() - self._started,
         )
+
+    def _wrap_up(self, actors: list[Actor]) -> ActorError | None:
+        """Let every actor wrap up, whatever happened before; the first error of these is returned."""
+        first = None
+        for actor in actors:
+            try:
+                self._call(actor, "wrapup")
+            except ActorError as error:
+                first = first or error
+        return first
 
     def _call(self, actor: Actor, method: str) -> None:
         try:
             getattr(actor, method)()
-        except EpicycleError:
-            raise
         except Exception as error:
             raise ActorError(actor.path, self.tag, f"{method}()", describe(error)) from error
 

@@ -1,8 +1,8 @@
 """From YAML text to a checked model: document, declarations, elaboration, graph."""
 
-from .elaborate import Metric, Model
 from .graph import Hop, ModelGraph, Wire
 from .load import load_model, packaged_models
+from .model import Metric, Model
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .weave import WovenAspect
 

@@ -6,15 +6,51 @@ import networkx as nx
 
 from epicycle.actors import accepts, type_name
 
-from .graph import ModelGraph
+from .graph import ModelGraph, Wire
 from .problems import Position, Problems
+
+MAX_WIRES = 1_000_000
+MAX_PASSAGE = 200  # composite ports in a row
 
 
 def check(graph: ModelGraph, problems: Problems) -> None:
     """Add every problem of wiring: types, missing connections, two writers, loops without delay."""
+    if not check_passages(graph, problems):
+        return
     check_types(graph, problems)
     check_connections(graph, problems)
     check_loops(graph, problems)
+
+
+def check_passages(graph: ModelGraph, problems: Problems) -> bool:
+    """Whether the ways through composite ports end, and are few enough to be followed one by one."""
+    ports = graph.ports
+    between = nx.DiGraph(ports.subgraph([path for path, port in ports.nodes(data="port") if port is None]))
+    if not nx.is_directed_acyclic_graph(between):
+        cycle = [source for source, _ in nx.find_cycle(between)]
+        hop = graph.outgoing(cycle[-1])[0]
+        problems.add(
+            f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}",
+            hop.position,
+            "a composite that hands its input straight on to its output cannot be connected to itself",
+        )
+        return False
+    if nx.dag_longest_path_length(between) > MAX_PASSAGE:
+        path = nx.dag_longest_path(between)
+        problems.add(f"a way of more than {MAX_PASSAGE} composite ports in a row, from {path[0]} to {path[-1]}")
+        return False
+    # How many wires lead on from each port, without walking along them: they may be very many.
+    onward: dict[str, int] = {}
+    for path in reversed(list(nx.topological_sort(between))):
+        onward[path] = sum(onward.get(far, 1) for _, far in ports.out_edges(path))
+    wires = 0
+    for actor in graph.actors.values():
+        for port in actor.outputs.values():
+            wires += sum(onward.get(far, 1) for _, far in ports.out_edges(port.path))
+            if wires > MAX_WIRES:
+                problems.add(f"the model has more than {MAX_WIRES:,} wires", graph.positions.get(actor.path))
+                return False
+    return True
 
 
 def check_types(graph: ModelGraph, problems: Problems) -> None:
@@ -44,21 +80,41 @@ def check_connections(graph: ModelGraph, problems: Problems) -> None:
         position = graph.positions.get(actor.path)
         for port in actor.inputs.values():
             wires = graph.wires_to(port)
-            if not wires and port.required:
+            if not wires and port.required and not _may_be_connected(graph, port.path):
                 problems.add(
                     f"{port.path} is not connected, and {type(actor).__name__} cannot do without it",
                     position,
                     *_open_end(graph, port.path),
-                    f"it takes {type_name(port.type)}"
-                    + (f": {port.doc}" if port.doc else ""),
+                    f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
                 )
             if len(wires) > 1 and not port.multi:
                 writers = ", ".join(wire.source.path for wire in wires)
                 problems.add(
                     f"{port.path} takes one connection, but {len(wires)} senders write to it: {writers}",
-                    wires[1].hops[0].position,
-                    "send through an actor that merges them",
+                    wires[1].hops[-1].position,
+                    *_first_connection(wires),
+                    "connect one of them, or send through an actor that merges them",
                 )
+
+
+def _may_be_connected(graph: ModelGraph, path: str) -> bool:
+    """Whether a missing connection may be due to another problem: a wrong connection, or an actor not made."""
+    if not graph.is_wired:
+        return True
+    seen, waiting = {path}, [path]
+    while waiting:
+        here = waiting.pop()
+        if graph.ports.nodes[here].get("unmade"):
+            return True
+        before = {hop.source for hop in graph.incoming(here)} - seen
+        seen |= before
+        waiting += sorted(before)
+    return False
+
+
+def _first_connection(wires: list[Wire]) -> tuple[str, ...]:
+    at = wires[0].hops[-1].position
+    return (f"the first connection is at {at.file}:{at.line}:{at.column}",) if at is not None else ()
 
 
 def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
@@ -75,7 +131,10 @@ def check_loops(graph: ModelGraph, problems: Problems) -> None:
     for component in nx.strongly_connected_components(dependencies):
         if len(component) < 2:
             continue
-        inner = dependencies.subgraph(component)
+        # A graph of our own in sorted order: a view would follow the order of a set, which varies between runs.
+        inner = nx.DiGraph()
+        for path in sorted(component):
+            inner.add_edges_from((path, far, data) for far, data in dependencies.adj[path].items() if far in component)
         cycle = nx.find_cycle(inner, source=min(component))
         wires = [inner.edges[edge]["wire"] for edge in cycle if "wire" in inner.edges[edge]]
         actors = [wire.source.actor.path for wire in wires]

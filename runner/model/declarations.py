@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from keyword import iskeyword
+
+from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
-from .problems import Position, Problems, did_you_mean
+from .expression import CONSTANTS, FUNCTIONS
+from .problems import Position, Problems, did_you_mean, nearest
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 REDUCTIONS = ("last", "first", "min", "max", "sum", "mean", "count")
@@ -52,6 +56,7 @@ class ParameterText:
     max: float | None = None
     choices: tuple[str, ...] = ()
     doc: str = ""
+    spoilt: bool = False  # the declaration is wrong and has been told so: values are not checked against it
 
 
 @dataclass
@@ -101,6 +106,7 @@ class CompositeText:
     outputs: dict[str, Position] = field(default_factory=dict)
     actors: dict[str, PartText] = field(default_factory=dict)
     connections: list[ConnectionText] = field(default_factory=list)
+    is_wired: bool = True  # whether all its connections could be read
     aspects: dict[str, PartText] = field(default_factory=dict)
 
 
@@ -189,9 +195,13 @@ class DeclarationReader:
                         f"{key!r} is the name of an actor and of a port", entry.key.position, "rename one"
                     )
         if "connections" in entries:
-            for item in self.items(entries["connections"].value, "connections"):
+            items = self.items(entries["connections"].value, "connections")
+            result.is_wired = items is not None
+            for item in items or ():
                 if (connection := self.connection(item)) is not None:
                     result.connections.append(connection)
+                else:
+                    result.is_wired = False
         for key, entry in self.named(entries, "aspects"):
             if (part := self.part(key, entry, "aspect")) is not None:
                 result.aspects[key] = part
@@ -200,6 +210,12 @@ class DeclarationReader:
     def parameter(self, name: str, entry: Entry) -> ParameterText:
         """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
         result = ParameterText(name, entry.key.position)
+        if name in CONSTANTS or name in FUNCTIONS or iskeyword(name):
+            self.problems.add(
+                f"a parameter cannot be called {name!r}: in expressions, that name means something else",
+                entry.key.position,
+                "give it another name",
+            )
         if not isinstance(entry.value, Mapping):
             result.value = entry.value
             return result
@@ -207,16 +223,26 @@ class DeclarationReader:
         result.value = inner["value"].value if "value" in inner else None
         for key in ("unit", "doc"):
             if key in inner:
-                setattr(result, key, self.text(inner[key].value, key) or "")
+                setattr(result, key, self.text(inner[key].value, f"{key} of parameter {name!r}") or "")
+        try:
+            if result.unit:
+                parse_unit(result.unit)
+        except UnitError as error:
+            self.problems.add(f"parameter {name!r}: {error}", inner["unit"].value.position)
+            result.spoilt = True
         for key in ("min", "max"):
             if key in inner:
                 node = inner[key].value
-                if isinstance(node, Scalar) and type(node.value) in (int, float):
-                    setattr(result, key, float(node.text) if isinstance(node.value, str) else node.value)
-                else:
-                    self.problems.add(f"{key} of parameter {name!r} is not a number", node.position)
+                try:
+                    setattr(result, key, Parameter(float).convert(node.value if isinstance(node, Scalar) else ""))
+                except ParameterError as error:
+                    self.problems.add(f"{key} of parameter {name!r}: {error}", node.position)
+                    result.spoilt = True
         if "choices" in inner:
             result.choices = tuple(text.text for text in self.texts(inner["choices"].value, "choices"))
+        if result.min is not None and result.max is not None and result.min > result.max:
+            self.problems.add(f"parameter {name!r}: min is greater than max", inner["min"].value.position)
+            result.spoilt = True
         return result
 
     def part(self, name: str, entry: Entry, kind: str) -> PartText | None:
@@ -252,28 +278,33 @@ class DeclarationReader:
             text = node.value if isinstance(node.value, str) else node.text
             left, arrow, right = text.partition("->")
             if not arrow or "->" in right:
-                self.problems.add(
-                    f"{text!r} is not a connection", node.position, "write 'actor.port -> actor.port'"
-                )
+                self.problems.add(f"{text!r} is not a connection", node.position, "write 'actor.port -> actor.port'")
                 return None
             sources, destinations = self.endpoints(left, node), self.endpoints(right, node)
             if not sources or not destinations:
-                self.problems.add(f"{text!r} connects nothing", node.position, "write 'actor.port -> actor.port'")
+                side = "right" if sources else "left"
+                self.problems.add(
+                    f"{text!r} has no port on its {side}", node.position, "write 'actor.port -> actor.port'"
+                )
                 return None
             return ConnectionText(sources, destinations, node.position)
-        entries = self.entries(node, "a connection", CONNECTION_KEYS)
-        if entries is None:
+        if not isinstance(node, Mapping):
+            self.problems.add(
+                "this is not a connection",
+                node.position,
+                "write 'actor.port -> actor.port' or {from: ..., to: ..., delay: ...}",
+            )
             return None
-        for key in ("from", "to"):
-            if key not in entries:
+        entries = self.entries(node, "a connection", CONNECTION_KEYS) or {}
+        before = len(self.problems)
+        ends = {key: self.texts(entries[key].value, key) if key in entries else [] for key in ("from", "to")}
+        for key, ports in ends.items():
+            if not ports and len(self.problems) == before:
                 self.problems.add(f"the connection has no {key!r}", node.position)
-                return None
-        return ConnectionText(
-            self.texts(entries["from"].value, "from"),
-            self.texts(entries["to"].value, "to"),
-            node.position,
-            entries["delay"].value if "delay" in entries else None,
-        )
+        if not ends["from"] or not ends["to"]:
+            return None
+        delay = entries["delay"].value if "delay" in entries else None
+        return ConnectionText(ends["from"], ends["to"], node.position, delay)
 
     def endpoints(self, text: str, node: Scalar) -> list[Text]:
         """The comma-separated ports of one side; brackets around the list are allowed."""
@@ -291,7 +322,7 @@ class DeclarationReader:
         inner = self.entries(entry.value, f"metric {name!r}", METRIC_KEYS)
         if inner is None:
             return None
-        if "of" not in inner:
+        if "of" not in inner or _is_empty(inner["of"].value):
             self.problems.add(f"metric {name!r} does not say of what", entry.key.position, "add 'of: actor.port'")
             return None
         port = self.text(inner["of"].value, "of")
@@ -327,6 +358,9 @@ class DeclarationReader:
                     entry.key.position,
                     f"valid keys: {', '.join(valid)}",
                 )
+                # Read on as if it had been written right, or else it would seem to be missing as well.
+                if (meant := nearest(key, valid)) is not None and meant not in node.entries:
+                    known.setdefault(meant, entry)
         return known
 
     def named(self, entries: dict[str, Entry], key: str) -> list[tuple[str, Entry]]:
@@ -349,13 +383,13 @@ class DeclarationReader:
                 )
         return found
 
-    def items(self, node: Node, what: str) -> tuple[Node, ...]:
+    def items(self, node: Node, what: str) -> tuple[Node, ...] | None:
         if isinstance(node, Sequence):
             return node.items
         if isinstance(node, Scalar) and node.value is None:
             return ()
-        self.problems.add(f"{what} is not a list", node.position)
-        return ()
+        self.problems.add(f"{what} is not a list", node.position, "begin each entry with '- '")
+        return None
 
     def texts(self, node: Node, what: str) -> list[Text]:
         """A text, or a list of texts."""
@@ -382,6 +416,10 @@ class DeclarationReader:
             )
             return None
         return text
+
+
+def _is_empty(node: Node) -> bool:
+    return isinstance(node, Scalar) and node.value is None
 
 
 def within(position: Position, name: str) -> Position:

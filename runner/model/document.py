@@ -190,6 +190,7 @@ _SCALAR_TAGS: dict[str, tuple[type, ...]] = {
 # libyaml counts lines this way; ours must agree with its marks.
 _LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
 _PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
 
 _HELP_FOR_SYNTAX: Final = (
@@ -197,6 +198,7 @@ _HELP_FOR_SYNTAX: Final = (
     ("did not find expected ',' or", "a bracket is not closed, or a comma is missing"),
     ("found unexpected end of stream", "a quote is not closed"),
     ("did not find expected key", "check the indentation, and that brackets and quotes are closed"),
+    ("did not find expected alphabetic", "quote a text that has [*] or * in it"),
     ("did not find expected '-' indicator", "check the indentation: all '-' of a list stand in one column"),
     ("could not find expected ':'", "each key needs a ':' and a space after it"),
 )
@@ -436,9 +438,7 @@ class _Builder:
         shown = _short("!!" + tag.removeprefix(_TAG_PREFIX) if tag.startswith(_TAG_PREFIX) else tag)
         known = shown.removeprefix("!!") in {"str", "map", "seq", *_SCALAR_TAGS} and shown.startswith("!!")
         reason = f"does not fit {kind}" if known else "is not allowed"
-        self._problems.add(
-            f"the tag {shown} {reason}", position, "leave it out, or quote a text that starts with '!'"
-        )
+        self._problems.add(f"the tag {shown} {reason}", position, "leave it out, or quote a text that starts with '!'")
 
     def _add_syntax(self, error: yaml.MarkedYAMLError) -> None:
         message = error.problem or str(error)
@@ -448,12 +448,10 @@ class _Builder:
         if context is not None and mark is not None and not "".join(self._lines[mark.line :]).strip():
             mark = context  # what is missing at the end of the file is found where it was begun
         position = None if mark is None else self._at(mark.line, mark.column)
-        if (
-            position is not None
-            and message.startswith("did not find expected ','")
-            and "${" in position.source
-        ):
+        if position is not None and message.startswith("did not find expected ','") and "${" in position.source:
             hints = ['within { } and [ ], quote an expression: "${...}"']
+        elif position is not None and hints and _INDEXED.search(position.source):
+            hints.append('within { } and [ ], quote a text that has an index: "a[0].port"')
         if position is not None and message.startswith("found character"):
             character = position.source[position.column - 1 : position.column]
             quote = f"quote a text that starts with {character!r}"

@@ -229,9 +229,7 @@ class _Evaluation:
                 return scope[name]
         if name in self._names:
             if name in CONSTANTS:
-                raise self._error(
-                    node, f"'{name}' is a constant and cannot be the name of something else: rename it"
-                )
+                raise self._error(node, f"'{name}' is a constant and cannot be the name of something else: rename it")
             value = self._names[name]
             return self._made(node, list(value)) if isinstance(value, tuple) else value
         if name in CONSTANTS:

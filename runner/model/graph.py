@@ -12,8 +12,9 @@ from typing import Any
 
 import networkx as nx
 
-from epicycle.actors import Actor, InputPort, OutputPort
+from epicycle.actors import Actor, InputPort, OutputPort, declared_ports
 
+from .patterns import could_be_within
 from .problems import Position
 
 
@@ -53,6 +54,8 @@ class ModelGraph:
         self.actors: dict[str, Actor] = {}
         self.positions: dict[str, Position] = {}
         self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
+        self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
+        self.is_wired = True  # whether every connection that the model declares has been made
         self._order = 0
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
@@ -62,6 +65,11 @@ class ModelGraph:
             self.positions[actor.path] = position
         for port in (*actor.inputs.values(), *actor.outputs.values()):
             self.ports.add_node(port.path, port=port, direction=port.direction)
+
+    def add_unmade(self, path: str, actor_type: type[Actor]) -> None:
+        """Add the ports of an actor that could not be made, so that what names them is not wrong as well."""
+        for name, port in declared_ports(actor_type).items():
+            self.ports.add_node(f"{path}.{name}", port=None, direction=port.direction, unmade=True)
 
     def add_composite_port(self, path: str, direction: str, position: Position | None) -> None:
         """Add a port of a composite; tokens only pass through it."""
@@ -105,6 +113,7 @@ class ModelGraph:
         ]
 
     def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
+        """The ways from a port to actors' ports; ``check_passages`` has seen to it that they end."""
         for hop in self.outgoing(path) if forward else self.incoming(path):
             far = hop.destination if forward else hop.source
             if self.ports.nodes[far]["port"] is not None:
@@ -121,10 +130,23 @@ class ModelGraph:
 
     def source_of(self, path: str) -> list[OutputPort[Any]]:
         """The actors' output ports behind a port: itself, or what feeds a composite's output."""
-        port = self.ports.nodes[path]["port"]
-        if isinstance(port, OutputPort):
-            return [port]
-        return [found for hop in self.incoming(path) for found in self.source_of(hop.source)]
+        found, seen, waiting = [], {path}, [path]
+        while waiting:
+            here = waiting.pop()
+            port = self.ports.nodes[here]["port"]
+            if isinstance(port, OutputPort):
+                found.append(port)
+            else:
+                before = [hop.source for hop in self.incoming(here)]
+                waiting += [each for each in reversed(before) if each not in seen]
+                seen.update(before)
+        return found
+
+    def is_excused(self, pattern: str) -> bool:
+        """Whether a pattern that matches nothing is right: it speaks of an empty array, or of what is not known."""
+        return any(could_be_within(pattern, path, array=True) for path in self.empty_arrays) or any(
+            could_be_within(pattern, path, array=False) for path in self.unknown
+        )
 
     def immediate_dependencies(self) -> Any:
         """The directed graph of what must be known first within a tag: actors' ports only, composites left out.

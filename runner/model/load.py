@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 
+from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
 from .document import read
-from .elaborate import Elaborator, Model
+from .elaborate import Elaborator
+from .model import Model
 from .problems import Problems, did_you_mean
 from .settings import change_aspect, parse_setting, without
 
@@ -51,11 +53,15 @@ def find_model(name: str, problems: Problems) -> Path | None:
 def load_model(
     name: str | Path,
     *,
-    set: Iterable[str] = (),  # noqa: A002 - the option's name
+    set: Iterable[str] = (),
     aspects: Iterable[str] = (),
     without_aspects: Iterable[str] = (),
+    types: Iterable[type] = (),
 ) -> Model:
-    """Read, change and check a model; raises ``ModelError`` with all that is wrong."""
+    """Read, change and check a model; raises ``ModelError`` with all that is wrong.
+
+    ``types`` are actor and aspect classes of your own that the model may name beside the installed ones.
+    """
     problems = Problems()
     settings = [found for text in set if (found := parse_setting(text, problems)) is not None]
     path = find_model(str(name), problems)
@@ -76,14 +82,12 @@ def load_model(
         without(text, change, problems)
     for change in aspects:
         change_aspect(text, change, problems)
-    model = Elaborator(text, composites, settings, problems).model()
+    model = Elaborator(text, composites, settings, problems, installed().with_types(types)).model()
     problems.raise_if_any()
     return model
 
 
-def _composites(
-    text: ModelText, path: Path, reader: DeclarationReader, problems: Problems
-) -> dict[str, CompositeText]:
+def _composites(text: ModelText, path: Path, reader: DeclarationReader, problems: Problems) -> dict[str, CompositeText]:
     """The composite classes of a model and of all that it includes."""
     # Included files must lie in or below the model's folder: a model cannot make us read other files.
     root = path.parent.resolve()
@@ -102,7 +106,13 @@ def _composites(
                 )
             composites.setdefault(name, composite)
         for include in current.include:
-            target = (where.parent / include.text).resolve()
+            try:
+                target = (where.parent / include.text).resolve()
+                exists = target.is_file()
+            except (OSError, RuntimeError, ValueError) as error:  # endless links, too long, or a NUL in it
+                reason = getattr(error, "strerror", None) or error
+                problems.add(f"{include.text!r} cannot be included: {reason}", include.position)
+                continue
             if not target.is_relative_to(root) or target.suffix not in (".yaml", ".yml"):
                 problems.add(
                     f"{include.text!r} cannot be included",
@@ -116,11 +126,21 @@ def _composites(
             if len(seen) > MAX_INCLUDES:
                 problems.add(f"more than {MAX_INCLUDES} files are included", include.position)
                 return composites
-            if not target.is_file():
-                problems.add(f"the included file {include.text!r} does not exist", include.position)
+            if not exists:
+                names = [str(path.relative_to(where.parent)) for path in _beside(target, where)]
+                kind = f"does not exist{did_you_mean(include.text, names)}"
+                if target.is_dir():
+                    kind = "is a folder"
+                problems.add(f"the included file {include.text!r} {kind}", include.position)
                 continue
             node = read(target, problems, str(where.parent / include.text))
             inner = reader.included(node) if node is not None else None
             if inner is not None:
                 waiting.append((inner, target))
     return composites
+
+
+def _beside(target: Path, where: Path) -> list[Path]:
+    """The YAML files of the folder in which an included file was to be."""
+    folder = where.parent / target.parent.relative_to(where.parent.resolve())
+    return sorted(folder.glob("*.yaml")) if folder.is_dir() else []

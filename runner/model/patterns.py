@@ -44,6 +44,22 @@ def matches(pattern: str, path: str) -> bool:
     return compile_pattern(pattern).match(path) is not None
 
 
+def could_be_within(pattern: str, path: str, *, array: bool) -> bool:
+    """Whether a pattern may speak of something behind a path without an index, were there anything.
+
+    With ``array``, the pattern must give an index there.
+    """
+    asked, parts = pattern.split("."), path.split(".")
+    for position, segment in enumerate(asked[: len(parts)]):
+        if segment == "**":
+            return True
+        name, bracket, _ = segment.partition("[")
+        is_last = position == len(parts) - 1
+        if segment != "*" and (name != parts[position].partition("[")[0] or (array and is_last and not bracket)):
+            return False
+    return len(asked) > len(parts)
+
+
 def select(pattern: str, paths: Iterable[str]) -> list[str]:
     """The paths that the pattern selects, in their order."""
     expression = compile_pattern(pattern)

@@ -1,6 +1,8 @@
 """What is wrong with a model, said so that it can be mended: where, what, and what would be right."""
 
 import difflib
+import itertools
+import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +12,9 @@ from epicycle.actors import EpicycleError
 MAX_PROBLEMS = 100
 MAX_SOURCE_WIDTH = 120
 _CUT = "..."
+_INDEX = re.compile(r"\[[0-9]+\]")
 _MAX_NAME = 200  # comparing names takes quadratic time; nobody mistypes a name this long
+_MAX_CANDIDATES = 2_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +75,14 @@ class Problems:
     """Collects problems, so that one run shows them all; identical ones count once, 100 are kept."""
 
     def __init__(self) -> None:
-        self._kept: dict[Problem, None] = {}
+        # What is wrong in an array is told for the first instance; a composite class's fault, for its first use.
+        self._kept: dict[tuple[str, Position | None], Problem] = {}
         self._left_out: set[int] = set()  # hashes will do: this is only a count
+        self._unsaid = 0
+        self.muted = False  # while true, problems count for len() alone: they repeat what has been said
 
     def __len__(self) -> int:
-        return len(self._kept) + len(self._left_out)
+        return len(self._kept) + len(self._left_out) + self._unsaid
 
     def __bool__(self) -> bool:
         """True for any collector, as `problems or Problems()` must not lose an empty one; ask len()."""
@@ -84,22 +91,35 @@ class Problems:
     @property
     def found(self) -> tuple[Problem, ...]:
         """The problems kept so far, in the order they were found."""
-        return tuple(self._kept)
+        return tuple(self._kept.values())
 
-    def add(self, message: str, position: Position | None = None, *hints: str) -> None:
-        """Note a problem; each hint becomes a line of help."""
-        problem = Problem(message, position, hints)
-        if problem in self._kept:
+    def add(self, message: str, position: Position | None = None, *hints: str, scope: str = "") -> None:
+        """Note a problem; each hint becomes a line of help.
+
+        ``scope`` is the path, within the message, of the instance of a composite class that stands for them all.
+        """
+        if self.muted:
+            self._unsaid += 1
+            return
+        key = (_INDEX.sub("[]", message.replace(f"{scope}.", "") if scope else message), position)
+        if key in self._kept:
             return
         if len(self._kept) < MAX_PROBLEMS:
-            self._kept[problem] = None
+            self._kept[key] = Problem(message, position, hints)
         else:
-            self._left_out.add(hash(problem))
+            self._left_out.add(hash(key))
 
     def raise_if_any(self) -> None:
         """Raise all problems as one ModelError, if there are any."""
         if self._kept:
-            raise ModelError(self._kept, len(self._left_out))
+            raise ModelError(sorted(self.found, key=self._place), len(self._left_out))
+
+    def _place(self, problem: Problem) -> tuple[int, int, int]:
+        """Where a problem is shown: file by file as they were met, and from top to bottom."""
+        if (at := problem.position) is None:
+            return -1, 0, 0
+        files = list(dict.fromkeys(each.position.file for each in self.found if each.position is not None))
+        return files.index(at.file), at.line, at.column
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str | None:
@@ -107,7 +127,7 @@ def nearest(name: str, candidates: Iterable[str]) -> str | None:
     if len(name) > _MAX_NAME:
         return None
     by_folded: dict[str, str] = {}
-    for candidate in candidates:
+    for candidate in itertools.islice(candidates, _MAX_CANDIDATES):
         if candidate != name and len(candidate) <= _MAX_NAME:
             by_folded.setdefault(candidate.casefold(), candidate)
     found = difflib.get_close_matches(name.casefold(), by_folded, n=1)

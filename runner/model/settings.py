@@ -1,11 +1,11 @@
-"""What is said about a model from outside: ``--set path=value``, ``--aspect name=Type,key=value``, ``--without``."""
+"""What is said about a model from outside: ``--set path=value``, ``--aspect name=Type,...``, ``--without name``."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from .declarations import ModelText, PartText, Text
-from .document import Entry, Node, Scalar, parse
+from .declarations import NAME, ModelText, PartText, Text
+from .document import Entry, Mapping, Node, Scalar, Sequence, parse
 from .patterns import PatternError, matches
 from .problems import Position, Problems, did_you_mean
 
@@ -38,15 +38,38 @@ def parse_setting(text: str, problems: Problems) -> Setting | None:
     except PatternError as error:
         problems.add(f"{path!r} is no parameter path: {error}", position)
         return None
-    node = _value(value, option, problems)
+    node = _value(value, option, len(option) - len(value), problems)
     return None if node is None else Setting(path, node, position)
 
 
-def _value(text: str, option: str, problems: Problems) -> Node | None:
+def _value(text: str, option: str, offset: int, problems: Problems) -> Node | None:
+    """The YAML value that stands in an option from ``offset`` on."""
     if not text.strip():
-        position = Position("command line", 1, 1, len(option), option)
-        return Scalar(None, "", True, position)
-    return parse(text, f"value in '{option}'", problems)
+        return Scalar(None, "", True, Position("command line", 1, 1, len(option), option))
+    if len(option.splitlines()) > 1:  # lines and columns are those of the value, then
+        return parse(text, "command line", problems)
+    found = Problems()
+    node = parse(" " * offset + text, "command line", found)
+    for problem in found.found:
+        position = None if problem.position is None else replace(problem.position, source=option)
+        problems.add(problem.message, position, *problem.help)
+    return None if node is None else _within(node, option)
+
+
+def _within(node: Node, option: str) -> Node:
+    """The node with the option as the line in which it stands."""
+    position = replace(node.position, source=option)
+    if isinstance(node, Sequence):
+        return Sequence(tuple(_within(item, option) for item in node.items), position)
+    if isinstance(node, Mapping):
+        entries = {
+            key: Entry(
+                replace(entry.key, position=replace(entry.key.position, source=option)), _within(entry.value, option)
+            )
+            for key, entry in node.entries.items()
+        }
+        return Mapping(entries, position)
+    return replace(node, position=position)
 
 
 def without(text: ModelText, name: str, problems: Problems) -> None:
@@ -63,41 +86,60 @@ def without(text: ModelText, name: str, problems: Problems) -> None:
 def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
     """``name=Type,key=value,...``: add an aspect, or put another in the place of one that is there.
 
-    An aspect that is replaced leaves its ports to the new one unless ``at`` is given; if the type stays the same, so
-    do the parameters that are not given.
+    An aspect that is replaced leaves its ports to the new one unless ``at`` is given; if the type stays the same, it
+    leaves the parameters that are not given, too.
     """
     option = f"--aspect {change}"
     position = Position("command line", 1, 10, max(1, len(change)), option)
     name, equals, rest = change.partition("=")
-    parts = _split(rest)
+    places = _split(rest)
+    parts = [rest[start:end].strip() for start, end in places]
     if not equals or not name.strip() or not parts or not parts[0]:
         problems.add(f"{change!r} is not of the form name=Type,key=value", position)
         return
     name = name.strip()
     values: dict[str, Entry] = {}
-    for part in parts[1:]:
+    at: list[Text] | None = None
+    for part, (_, end) in zip(parts[1:], places[1:], strict=True):
         key, equals, value = part.partition("=")
         key = key.strip()
         if not equals or not key:
             problems.add(f"{part!r} is not of the form key=value", position)
             return
-        node = _value(value, option, problems)
-        if node is not None:
-            values[key] = Entry(Scalar(key, key, True, position), node)
+        stop = len(option) - len(rest) + end
+        if key == "at":
+            at = _pointcuts(value, option, stop - len(value))
+            continue
+        node = _value(value, option[:stop], stop - len(value), problems)
+        if node is None:
+            return
+        values[key] = Entry(Scalar(key, key, True, position), _within(node, option))
+    if not NAME.match(name):
+        problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+        return
     old = text.root.aspects.get(name)
-    at = [Text(parse_text(values.pop("at").value), position)] if "at" in values else (old.at if old else [])
+    enabled = values.pop("enabled").value if "enabled" in values else None
+    if at is None:
+        at = old.at if old is not None else []
     if old is not None and old.type.text == parts[0]:
         values = {**old.values, **values}
-    text.root.aspects[name] = PartText(name, position, Text(parts[0], position), values, at=at)
+    text.root.aspects[name] = PartText(name, position, Text(parts[0], position), values, None, at, enabled)
 
 
-def parse_text(node: Node) -> str:
-    """The text of a scalar."""
-    return node.text if isinstance(node, Scalar) else ""
+def _pointcuts(value: str, option: str, offset: int) -> list[Text]:
+    """``port`` or ``[port, port]``, read without YAML, to which ``[observer[*].plan]`` would be a broken list."""
+    if value.startswith("[") and value.endswith("]"):
+        value, offset = value[1:-1], offset + 1
+    found = []
+    for start, end in _split(value):
+        text = value[start:end].strip(" '\"")
+        column = offset + start + value[start:end].find(text) + 1
+        found.append(Text(text, Position("command line", 1, column, max(1, len(text)), option)))
+    return found
 
 
-def _split(text: str) -> list[str]:
-    """Split at commas that are not inside brackets."""
+def _split(text: str) -> list[tuple[int, int]]:
+    """Where the parts begin and end that commas divide, those inside brackets left aside."""
     parts, depth, start = [], 0, 0
     for index, character in enumerate(text):
         if character in "[{(":
@@ -105,7 +147,7 @@ def _split(text: str) -> list[str]:
         elif character in "]})":
             depth -= 1
         elif character == "," and depth == 0:
-            parts.append(text[start:index].strip())
+            parts.append((start, index))
             start = index + 1
-    parts.append(text[start:].strip())
+    parts.append((start, len(text)))
     return parts

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
+from epicycle.actors import Parameter, ParameterError
 
 from .declarations import ParameterText
 from .document import Mapping, Node, Scalar, Sequence
-from .expression import CONSTANTS, FUNCTIONS, ExpressionError, interpolate
+from .expression import ExpressionError, interpolate, names_in
 from .problems import Position, Problems
 
 
@@ -24,54 +25,57 @@ class Values:
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
 
-    def of(self, node: Node, names: dict[str, object]) -> Any:
-        """The value of a node, or ``missing``."""
+    def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Container[str] = ()) -> Any:
+        """The value of a node, or ``missing``.
+
+        ``label`` is whose value it is, ``scope`` the composite in which it stands; ``later`` are the names that are
+        declared but have no value yet.
+        """
         if isinstance(node, Sequence):
-            items = [self.of(item, names) for item in node.items]
+            items = [self.of(item, names, label, scope, later) for item in node.items]
             return self.missing if any(item is self.missing for item in items) else items
         if isinstance(node, Mapping):
-            entries = {key: self.of(entry.value, names) for key, entry in node.entries.items()}
+            entries = {k: self.of(entry.value, names, label, scope, later) for k, entry in node.entries.items()}
             return self.missing if any(item is self.missing for item in entries.values()) else entries
         if not isinstance(node.value, str) or "${" not in node.value:
             return node.value
         try:
-            value = interpolate(node.value, {k: v for k, v in names.items() if v is not self.missing})
+            asked = names_in(node.value)
+            if any(names.get(name) is self.missing for name in asked):
+                return self.missing  # what is wrong with that name has been told
+            if early := sorted(name for name in asked if name in later and name not in names):
+                self.problems.add(
+                    f"{label}: {early[0]!r} has no value yet: a default may use the parameters above it only",
+                    node.position,
+                    f"declare {early[0]!r} further up",
+                    scope=scope,
+                )
+                return self.missing
+            return interpolate(node.value, {k: v for k, v in names.items() if v is not self.missing})
         except ExpressionError as error:
-            if not any(value is self.missing and name in node.value for name, value in names.items()):
-                self.problems.add(str(error.message), _inside(node, error))
+            self.problems.add(f"{label}: {error.message}", _inside(node, error), scope=scope)
             return self.missing
-        return value
 
-    def declared(self, full: str, parameter: ParameterText, value: Any, position: Position) -> Any:
+    def declared(self, full: str, parameter: ParameterText, value: Any, position: Position, scope: str = "") -> Any:
         """A value for a parameter that a model or composite declares, converted to its unit and checked."""
-        if parameter.name in CONSTANTS or parameter.name in FUNCTIONS:
-            self.problems.add(
-                f"{full}: a parameter cannot be called {parameter.name!r}, expressions use that name",
-                parameter.position,
-            )
-        if value is self.missing:
-            return value
+        if value is self.missing or parameter.spoilt:
+            return self.missing
         try:
             return self._convert(parameter, value)
         except ParameterError as error:
-            self.problems.add(f"{full}: {error}", position)
-        except UnitError as error:
-            self.problems.add(f"{full}: {error}", parameter.position)
+            self.problems.add(f"{full}: {error}", position, scope=scope)
         return self.missing
 
     def _convert(self, parameter: ParameterText, value: Any) -> Any:
+        default = parameter.value.value if isinstance(parameter.value, Scalar) else None
+        if value is None and isinstance(parameter.value, Scalar) and default is None:
+            return None  # a parameter that may be left empty
         if isinstance(value, list):
             return [self._convert(parameter, item) for item in value]
         if parameter.choices:
             return Parameter(str, choices=parameter.choices).convert(value)
-        if isinstance(value, dict):
-            return value
-        default = parameter.value.value if isinstance(parameter.value, Scalar) else None
         bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}
         if parameter.unit:
-            parse_unit(parameter.unit)
-            if value is None:
-                return None
             return Parameter(float, unit=parameter.unit, **bounds).convert(value)
         if isinstance(default, bool):
             return Parameter(bool).convert(value)

@@ -34,22 +34,23 @@ def select_ports(
         try:
             found = select(full, graph.ports.nodes)
         except PatternError as error:
-            problems.add(f"aspect {name}: {pointcut.text!r} is no pointcut: {error}", pointcut.position)
+            problems.add(f"aspect {name}: {pointcut.text!r} is no pointcut: {error}", pointcut.position, scope=scope)
             continue
         fitting = [port for port in found if graph.direction(port) in aspect.stands_at]
-        if not found and not _array_is_empty(full, graph):
-            close = nearest(full, list(graph.ports.nodes))
+        if not found and not graph.is_excused(full):
+            close = nearest(full, [path for path in graph.ports.nodes if graph.direction(path) in aspect.stands_at])
             problems.add(
-                f"aspect {name}: {pointcut.text!r} matches no port"
-                + (f", did you mean {close!r}?" if close else ""),
+                f"aspect {name}: {pointcut.text!r} matches no port" + (f", did you mean {close!r}?" if close else ""),
                 pointcut.position,
                 _valid_ends(full, graph),
+                scope=scope,
             )
         elif found and not fitting:
             problems.add(
                 f"aspect {name}: {aspect.__name__} stands at {' or '.join(sorted(aspect.stands_at))} ports, "
                 f"but {found[0]} is an {graph.direction(found[0])} port",
                 pointcut.position,
+                scope=scope,
             )
         chosen.update(dict.fromkeys(fitting))
     order = {path: index for index, path in enumerate(graph.ports.nodes)}
@@ -61,9 +62,3 @@ def _valid_ends(pattern: str, graph: ModelGraph) -> str:
     depth = pattern.count(".")
     ends = sorted({path.rpartition(".")[2] for path in graph.ports.nodes if path.count(".") == depth})
     return f"ports at this depth: {', '.join(ends)}" if ends else "no port has so many dots"
-
-
-def _array_is_empty(pattern: str, graph: ModelGraph) -> bool:
-    """Whether the pattern speaks of an array that has no instances: then matching nothing is right."""
-    base = pattern.split("[")[0]
-    return base in graph.empty_arrays and "[" in pattern

@@ -35,9 +35,7 @@ class Trajectories(Figure):
     deviations; the discs are the obstacle with the distance to keep, once a second.
     """
 
-    robots = texts_parameter(
-        doc="signals of the robots' states (patterns); the first robot is drawn strongest"
-    )
+    robots = texts_parameter(doc="signals of the robots' states (patterns); the first robot is drawn strongest")
     obstacle = Parameter(str, "", doc="signal of the obstacle's state")
     estimate = Parameter(str, "", doc="signal of an estimate of the obstacle")
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where the first robot is to arrive")
@@ -54,9 +52,7 @@ class Trajectories(Figure):
         canvas = Canvas(figsize=(7.2, 4.2), layout="constrained")
         FigureCanvasAgg(canvas)
         axes = canvas.add_subplot()
-        robots = [
-            results.signals[name] for pattern in self.robots for name in select(pattern, results.signals)
-        ]
+        robots = [results.signals[name] for pattern in self.robots for name in select(pattern, results.signals)]
         if self.obstacle:
             self._obstacle(axes, results.signals[self.obstacle])
         if self.estimate:
@@ -64,9 +60,7 @@ class Trajectories(Figure):
         colours = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")
         for index, signal in reversed(list(enumerate(robots))):
             self._path(axes, signal, colours[index % len(colours)], main=index == 0, legend=index < 8)
-        axes.plot(
-            *self.goal, marker="*", markersize=15, color="#c62828", linestyle="none", label="goal", zorder=6
-        )
+        axes.plot(*self.goal, marker="*", markersize=15, color="#c62828", linestyle="none", label="goal", zorder=6)
         axes.set_aspect("equal")
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
@@ -85,9 +79,7 @@ class Trajectories(Figure):
         axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=width, label=label, zorder=order)
         marks = points[self._every(signal)]
         axes.plot(marks[:, 0], marks[:, 1], ".", color=colour, markersize=4 + width, zorder=order)
-        axes.plot(
-            *points[0], "o", markersize=8, markerfacecolor="white", markeredgecolor=colour, zorder=order
-        )
+        axes.plot(*points[0], "o", markersize=8, markerfacecolor="white", markeredgecolor=colour, zorder=order)
 
     def _obstacle(self, axes: Any, signal: Signal) -> None:
         from matplotlib.patches import Circle
@@ -101,9 +93,7 @@ class Trajectories(Figure):
             strength = 0.05 + 0.13 * (place + 1) / len(marks)
             label = f"{self.safe_distance:g} m around it" if place == len(marks) - 1 else None
             axes.add_patch(
-                Circle(
-                    points[index], self.safe_distance, color="0.3", alpha=strength, linewidth=0, label=label
-                )
+                Circle(points[index], self.safe_distance, color="0.3", alpha=strength, linewidth=0, label=label)
             )
 
     def _ellipses(self, axes: Any, signal: Signal) -> None:

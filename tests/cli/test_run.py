@@ -14,9 +14,7 @@ import pytest
 SHORT = ("--set", "observers=2", "--until", "1.5", "--seed", "7")
 
 
-def epicycle(
-    *arguments: str, cwd: Path | None = None, **environment: str
-) -> subprocess.CompletedProcess[str]:
+def epicycle(*arguments: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run the command line in a process of its own."""
     return subprocess.run(
         [sys.executable, "-m", "epicycle.runner.cli", *arguments],
@@ -70,9 +68,7 @@ def test_removing_an_aspect_moves_no_other_stream(tmp_path: Path) -> None:
     run_json(*SHORT, "--set", "disturbance=0.5", "--without", "packet_loss", "--log", str(one))
 
     def failures(path: Path) -> list[tuple[float, str]]:
-        return [
-            (row["time"], row["actor"]) for row in read_log(path) if row["aspect"] == "measurement_failure"
-        ]
+        return [(row["time"], row["actor"]) for row in read_log(path) if row["aspect"] == "measurement_failure"]
 
     assert failures(both) == failures(one) != []
 
@@ -137,21 +133,27 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
     [
         (
             ("run", "colision_avoidance"),
-            ("error: there is no packaged model 'colision_avoidance', did you mean 'collision_avoidance'?\n"
-            "   help: packaged models: collision_avoidance; a path to a file ends in .yaml\n"),
+            (
+                "error: there is no packaged model 'colision_avoidance', did you mean 'collision_avoidance'?\n"
+                "   help: packaged models: collision_avoidance; a path to a file ends in .yaml\n"
+            ),
         ),
         (
             ("run", "collision_avoidance", "--set", "observer=3"),
-            ("command line:1:7: error: 'observer' sets no parameter, did you mean 'observers'?\n"
-            "    1 | --set observer=3\n"
-            "      |       ^^^^^^^^^^\n"),
+            (
+                "command line:1:7: error: 'observer' sets no parameter, did you mean 'observers'?\n"
+                "    1 | --set observer=3\n"
+                "      |       ^^^^^^^^^^\n"
+            ),
         ),
         (
             ("run", "collision_avoidance", "--without", "packet_los"),
-            ("command line:1:11: error: the model has no aspect 'packet_los', did you mean 'packet_loss'?\n"
-            "    1 | --without packet_los\n"
-            "      |           ^^^^^^^^^^\n"
-            "   help: its aspects: packet_loss, measurement_failure\n"),
+            (
+                "command line:1:11: error: the model has no aspect 'packet_los', did you mean 'packet_loss'?\n"
+                "    1 | --without packet_los\n"
+                "      |           ^^^^^^^^^^\n"
+                "   help: its aspects: packet_loss, measurement_failure\n"
+            ),
         ),
         (
             ("run", "collision_avoidance", "--log", "log.txt"),

@@ -147,10 +147,7 @@ TAG_HELP = "\n   help: leave it out, or quote a text that starts with '!'"
         ),
         (
             "true: a",
-            (
-                "m.yaml:1:1: error: a key must be text, this one is true, which is not text\n"
-                "   help: quote it: 'true'"
-            ),
+            ("m.yaml:1:1: error: a key must be text, this one is true, which is not text\n   help: quote it: 'true'"),
         ),
         ("? \n: a", "m.yaml:1:2: error: a key must be text, this one is empty\n   help: quote it: ''"),
         (
@@ -270,16 +267,12 @@ def test_problems_before_a_syntax_error_are_kept() -> None:
 def test_alias_bomb() -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]
-    assert faults("\n".join(lines)) == (
-        "m.yaml:6:25: error: more than 500,000 values, aliases counted at each use"
-    )
+    assert faults("\n".join(lines)) == ("m.yaml:6:25: error: more than 500,000 values, aliases counted at each use")
 
 
 def test_depth_by_aliases() -> None:
     lines = ["a0: &a0 [x]"] + [f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 150)]
-    assert faults("\n".join(lines)) == (
-        "m.yaml:100:12: error: nested deeper than 100 levels by the alias *a98"
-    )
+    assert faults("\n".join(lines)) == ("m.yaml:100:12: error: nested deeper than 100 levels by the alias *a98")
 
 
 def test_deepest_allowed_nesting() -> None:
@@ -367,11 +360,7 @@ def test_read_what_is_not_utf8(tmp_path: Path) -> None:
 
 
 values = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers(-(2**70), 2**70)
-    | st.floats(allow_nan=False)
-    | st.text(max_size=8),
+    st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats(allow_nan=False) | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=10,
 )

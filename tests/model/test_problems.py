@@ -58,9 +58,7 @@ def test_gutter_grows_with_the_line_number() -> None:
 
 def test_control_characters_are_escaped_everywhere() -> None:
     problem = Problem("\x1b[31m bad\nx", Position("f\r", 1, 1, 1, "\x1b\u202e"), ("\x07",))
-    assert str(problem) == (
-        "f\\r:1:1: error: \\x1b[31m bad\\nx\n    1 | \\x1b\\u202e\n      | ^^^^\n   help: \\x07"
-    )
+    assert str(problem) == ("f\\r:1:1: error: \\x1b[31m bad\\nx\n    1 | \\x1b\\u202e\n      | ^^^^\n   help: \\x07")
 
 
 @pytest.mark.parametrize("column", [1, 2, 60, 119, 120, 121, 300, 5_000, 99_990, 99_999])
@@ -85,8 +83,7 @@ def test_model_error_counts_its_problems() -> None:
     assert isinstance(one, EpicycleError)
     two = ModelError([MISTYPED, Problem("other", Position("y.yaml", 1, 1, 1, "a"))])
     assert str(two) == (
-        MISTYPED_TEXT
-        + "\n\ny.yaml:1:1: error: other\n    1 | a\n      | ^\n2 errors in models/x.yaml, y.yaml"
+        MISTYPED_TEXT + "\n\ny.yaml:1:1: error: other\n    1 | a\n      | ^\n2 errors in models/x.yaml, y.yaml"
     )
     assert str(ModelError([Problem("a"), Problem("b")])) == "error: a\n\nerror: b\n2 errors"
 

@@ -86,7 +86,9 @@ def test_200_steps_agree_with_filterpy(kind: int) -> None:
 
 def noise_along(mean: np.ndarray, kind: int, observers: np.ndarray, deviations: np.ndarray) -> np.ndarray:
     """The noise ellipses turned along the directions to the mean."""
-    return ukf.measurement_noise(mean[np.newaxis], np.ones(1), np.full(len(observers), float(kind)), observers, deviations)
+    return ukf.measurement_noise(
+        mean[np.newaxis], np.ones(1), np.full(len(observers), float(kind)), observers, deviations
+    )
 
 
 def test_expected_noise_is_the_average_over_the_sigma_points() -> None:

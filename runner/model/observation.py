@@ -1,0 +1,111 @@
+"""What is watched of a model: how long it runs, what it records, and its metrics."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from epicycle.actors import Parameter, ParameterError, accepts, to_nanoseconds, type_name
+
+from .declarations import DeclarationReader, MetricText, ModelText, Text
+from .model import Metric, Model
+from .patterns import PatternError, select
+from .problems import Problems, nearest
+from .values import Values
+
+# Larger seeds could not be told apart in the int64 columns of result files.
+MAX_SEED = 2**63 - 1
+
+
+class Observation:
+    """Reads ``run`` and ``metrics`` into a model."""
+
+    def __init__(self, model: Model, values: Values, problems: Problems) -> None:
+        self.model = model
+        self.graph = model.graph
+        self.values = values
+        self.problems = problems
+        self._outputs = [path for path in self.graph.ports.nodes if self.graph.direction(path) == "output"]
+
+    def read(self, text: ModelText, names: dict[str, object]) -> None:
+        """Everything that the model file says about it."""
+        reader = DeclarationReader(self.problems)
+        for key, entry in text.run.items():
+            if key == "record":
+                found = [path for each in reader.texts(entry.value, key) for path in self._select(each, key)]
+                self.model.record = list(dict.fromkeys(found))
+            elif key == "stop_when":
+                for each in reader.texts(entry.value, key):
+                    self._stop_when(each)
+            else:
+                value = self.values.of(entry.value, names, key)
+                if value is self.values.missing:
+                    continue
+                try:
+                    if key == "stop":
+                        seconds: Any = Parameter(float, unit="s", min=0.0).convert(value)
+                        self.model.stop = to_nanoseconds(seconds)
+                    else:
+                        seed: Any = Parameter(int, min=0, max=MAX_SEED).convert(value)
+                        self.model.seed = seed
+                except (ParameterError, ValueError) as error:
+                    self.problems.add(f"{key}: {error}", entry.value.position)
+        for metric in text.metrics:
+            self._metric(metric)
+
+    def _stop_when(self, text: Text) -> None:
+        for path in self._select(text, "stop_when"):
+            self.model.stop_when.append(path)
+            for port in self.graph.source_of(path):
+                if not accepts(float | bool, port.type):
+                    self.problems.add(
+                        f"stop_when: {path} sends {type_name(port.type)}, which is neither true nor false",
+                        text.position,
+                        "name a port that sends bool or numbers; the run ends when it sends true, or not 0",
+                    )
+                    return
+
+    def _metric(self, metric: MetricText) -> None:
+        what = f"metric {metric.name}"
+        paths = self._select(metric.port, what)
+        self.model.metrics.append(Metric(metric.name, paths, metric.take, metric.unit, metric.doc))
+        if metric.take == "count":
+            return
+        wanted: Any = float | bool if metric.take not in ("first", "last") else float | bool | str
+        for path in paths:
+            for port in self.graph.source_of(path):
+                if port.type in (Any, object) or not accepts(wanted, port.type):
+                    self.problems.add(
+                        f"{what}: {path} sends {type_name(port.type)}, of which there is no {metric.take!r}",
+                        metric.port.position,
+                        "name a port that sends numbers, or take 'count'",
+                    )
+                    return
+
+    def _select(self, text: Text, what: str) -> list[str]:
+        """The output ports that a pattern selects, composites' included."""
+        try:
+            found = select(text.text, self._outputs)
+        except PatternError as error:
+            self.problems.add(f"{what}: {text.text!r} is no pattern: {error}", text.position)
+            return []
+        if found or self.graph.is_excused(text.text):
+            return found
+        close = nearest(text.text, self._outputs)
+        guess = f", did you mean {close!r}?" if close else ""
+        if text.text in self.graph.ports.nodes:
+            self.problems.add(
+                f"{what}: {text.text} is an input port, but an output port is needed{guess}", text.position
+            )
+        else:
+            self.problems.add(
+                f"{what}: {text.text!r} matches no output port{guess}",
+                text.position,
+                *self._hint(text.text),
+            )
+        return []
+
+    def _hint(self, pattern: str) -> tuple[str, ...]:
+        """The output ports of the actor that the pattern names, if there is one."""
+        owner = pattern.rpartition(".")[0]
+        ports = [path for path in self._outputs if path.rpartition(".")[0] == owner]
+        return (f"output ports of {owner}: {', '.join(p.rpartition('.')[2] for p in ports)}",) if ports else ()

@@ -1,0 +1,171 @@
+"""The event log, its digest, its files, and the bytes that tokens become."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import math
+import os
+import struct
+import subprocess
+import sys
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from epicycle.actors import Tag
+from epicycle.runner.engine import ActorError, LogError, Record, canonical, check_log_path, plain, scalars, write_log
+
+sys.path.insert(0, str(Path(__file__).parent))
+from engine_parts import Plan, simulate
+
+MODEL = """
+actors: {t: {type: Ticker, limit: 3}, s: {type: Scale, factor: 0.5}, join: {type: Join}}
+connections: [t.output -> s.input, "t.output, s.output -> join.input"]
+aspects: {loss: {type: PacketLoss, probability: 0.5, at: s.input}}
+"""
+
+
+@dataclass
+class Point:
+    x: float
+    y: Any
+
+
+@dataclass
+class Spot:
+    x: float
+    y: Any
+
+
+class Colour(Enum):
+    RED = 1
+
+
+DIFFERENT: list[Any] = [
+    None, True, False, 0, 1, -1, 2**63, -(2**63) - 1, 0.0, -0.0, 1.0, math.nan, math.inf, -math.inf,
+    "", "0", "1", "a", "None", [], [0], [0.0], [[0]], [0, 0], [[0], 0], ["a", "b"], ["ab"],
+    {}, {"a": 1}, {"a": 1.0}, {"b": 1}, {1: "a"}, {"1": "a"}, set(), {0}, {"a"}, b"", b"a", 1j, Colour.RED,
+    Point(0, 1), Point(0.0, 1), Spot(0, 1), {"x": 0, "y": 1},
+    np.zeros(0), np.zeros(1), np.zeros(2), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros(2, dtype=np.float32),
+    np.zeros(2, dtype=int), np.zeros(2, dtype=bool), np.array([0.0, -0.0]), np.array([0.0, math.nan]),
+    np.array(["a"]), np.array([None, 1]),
+]  # fmt: skip
+
+
+def test_canonical_bytes_tell_kinds_apart() -> None:
+    found = [canonical(token) for token in DIFFERENT]
+    for (one, first), (other, second) in itertools.combinations(zip(DIFFERENT, found, strict=True), 2):
+        assert first != second, f"{one!r} and {other!r}"
+
+
+def test_equal_tokens_give_equal_bytes() -> None:
+    odd_nan = struct.unpack("<d", struct.pack("<Q", 0xFFF8000000000001))[0]
+    assert canonical(odd_nan) == canonical(math.nan)
+    assert canonical(np.array([odd_nan, 1.0])) == canonical(np.array([math.nan, 1.0]))
+    assert canonical({"a": 1, "b": 2}) == canonical({"b": 2, "a": 1})
+    assert canonical({"x", "y", "z"}) == canonical({"z", "y", "x"})
+    assert canonical(np.float64(0.5)) == canonical(0.5)
+    assert canonical(np.int32(5)) == canonical(5)
+    assert canonical(np.bool_(True)) == canonical(True)
+    assert canonical((1, 2)) == canonical([1, 2])
+    assert canonical(np.arange(6).reshape(2, 3).T) == canonical(np.ascontiguousarray(np.arange(6).reshape(2, 3).T))
+    assert canonical(np.longdouble(1)) == canonical(np.longdouble(1))
+
+
+def test_plain_and_scalars() -> None:
+    token = Point(
+        np.float64(0.5), {"a": np.arange(2), "b": (True, None), "c": {2, 1}, "d": np.array([None, "x"], dtype=object)}
+    )
+    assert plain(token) == {"x": 0.5, "y": {"a": [0, 1], "b": [True, None], "c": [1, 2], "d": [None, "x"]}}
+    assert json.loads(json.dumps(plain(DIFFERENT)))
+    assert list(scalars(token)) == [("x", 0.5), ("y.a[0]", 0.0), ("y.a[1]", 1.0), ("y.b[0]", 1.0)]
+    assert list(scalars([10**400, -(10**400), "x", np.str_("y"), 1j, np.complex128(1j)])) == [
+        ("[0]", math.inf), ("[1]", -math.inf)
+    ]  # fmt: skip
+
+
+def test_a_token_without_a_value_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Plan, "begin", lambda actor: actor.wake_in(0))
+    monkeypatch.setattr(Plan, "act", lambda actor: actor.output.send(object()))
+    with pytest.raises(ActorError) as caught:
+        simulate("actors: {a: {type: Plan}}")
+    assert str(caught.value).splitlines()[0] == (
+        "a failed in fire() at (0 s, 1): a token of type object has no value that could be logged: "
+        "make it a dataclass, or give it a __repr__ that shows what is in it"
+    )
+
+
+def test_order_and_digest() -> None:
+    _, results = simulate(MODEL, seed=1)
+    found = [(r.tag.seconds, r.event, r.actor, r.port, r.channel, r.aspect, r.value) for r in results.log.records]
+    assert results.events == len(found)
+    assert [row for row in found if row[0] == 0.0] == [
+        (0.0, "send", "t", "output", None, "", 0),
+        (0.0, "send", "s", "output", None, "", 0.0),
+        (0.0, "send", "join", "output", None, "", [[0], [0.0]]),
+    ]
+    assert (1.0, "dropped", "s", "input", None, "loss", 1) in found
+    assert results.digest == simulate(MODEL, seed=1)[1].digest
+    assert len({simulate(MODEL, seed=seed)[1].digest for seed in range(8)}) > 3
+
+
+def test_the_digest_does_not_depend_on_the_hash_seed() -> None:
+    script = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from test_log import MODEL, simulate\n"
+        "from epicycle.runner.engine import canonical\n"
+        "print(simulate(MODEL, seed=3)[1].digest, canonical({'a', 'b', 'c', 'd'}).hex())"
+    )
+    found = set()
+    for seed in ("0", "1", "12345"):
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        run = subprocess.run(
+            [sys.executable, "-c", script, str(Path(__file__).parent)],
+            env=environment, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        found.add(run.stdout)
+    assert len(found) == 1
+
+
+RECORDS = [
+    Record(Tag(0, 1), "send", "a", "output", None, "", [1, 2.5, 'x,\n"é']),
+    Record(Tag(1_500_000_000, 2), "dropped", "b[0].c", "input", None, "loss", None),
+    Record(Tag(2**60, 3), "send", "a", "output", 4, "", {"x": True}),
+]
+
+
+@pytest.mark.parametrize("ending", [".jsonl", ".csv", ".parquet"])
+@pytest.mark.parametrize("records", [RECORDS, []])
+def test_files_hold_what_was_recorded(ending: str, records: list[Record], tmp_path: Path) -> None:
+    path = tmp_path / f"log{ending}"
+    check_log_path(path)
+    write_log(records, path)
+    names = ["time", "microstep", "event", "actor", "port", "channel", "aspect", "value"]
+    if ending == ".jsonl":
+        rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        assert [list(row) for row in rows] == [names] * len(records)
+        found = [(*list(row.values())[:-1], json.dumps(row["value"])) for row in rows]
+    elif ending == ".csv":
+        with path.open(encoding="utf-8", newline="") as file:
+            header, *lines = csv.reader(file)
+        assert header == names
+        found = [(float(a), int(b), c, d, e, int(f) if f else None, g, h) for a, b, c, d, e, f, g, h in lines]
+    else:
+        table = pq.read_table(path)
+        assert table.column_names == names
+        found = [tuple(row.values()) for row in table.to_pylist()]
+    assert found == [record.row() for record in records]
+
+
+def test_paths_of_logs(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="is no log file: its name must end in"):
+        check_log_path(tmp_path / "log.txt")
+    with pytest.raises(LogError, match="there is no folder"):
+        check_log_path(tmp_path / "no" / "log.csv")

@@ -1,0 +1,251 @@
+"""Actors written as SimPy generators."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import simpy
+
+from epicycle.runner.engine import ActorError, Results, Simulation
+
+sys.path.insert(0, str(Path(__file__).parent))
+from engine_parts import Plan, Script, load, seen, sends, simulate
+
+Behaviour = Callable[[Script], Generator[Any, Any, None]]
+ALONE = "actors: {a: {type: Script}, probe: {type: Probe}}\nconnections: [a.output -> probe.input]\n"
+FED = "actors: {t: {type: Ticker}, a: {type: Script}}\nconnections: [t.output -> a.input]\n"
+
+
+@pytest.fixture
+def behave(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Results]:
+    def run(behaviour: Behaviour, text: str = ALONE, until: float = 5) -> Results:
+        monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))
+        return simulate(text, until=until)[1]
+
+    return run
+
+
+def test_a_clock_and_a_gain_send_as_reactive_ones_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Tick(Script):
+        def run(self) -> Generator[Any, Any, None]:
+            count = 0
+            while True:
+                self.output.send(count)
+                count += 1
+                yield self.wait(0.1)
+
+    class Twice(Script):
+        def run(self) -> Generator[Any, Any, None]:
+            while True:
+                token = yield self.read(self.input)
+                self.output.send(2.0 * token)
+
+    text = """
+actors: {{t: {{type: {}, {}}}, g: {{type: {}, {}}}, slow: {{type: {}, {}}}, probe: {{type: Probe}}}}
+connections:
+  - t.output -> g.input
+  - {{from: t.output, to: slow.input, delay: 0.25 s}}
+  - {{from: g.output, to: probe.input, delay: 0}}
+  - slow.output -> probe.input
+"""
+    reactive = simulate(text.format("Ticker", "period: 0.1", "Scale", "factor: 2", "Scale", "factor: 2"), until=2)
+    process = simulate(
+        text.format("Tick", "", "Twice", "", "Twice", "").replace(", }", "}"), until=2, types=[Tick, Twice]
+    )
+    assert sends(reactive[1]) == sends(process[1])
+    assert seen(reactive[0]) == seen(process[0])
+    assert reactive[1].digest == process[1].digest
+
+
+def test_wait_zero_is_the_next_microstep(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        for item in "abc":
+            self.output.send(item)
+            yield self.wait(0)
+
+    assert [row[:2] + row[3:] for row in sends(behave(behaviour))] == [(0.0, 1, "a"), (0.0, 2, "b"), (0.0, 3, "c")]
+
+
+def test_tokens_queue_up_until_they_are_read(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        yield self.wait(2.5)
+        while True:
+            token = yield self.read(self.input)
+            self.output.send(token)
+
+    results = behave(behaviour, FED, 4)
+    assert [(t, m, v) for t, m, _, v in sends(results, "a")] == [
+        (2.5, 1, 0), (2.5, 1, 1), (2.5, 1, 2), (3.0, 1, 3), (4.0, 1, 4)
+    ]  # fmt: skip
+
+
+def test_a_read_that_lost_a_race_takes_no_token(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        yield self.read(self.input)  # the token of 0 s
+        read = self.read(self.input)
+        done = yield read | self.wait(0.5)
+        assert read not in done
+        yield self.wait(2)  # meanwhile two tokens come
+        for _ in range(2):
+            self.output.send((yield self.read(self.input)))
+
+    assert [row[3] for row in sends(behave(behaviour, FED), "a")] == [1, 2]
+
+
+def test_a_read_made_early_gets_its_token(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        read = self.read(self.input)
+        yield self.wait(2.5)
+        self.output.send((yield read))
+        self.output.send((yield self.read(self.input)))
+
+    assert [row[3] for row in sends(behave(behaviour, FED), "a")] == [0, 1]
+
+
+def test_simpy_resources_conditions_and_interrupts(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        environment = self.environment
+        desk = simpy.Resource(environment, capacity=1)
+
+        def customer(name: str, stay: int) -> Generator[Any, Any, None]:
+            with desk.request() as request:
+                yield request
+                yield environment.timeout(stay)
+                self.output.send(f"{name} leaves")
+
+        yield environment.process(customer("a", 10**9)) & environment.process(customer("b", 10**9))
+        self.output.send("both")
+
+        def sleeper() -> Generator[Any, Any, None]:
+            try:
+                yield environment.timeout(10**12)
+            except simpy.Interrupt as interrupt:
+                self.output.send(interrupt.cause)
+
+        asleep = environment.process(sleeper())
+        yield self.wait(1)
+        asleep.interrupt("woken")
+        yield asleep
+        yield self.wait(0.5) | self.wait(7)
+        self.output.send("end")
+
+    results = behave(behaviour)
+    assert [(t, m, v) for t, m, _, v in sends(results)] == [
+        (1.0, 1, "a leaves"),
+        (2.0, 1, "b leaves"),
+        (2.0, 1, "both"),
+        (3.0, 2, "woken"),  # SimPy interrupts after the firing at (3 s, 1)
+        (3.5, 2, "end"),  # a condition is SimPy's, too
+    ]
+
+
+def test_what_simpy_resumed_sends_at_the_first_open_microstep(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        yield self.environment.timeout(10**9)
+        self.output.send("timeout")  # before the director has handled anything at 1 s
+        yield self.wait(0)
+        yield self.environment.timeout(0)
+        self.output.send("again")  # after it has
+
+    model, results = simulate_with(behave, behaviour)
+    assert [row[:2] for row in sends(results)] == [(1.0, 1), (1.0, 2)]
+    assert [row[:2] for row in seen(model)] == [(1.0, 1), (1.0, 2)]
+
+
+def simulate_with(behave: Callable[..., Results], behaviour: Behaviour) -> Any:
+    behave(behaviour)  # leaves the behaviour in place
+    return simulate(ALONE, until=5)
+
+
+def test_simpy_times_between_two_nanoseconds(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        for _ in range(3):
+            yield self.environment.timeout(0.3)
+            self.output.send(self.environment.now)
+        yield self.wait(1)
+        self.output.send("end")
+
+    results = behave(behaviour)
+    assert [(row.tag.time, row.tag.microstep) for row in results.log.records] == [
+        (1, 1),
+        (1, 1),
+        (1, 1),
+        (10**9 + 1, 1),
+    ]
+
+
+def test_stop_when_from_a_process_finishes_the_tag(behave: Callable[..., Results], monkeypatch: Any) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        yield self.environment.timeout(10**9)
+        self.output.send(1)
+        yield self.wait(1)
+        self.output.send(2)
+
+    monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))
+    model, results = simulate(ALONE + "run: {stop_when: a.output}\n")
+    assert (results.stopped, results.end) == ("stop_when", 1.0)
+    assert seen(model) == [(1.0, 1, (1,))]
+
+
+class FussyError(Exception):
+    """SimPy cannot make a copy of this one."""
+
+    def __init__(self, one: int, two: int) -> None:
+        super().__init__(f"{one} and {two}")
+
+
+@pytest.mark.parametrize(
+    ("resumed_by", "error"),
+    [(by, ValueError("bad luck")) for by in ("start", "wait", "read", "timeout", "subprocess")]
+    # SimPy itself fails to hand such an error from one of its processes to another.
+    + [(by, FussyError(1, 2)) for by in ("start", "wait", "read", "timeout")],
+)
+def test_an_exception_in_a_process_names_its_actor(
+    resumed_by: str, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def inner(self: Script) -> Generator[Any, Any, None]:
+        yield self.environment.timeout(1)
+        raise error
+
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        if resumed_by == "wait":
+            yield self.wait(1)
+        elif resumed_by == "read":
+            yield self.read(self.input)
+        elif resumed_by == "timeout":
+            yield self.environment.timeout(10**9)
+        elif resumed_by == "subprocess":
+            yield self.environment.process(inner(self))
+        raise error
+
+    monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))
+    model = load(
+        "actors:\n  t: {type: Ticker}\n  a: {type: Script}\n  probe: {type: Probe}\n"
+        "connections: [t.output -> a.input]\n"
+    )
+    with pytest.raises(ActorError) as caught:
+        Simulation(model).run(until=3)
+    tag = {"start": "(0 s, 1)", "read": "(0 s, 1)", "subprocess": "(1e-09 s, 1)"}.get(resumed_by, "(1 s, 1)")
+    reason = "ValueError: bad luck" if isinstance(error, ValueError) else "FussyError: 1 and 2"
+    first = str(caught.value).splitlines()[0]
+    assert first == f"a failed in run() at {tag}: {reason}"
+    assert caught.value.where.endswith("m.yaml:4:3")
+    assert model.graph.actors["probe"].wrapped == 1  # type: ignore[attr-defined]
+
+
+def test_an_exception_in_a_process_of_simpys_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def begin(actor: Plan) -> None:
+        def stray() -> Generator[Any, Any, None]:
+            yield actor.context.environment.timeout(5)
+            raise KeyError("lost")
+
+        actor.context.environment.process(stray())
+
+    monkeypatch.setattr(Plan, "begin", begin)
+    with pytest.raises(ActorError) as caught:
+        simulate("actors: {a: {type: Plan}}")
+    assert str(caught.value) == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"

@@ -1,0 +1,198 @@
+"""Whatever stands in a file, load_model answers in bearable time with a Model or a ModelError."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import re
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import epicycle.actors
+from epicycle.actors import ChannelError, EpicycleError, FilterError, ParameterError, PortError, Tag, UnitError
+from epicycle.runner.engine import ActorError, LogError, LoopError
+from epicycle.runner.engine.encoding import TokenError
+from epicycle.runner.model import Model, ModelError, Position, Problem, load_model
+from epicycle.runner.model.expression_syntax import ExpressionError
+from epicycle.runner.model.load import model_folders
+
+sys.path.insert(0, str(Path(__file__).parent))
+from model_parts import TYPES
+
+EXAMPLE = next(folder for folder in model_folders() if (folder / "collision_avoidance.yaml").is_file())
+TEXT = (EXAMPLE / "collision_avoidance.yaml").read_text(encoding="utf-8")
+TOKEN = re.compile(r"[A-Za-z_]\w*|[-\d.]+|\S")
+SPICE = [
+    "", " ", "  ", "\n", ":", "- ", "{", "}", "[", "]", "'", '"', "&a", "*a", "!!int", "|", ">", "#", "${", "}", "?",
+    "${index}", "%", "null", "true", ".nan", ".inf", "-1", "1e999", "0x1F", "1e9", "[]", "{}", "[[[]]]", "a.b", "**",
+    "*", "[*]", "->", "\t", "\x00", "é", "type", "count", "value", "delay", "at", "of", "from", "to", "<<", "---",
+    "...", "99999999999999999999", "3 m", "10 s",
+]  # fmt: skip
+
+
+def said(text: str, tmp_path: Path, **options: object) -> str:
+    path = tmp_path / "m.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ModelError) as caught:
+        load_model(path, types=TYPES, **options)  # type: ignore[arg-type]
+    return str(caught.value).replace(str(path), "m.yaml")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("models")
+    shutil.copytree(EXAMPLE / "robots", path / "robots", ignore=shutil.ignore_patterns("__pycache__"))
+    return path
+
+
+def mutated(text: str, chance: np.random.Generator) -> str:
+    """The text with one to five accidents of the kind that happen in an editor."""
+    for _ in range(chance.integers(1, 6)):
+        lines = text.split("\n")
+        one, other = int(chance.integers(len(lines))), int(chance.integers(len(lines)))
+        kind = chance.integers(7)
+        if kind == 0:
+            del lines[one]
+        elif kind == 1:
+            lines.insert(other, lines[one])
+        elif kind == 2:
+            lines[one], lines[other] = lines[other], lines[one]
+        elif kind == 3:
+            lines[one] = " " * int(chance.integers(7)) + lines[one].strip()
+        else:
+            tokens = list(TOKEN.finditer(text))
+            token = tokens[chance.integers(len(tokens))]
+            new = SPICE[chance.integers(len(SPICE))] if kind < 6 else tokens[chance.integers(len(tokens))][0]
+            text = text[: token.start()] + new + text[token.end() :]
+            continue
+        text = "\n".join(lines)
+    return text
+
+
+@settings(
+    max_examples=200, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.integers(0, 2**32))
+def test_accidents_in_a_file(folder: Path, seed: int) -> None:
+    path = folder / "m.yaml"
+    path.write_text(mutated(TEXT, np.random.default_rng(seed)), encoding="utf-8")
+    outcome: object
+    try:
+        outcome = load_model(path)
+    except ModelError as error:
+        outcome = error
+    if isinstance(outcome, ModelError):
+        assert "error: " in str(outcome)
+        assert pickle.loads(pickle.dumps(outcome)).problems == outcome.problems
+    else:
+        assert isinstance(outcome, Model)
+
+
+BOMBS = {
+    "aliases": "a: &a [x, x, x, x, x, x, x, x, x]\n"
+    + "".join(f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)),
+    "nesting": "model: m\nparameters: {p: " + "[" * 10_000 + "]" * 10_000 + "}\n",
+    "mappings": "model: m\nparameters: " + "{p: " * 10_000 + "1" + "}" * 10_000 + "\n",
+    "list": "model: m\nparameters: {p: '${[[0] * 100000] * 100000}'}\n",
+    "repetition": "model: m\nparameters: {p: \"${'x' * 10 ** 9}\"}\n",
+    "comprehension": "model: m\nparameters: {p: '${[i * j for i in range(99999) for j in range(99999)]}'}\n",
+    "count": "model: m\nactors: {a: {type: Ramp, count: '${len([0] * 99999) * 99999}'}}\n",
+    "doubling": "model: m\ncomposites:\n"
+    + "".join(f"  C{i}: {{actors: {{a: {{type: C{i + 1}, count: 2}}}}}}\n" for i in range(40))
+    + "  C40: {}\nactors: {a: {type: C0}}\n",
+    "too deep": "model: m\ncomposites:\n"
+    + "".join(f"  C{i}: {{actors: {{a: {{type: C{i + 1}}}}}}}\n" for i in range(60))
+    + "  C60: {}\nactors: {a: {type: C0}}\n",
+    "wires": "model: m\ncomposites:\n  Fan: {inputs: [in], outputs: [out], connections: ["
+    + ", ".join(["in -> out"] * 10)
+    + "]}\nactors:\n  a: {type: Ramp}\n  s: {type: Sum}\n"
+    + "".join(f"  f{i}: {{type: Fan}}\n" for i in range(9))
+    + "connections:\n  - a.output -> f0.in\n  - f8.out -> s.input\n"
+    + "".join(f"  - f{i}.out -> f{i + 1}.in\n" for i in range(8)),
+    "passage": "model: m\ncomposites: {Through: {inputs: [in], outputs: [out], connections: [in -> out]}}\nactors:\n"
+    + "".join(f"  f{i}: {{type: Through}}\n" for i in range(2000))
+    + "connections:\n"
+    + "".join(f"  - f{i}.out -> f{i + 1}.in\n" for i in range(1999)),
+    "pattern": "model: m\nactors: {a: {type: Ramp}}\nrun: {record: '" + "**." * 300 + "x'}\n",
+    "long name": "model: m\nactors: {a: {type: " + "R" * 100_000 + "}}\n",
+    "many mistakes": "model: m\nactors:\n" + "".join(f"  a{i}: {{type: Rmap{i}}}\n" for i in range(3000)),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_bombs_do_no_harm(name: str, tmp_path: Path) -> None:
+    started = time.perf_counter()
+    assert "error: " in said(BOMBS[name], tmp_path)
+    assert time.perf_counter() - started < 10
+
+
+def test_what_is_said_about_bombs(tmp_path: Path) -> None:
+    assert "m.yaml:2:115: error: nested deeper than 100 levels" in said(BOMBS["nesting"], tmp_path)
+    assert "a.a.a.a" in said(BOMBS["too deep"], tmp_path)
+    assert "composites are nested deeper than 50 levels" in said(BOMBS["too deep"], tmp_path)
+    assert "the model has more than 200,000 actors and composites" in said(BOMBS["doubling"], tmp_path)
+    assert "the model has more than 1,000,000 wires" in said(BOMBS["wires"], tmp_path)
+    assert "a way of more than 200 composite ports in a row, from f0.in to f1999.out" in said(
+        BOMBS["passage"], tmp_path
+    )
+    assert "... and 2900 more\n3000 errors in m.yaml" in said(BOMBS["many mistakes"], tmp_path)
+
+
+def test_files_that_are_no_text(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_bytes(b"model: \xff\n")
+    with pytest.raises(ModelError, match="not UTF-8"):
+        load_model(path)
+    with pytest.raises(ModelError, match="is a folder"):
+        load_model(f"{tmp_path}/")
+    with pytest.raises(ModelError):
+        load_model("x" * 5000 + ".yaml")
+    with pytest.raises(ModelError):
+        load_model("a\0b.yaml")
+    with pytest.raises(ModelError, match="there is no packaged model ''"):
+        load_model("")
+
+
+def test_nothing_is_executed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    said("model: m\nactors: {a: !!python/object/apply:os.system ['touch harm']}\n", tmp_path)
+    said("model: m\nparameters: {p: \"${__import__('os').system('touch harm')}\"}\n", tmp_path)
+    said("model: m\n", tmp_path, set=["p=!!python/object/apply:os.system ['touch harm']"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.yaml"]
+
+
+POSITION = Position("m.yaml", 1, 2, 3, "model: m")
+ERRORS = [
+    ModelError([Problem("wrong", POSITION, ("help",)), Problem("worse")], 3),
+    ActorError("main.sensor", Tag(5, 2), "fire()", "ValueError: no", "m.yaml:3:4"),
+    LoopError(7, ("a", "b")),
+    LoopError(7, ()),
+    ParameterError("no"),
+    UnitError("no"),
+    PortError("no"),
+    ChannelError("no"),
+    FilterError("no"),
+    LogError("no"),
+    TokenError("no"),
+    ExpressionError("no", 3, 4),
+    EpicycleError("no"),
+]
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_errors_travel_between_processes(error: EpicycleError) -> None:
+    for rebuilt in (pickle.loads(pickle.dumps(error)), copy.copy(error), copy.deepcopy(error)):
+        assert type(rebuilt) is type(error)
+        assert (str(rebuilt), rebuilt.args, vars(rebuilt)) == (str(error), error.args, vars(error))
+
+
+def test_all_public_errors_are_tried() -> None:
+    public = {value for name in epicycle.actors.__all__ if isinstance(value := getattr(epicycle.actors, name), type)}
+    assert {each for each in public if issubclass(each, EpicycleError)} <= {type(error) for error in ERRORS}
