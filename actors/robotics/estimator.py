@@ -9,7 +9,6 @@ import numpy as np
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from .messages import RANGE, Array, Estimate, Measurement
 
-
 EXPECTED, PREDICTED = "expected", "predicted"
 
 
