@@ -49,7 +49,7 @@ class Trajectories(Figure):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure as Canvas
 
-        canvas = Canvas(figsize=(7.2, 4.2), layout="constrained")
+        canvas = Canvas()
         FigureCanvasAgg(canvas)
         axes = canvas.add_subplot()
         robots = [results.signals[name] for pattern in self.robots for name in select(pattern, results.signals)]
@@ -58,7 +58,7 @@ class Trajectories(Figure):
         if self.estimate:
             self._ellipses(axes, results.signals[self.estimate])
         colours = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")
-        for index, signal in reversed(list(enumerate(robots))):
+        for index, signal in enumerate(robots):
             self._path(axes, signal, colours[index % len(colours)], main=index == 0, legend=index < 8)
         axes.plot(*self.goal, marker="*", markersize=15, color="#c62828", linestyle="none", label="goal", zorder=6)
         axes.set_aspect("equal")
@@ -67,8 +67,12 @@ class Trajectories(Figure):
         axes.grid(color="0.9", linewidth=0.6)
         axes.set_axisbelow(True)
         axes.set_title(f"{results.model}, seed {results.seed}, {results.end:g} s", fontsize=10)
-        canvas.legend(loc="outside right upper", fontsize=8, frameon=False)
-        canvas.savefig(path, dpi=200)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, fontsize=8, frameon=False)
+        # One metre is as long in x as in y; the sheet takes the shape of what is on it.
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        scale = min(6.5 / (right - left), 5.0 / (high - low))
+        canvas.set_size_inches(max(1.5, scale * (right - left)) + 1.0, max(1.5, scale * (high - low)) + 0.8)
+        canvas.savefig(path, dpi=200, bbox_inches="tight")
 
     def _path(self, axes: Any, signal: Signal, colour: str, *, main: bool, legend: bool) -> None:
         points = positions(signal)
