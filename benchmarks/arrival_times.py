@@ -5,7 +5,8 @@
 
 Prints a Markdown table: mean arrival time with its standard error, smallest distances over all runs, runs that came
 within 2 m of the obstacle or of another robot, runs that never arrived (counted apart, never averaged in), and the
-mean number of the main robot's plans that broke a constraint.  Seeds count from --first-seed; every condition uses the same.
+mean number of the main robot's plans that broke a constraint.  Seeds count from --first-seed, the same for every
+condition.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem
 
 STEPS, SECONDS = "steps", "seconds"
+DECISION, NOW = "decision", "now"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,10 @@ class RobustController(Actor):
 
     Connect ``control`` to the vehicle with a delay of one period: solving takes time, so what is computed
     from the state at t acts from t + period on (the paper's U_{t+1}).
+
+    Eq. (2) sums over the states at t + 1 .. t + N periods, of which U_{t+N} reaches none: in the paper's dynamics a
+    control moves the robot two periods later.  ``horizon_from: decision`` counts the N steps from t + period instead,
+    from where the first unknown control acts.
 
     The latest plan of each peer counts; with every period beyond the first that has passed since it was made,
     the distance to keep grows (eq. 4).  Before a first plan or estimate comes, there is nobody to avoid.
@@ -58,6 +63,12 @@ class RobustController(Actor):
     max_speed = Parameter(float, 8.0, unit="m/s", min=1e-6, doc="Vmax")
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=1e-6, doc="Amax")
     horizon = Parameter(int, 10, min=3, doc="N: periods to look ahead")
+    horizon_from = Parameter(
+        str,
+        NOW,
+        choices=(NOW, DECISION),
+        doc="where the N steps begin: at t, or at t + period, when U_{t+1} begins to act",
+    )
     period = Parameter(float, 0.1, unit="s", min=1e-9, doc="Delta t: time between two triggers")
     safe_distance = Parameter(float, 2.0, unit="m", min=0, doc="Dmin: to the target and to other robots")
     margin = Parameter(float, 2.0, min=0, doc="alpha: standard deviations to add to it")
@@ -77,7 +88,12 @@ class RobustController(Actor):
         compile_kernels()
         self._name = self.robot_name or enclosing(self.path)
         tau = 1.0 if self.tube_time == STEPS else self.period
-        self._radius = tube_radius(self.tube_initial, self.tube_growth, tau, self.horizon)
+        # The kernels count steps from t.  From t + period on there is one more of them, and tau is 0 at the first.
+        ahead = 1 if self.horizon_from == DECISION else 0
+        self._steps = self.horizon + ahead
+        self._radius = tube_radius(
+            self.tube_initial - ahead * self.tube_growth * tau, self.tube_growth, tau, self._steps
+        )
         noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
         self._process_noise = noise if self.covariance_noise else np.zeros((4, 4))
         self._applied = np.zeros(2)  # U_t
@@ -101,7 +117,7 @@ class RobustController(Actor):
         solution = self.solver.solve(problem, first_guesses(problem, self._shifted_controls()))
         controls, violation = solution.controls, solution.violation
         if not np.isfinite(controls).all():  # input so large that its squares are not finite
-            controls, violation = braking(problem, self.horizon), math.inf
+            controls, violation = braking(problem, self._steps), math.inf
         self._send(own, problem, controls)
         self._infeasible += violation > 0.0
         self.violation.send(float(violation))
@@ -120,9 +136,9 @@ class RobustController(Actor):
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         from .numerics.horizon import trajectory
 
-        positions = trajectory(problem.position, problem.velocity, controls, self.period, self.horizon)
+        positions = trajectory(problem.position, problem.velocity, controls, self.period, self._steps)
         self._standing = _Standing(self.now, controls, positions)
-        self.plan.send(Plan(self._name, self.now, own, np.vstack([self._applied, controls])))
+        self.plan.send(Plan(self._name, self.now, own, np.vstack([self._applied, controls[: self.horizon]])))
         self._applied = controls[0].copy()
         self.control.send(controls[0].copy())
 
@@ -161,20 +177,20 @@ class RobustController(Actor):
 
     def _tube(self) -> tuple[Array, Array]:
         """f3: centres (N, 2) and radii (N,); it binds where the standing plan reaches, and is free beyond."""
-        centre, radius = np.zeros((self.horizon, 2)), np.full(self.horizon, np.inf)
+        centre, radius = np.zeros((self._steps, 2)), np.full(self._steps, np.inf)
         if self._standing is not None:
             age = self._standing.age(self.now, self.period)
-            reached = max(0, self.horizon - age)
+            reached = max(0, self._steps - age)
             centre[:reached] = self._standing.positions[age:]
             radius[:reached] = self._radius[:reached]
         return centre, radius
 
     def _shifted_controls(self) -> Array:
         """The standing plan from the next period on; zero where it ends."""
-        controls = np.zeros((self.horizon, 2))
+        controls = np.zeros((self._steps, 2))
         if self._standing is not None:
             age = self._standing.age(self.now, self.period)
-            controls[: max(0, self.horizon - age)] = self._standing.controls[age:]
+            controls[: max(0, self._steps - age)] = self._standing.controls[age:]
         return controls
 
     def _predicted_target(self) -> tuple[Array, Array, Array, Array]:
@@ -182,7 +198,7 @@ class RobustController(Actor):
         from .numerics.reachability import propagate
         from .numerics.ukf import constant_velocity, sigma_points
 
-        steps = self.horizon
+        steps = self._steps
         if self._target is None:
             return np.empty((0, steps, 2)), np.empty((0, steps, 3)), np.empty((0, 2)), np.empty(0)
         # Copies, as tokens are read-only and the kernels are compiled for arrays that are not.
@@ -198,7 +214,7 @@ class RobustController(Actor):
         """f5: positions (n, N, 2) and the distances to keep from them (n, N), sorted by the peers' names."""
         from .numerics.reachability import planned_positions
 
-        steps = self.horizon
+        steps = self._steps
         positions, distances = np.empty((len(self._peers), steps, 2)), np.empty((len(self._peers), steps))
         for row, name in enumerate(sorted(self._peers)):
             plan = self._peers[name]

@@ -34,7 +34,9 @@ def plan(robot: str, time: float, x: float = 20.0, y: float = 2.0, controls: obj
 
 
 def make(**parameters: object) -> tuple[Harness, _Recorder]:
+    """A controller whose problems are recorded; steps are counted from now, so that row s - 1 is step s."""
     recorder = _Recorder()
+    parameters = {"horizon_from": "now", **parameters}
     return Harness(RobustController("main.controller", solver=recorder, **parameters)), recorder
 
 
@@ -138,6 +140,31 @@ def test_tube_time_in_seconds() -> None:
     harness, recorder = make(tube_time="seconds")
     harness.fire(0.0, trigger=0, state=state(), peer_plans=[plan("b", 0.0)])
     assert recorder.records[0][0].peer_distance[0, [0, 9]] == pytest.approx([2.0 + 0.48, 2.0 + 1.2])
+
+
+def test_steps_counted_from_the_decision() -> None:
+    from epicycle.actors.robotics.numerics.horizon import trajectory
+
+    harness, recorder = make(horizon_from="decision")
+    for tick in range(2):
+        harness.fire(0.1 * tick, trigger=tick, state=state(), estimate=estimate(), peer_plans=[plan("b", 0.0)])
+    first, second = recorder.records[0][0], recorder.records[1][0]
+    # One row more than N: tau is 0 at t + period, and N steps on at the last.
+    assert first.peer_distance.shape == (1, 11)
+    assert first.peer_distance[0, [0, 1, 10]] == pytest.approx([2.0 + 2 * 0.2, 2.0 + 2 * 0.6, 2.0 + 2 * 4.2])
+    assert second.tube_radius[:10] == pytest.approx(0.2 + 0.4 * np.arange(10))
+    assert np.isinf(second.tube_radius[10])
+    assert harness.last("plan").controls.shape == (11, 2)  # U_t .. U_{t+N}, as ever
+    # Every announced control but the last moves a position: U_{t+N-1} decides the last one.
+    controls = recorder.records[0][2].controls
+    positions = []
+    for row in (8, 9):
+        moved = controls.copy()
+        moved[row] += 1.0
+        positions.append(trajectory(first.position, first.velocity, moved, 0.1, 11)[-1])
+    plain = trajectory(first.position, first.velocity, controls, 0.1, 11)[-1]
+    assert (positions[0] != plain).all()
+    assert (positions[1] == plain).all()
 
 
 def test_covariance_noise_widens_the_prediction() -> None:
