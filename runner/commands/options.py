@@ -1,0 +1,59 @@
+"""The options that several commands share, and what they mean."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..model import Model
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def add_model(command: argparse.ArgumentParser) -> None:
+    """The options that say which model is meant, and what to change in it."""
+    command.add_argument("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model")
+    command.add_argument(
+        "--set",
+        metavar="PATH=VALUE",
+        action="append",
+        default=[],
+        help="set a parameter, such as observers=3 or 'observer[*].sensor.max_range=5 m'; may be repeated",
+    )
+    command.add_argument(
+        "--aspect",
+        metavar="NAME=TYPE,KEY=VALUE,...",
+        action="append",
+        default=[],
+        help="add an aspect, or put it in the place of the one of that name; may be repeated",
+    )
+    command.add_argument(
+        "--without", metavar="NAME", action="append", default=[], help="remove an aspect; may be repeated"
+    )
+
+
+def seed(text: str) -> int:
+    """A seed: a whole number from 0 on."""
+    number = int(text) if text.isdecimal() else -1
+    if not 0 <= number < 2**64:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to 2**64 - 1")
+    return number
+
+
+def load(options: argparse.Namespace) -> tuple[Model, dict[str, Any]]:
+    """The model that the options describe, and its figures."""
+    from ..model import Problems, load_model
+    from ..show import figures_of
+
+    model = load_model(options.model, set=options.set, aspects=options.aspect, without_aspects=options.without)
+    problems = Problems()
+    figures = figures_of(model, problems)
+    problems.raise_if_any()
+    return model, figures
+
+
+def complain(text: str) -> None:
+    """Say what went wrong."""
+    print(text, file=sys.stderr)

@@ -1,0 +1,109 @@
+"""run a model"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import sys
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .options import DONE, add_model, complain, load, seed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ..model import Model
+
+DESCRIPTION = "Run a model once and report what came of it."
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle run``."""
+    add_model(command)
+    command.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
+    command.add_argument("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)")
+    command.add_argument(
+        "--out",
+        metavar="DIR",
+        type=Path,
+        help="folder for manifest, signals and figures (default: results/MODEL; with --json: none)",
+    )
+    command.add_argument(
+        "--log", metavar="FILE", type=Path, help="write the event log to FILE (.parquet, .csv or .jsonl)"
+    )
+    command.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Run the model, report and write what was asked for."""
+    from epicycle.actors import EpicycleError, convert
+
+    from ..engine import ActorError, LoopError, Simulation, check_log_path, write_log
+    from ..show import summary_object, summary_table, write_folder
+
+    if options.log is not None:
+        check_log_path(options.log)
+    until = None
+    if options.until is not None:
+        until = float(convert(options.until, "s"))
+        if not 0.0 <= until < 1e9:
+            raise EpicycleError(f"--until {options.until}: expected a time from 0 s to 1e9 s")
+    model, figures = load(options)
+    folder = options.out or (None if options.json else Path("results") / model.name)
+    if folder is not None and folder.exists() and not folder.is_dir():
+        raise EpicycleError(f"--out {folder} is a file, not a folder")
+    simulation = Simulation(model, seed=options.seed, keep_log=options.log is not None)
+    with progress(model, until) as report:
+        try:
+            results = simulation.run(until=until, progress=report)
+        except (ActorError, LoopError) as error:
+            results = simulation.results("failed")
+            if options.log is not None:
+                write_log(simulation.log.records, options.log)
+            if folder is not None:
+                write_folder(folder, results, {}, ["epicycle", *given], str(error))
+                complain(f"what was recorded until then is in {folder}")
+            raise
+    if options.log is not None:
+        write_log(simulation.log.records, options.log)
+    written = [] if folder is None else write_folder(folder, results, figures, ["epicycle", *given])
+    if options.json:
+        print(json.dumps(summary_object(results)))
+        return DONE
+    from rich.console import Console
+
+    # Piped output has no width of its own; the default of 80 would fold the table.
+    console = Console() if sys.stdout.isatty() else Console(width=120)
+    console.print(summary_table(model, results))
+    for path in written:
+        console.print(f"wrote {path}", highlight=False, markup=False)
+    return DONE
+
+
+@contextmanager
+def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None] | None]:
+    """A bar on a terminal's standard error, and notices of what takes long."""
+    from rich.console import Console
+    from rich.logging import RichHandler
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    notices = logging.getLogger("epicycle")
+    handler = RichHandler(console=console, show_time=False, show_level=False, show_path=False)
+    notices.addHandler(handler)
+    notices.setLevel(logging.INFO)
+    try:
+        if not console.is_terminal:
+            yield None
+            return
+        end = until if until is not None else None if model.stop is None else model.stop / 1e9
+        text = TextColumn("{task.description} {task.completed:.1f} s of model time")
+        with Progress(text, BarColumn(), TimeElapsedColumn(), console=console, transient=True) as bar:
+            task = bar.add_task(model.name, total=end)
+            yield lambda now: bar.update(task, completed=now)
+    finally:
+        notices.removeHandler(handler)

@@ -1,0 +1,22 @@
+"""check a model"""
+
+from __future__ import annotations
+
+import argparse
+
+from .options import DONE, add_model, load
+
+DESCRIPTION = "Check a model without running it."
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle validate``."""
+    add_model(command)
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Load the model, and say how large it is."""
+    model, _ = load(options)
+    wires = sum(1 for _ in model.graph.wires())
+    print(f"{options.model} is valid: {len(model.graph.actors)} actors, {wires} wires, {len(model.aspects)} aspects")
+    return DONE
