@@ -1,7 +1,7 @@
 """The commands of the command line, one a module.
 
-A module's docstring is what ``epicycle --help`` says of it; ``add`` declares its options, ``run`` does it and returns the
-exit code.  Nothing heavy is imported before ``run``, so that ``--help`` answers at once.
+The docstring of a module is what ``epicycle --help`` says of it; ``add`` declares its options, ``run`` does it and
+returns the exit code.  Nothing heavy is imported before ``run``, so that ``--help`` answers at once.
 """
 
 from __future__ import annotations
