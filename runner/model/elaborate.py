@@ -307,6 +307,7 @@ class Elaborator:
         inside = self._parameters(path, composite, part.values, names, part.position)
         if "index" in names:
             inside.setdefault("index", names["index"])
+        self.graph.composites[path] = composite.name
         for direction, ports in (("input", composite.inputs), ("output", composite.outputs)):
             for name in ports:
                 self.graph.add_composite_port(f"{path}.{name}", direction, part.position)

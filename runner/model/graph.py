@@ -52,6 +52,7 @@ class ModelGraph:
     def __init__(self) -> None:
         self.ports: Any = nx.MultiDiGraph()
         self.actors: dict[str, Actor] = {}
+        self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
         self.positions: dict[str, Position] = {}
         self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
         self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
