@@ -1,13 +1,21 @@
-"""Disturbances of communication: they stand at input ports."""
+"""Disturbances of communication: they stand at input ports, and decide whether, when and how a message arrives."""
 
 from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from epicycle.actors import Parameter
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.actors import Parameter, texts_parameter
 
 from .core import CommunicationAspect, JoinPoint
-from .loss import loses
+from .loss import is_bad, loses
+from .tokens import altered
+
+UNIFORM, NORMAL, EXPONENTIAL = "uniform", "normal", "exponential"
+GAUSSIAN, BIT_FLIP = "gaussian", "bit_flip"
+DROP, DELAY = "drop", "delay"
 
 
 class PacketLoss(CommunicationAspect):
@@ -26,3 +34,172 @@ class PacketLoss(CommunicationAspect):
             point.act("dropped", token)
         else:
             point.forward(token)
+
+
+class GilbertElliott(CommunicationAspect):
+    """Drops messages in bursts: a channel that is good or bad, and changes between the two from message to message.
+
+    In the stationary law the channel is bad with probability p / (p + r); it stays bad for 1 / r messages in the mean
+    and good for 1 / p.  The mean loss is (p * loss_bad + r * loss_good) / (p + r).  A loss of 25 % in bursts of four:
+    ``r: 0.25, p: 0.0833``.  Event: ``dropped``.  Source: Gilbert, Bell Syst. Tech. J. 39, 1960; Elliott, 42, 1963.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("dropped",)
+
+    p = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a good channel turns bad, per message")
+    r = Parameter(float, 1.0, min=0.0, max=1.0, unit="1", doc="probability that a bad channel recovers, per message")
+    loss_bad = Parameter(float, 1.0, min=0.0, max=1.0, unit="1", doc="probability of loss while the channel is bad")
+    loss_good = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability of loss while it is good")
+    spare_first = Parameter(bool, False, doc="messages of the first tag at which any arrives always pass")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        bad = is_bad(point, self.p, self.r)
+        if loses(point, self.loss_bad if bad else self.loss_good, self.spare_first):
+            point.act("dropped", token)
+        else:
+            point.forward(token)
+
+
+class Latency(CommunicationAspect):
+    """Delays each message by ``delay`` and a random part.
+
+    uniform: ``delay`` + U(-jitter, jitter); normal: ``delay`` + N(0, jitter^2); both cut off at 0.
+    exponential: ``delay`` + Exp(mean ``jitter``).  One number is drawn for every message.
+    Unless ``reordering`` is allowed, a message waits for the one before it.  Event: ``delayed``, with the seconds.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("delayed",)
+
+    delay = Parameter(float, 0.0, min=0.0, unit="s", doc="fixed part of the delay")
+    jitter = Parameter(float, 0.0, min=0.0, unit="s", doc="size of the random part, see the distribution")
+    distribution = Parameter(str, UNIFORM, choices=(UNIFORM, NORMAL, EXPONENTIAL), doc="law of the random part")
+    reordering = Parameter(bool, False, doc="whether a message may overtake an earlier one")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        if self.distribution == UNIFORM:
+            extra = point.random.uniform(-1.0, 1.0)
+        elif self.distribution == NORMAL:
+            extra = point.random.standard_normal()
+        else:
+            extra = point.random.standard_exponential()
+        delay = max(0.0, self.delay + self.jitter * extra)
+        if not self.reordering:
+            delay = max(delay, point.memory.get("last", 0.0) - point.now)
+            point.memory["last"] = point.now + delay
+        if delay == 0.0:
+            point.forward(token)
+            return
+        point.act("delayed", token, delay)
+        point.forward(token, delay)
+
+
+class Duplicate(CommunicationAspect):
+    """Delivers a message more than once, with a fixed probability.
+
+    Event: ``duplicated``, with the number of copies.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("duplicated",)
+
+    probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is duplicated")
+    copies = Parameter(int, 1, min=1, max=1000, doc="how many further times it is delivered")
+    spacing = Parameter(float, 0.0, min=0.0, unit="s", doc="time between the copies; 0 is the next microstep")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        point.forward(token)
+        if point.random.random() < self.probability:
+            point.act("duplicated", token, self.copies)
+            for copy in range(1, self.copies + 1):
+                point.forward(token, copy * self.spacing)
+
+
+class Reorder(CommunicationAspect):
+    """Holds a message back until later ones have overtaken it, with a fixed probability.
+
+    A message that is still held when the run ends is never delivered.  Events: ``held``, ``released``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("held", "released")
+
+    probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is held back")
+    overtaken_by = Parameter(int, 1, min=1, doc="how many later messages pass before it is delivered")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        held: list[list[Any]] = point.memory.setdefault("held", [])  # [messages still to pass, token]
+        if point.random.random() < self.probability:
+            point.act("held", token)
+            held.append([self.overtaken_by, token])
+            return
+        point.forward(token)
+        for waiting in held:
+            waiting[0] -= 1
+        while held and held[0][0] <= 0:
+            late = held.pop(0)[1]
+            point.act("released", late)
+            point.forward(late)
+
+
+class Corrupt(CommunicationAspect):
+    """Damages the numbers in a message, with a fixed probability.
+
+    gaussian: adds N(0, deviation^2) to each.  bit_flip: turns one random bit of the 64 of each; what is not finite
+    then is up to the receiver.  Event: ``corrupted``, with the new message.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("corrupted",)
+
+    probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is damaged")
+    kind = Parameter(str, GAUSSIAN, choices=(GAUSSIAN, BIT_FLIP), doc="what happens to a number")
+    deviation = Parameter(float, 1.0, min=0.0, doc="standard deviation of the error, in the number's own unit")
+    fields = texts_parameter((), doc="fields of the message that can be damaged; none: all numbers in it")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        hit = point.random.random() < self.probability
+        if self.kind == BIT_FLIP:
+            new = altered(token, self.fields, lambda numbers: _flip(numbers, point.random))
+        else:
+            new = altered(
+                token, self.fields, lambda numbers: numbers + self.deviation * point.random.normal(size=numbers.shape)
+            )
+        if not hit:
+            point.forward(token)
+            return
+        point.act("corrupted", token, new)
+        point.forward(new)
+
+
+def _flip(numbers: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
+    """Each number with one bit of its IEEE 754 form turned."""
+    bits = np.left_shift(np.uint64(1), random.integers(0, 64, numbers.shape, dtype=np.uint64))
+    return (numbers.view(np.uint64) ^ bits).view(np.float64)
+
+
+class Throttle(CommunicationAspect):
+    """Lets through at most ``rate`` messages a second in the long run, and ``burst`` at once (token bucket).
+
+    The bucket holds ``burst`` permits, is full at first and gains ``rate`` of them a second; each message takes one.
+    What comes to an empty bucket is dropped (policing) or waits for its permit in order (shaping).
+    Events: ``dropped``; ``delayed``, with the seconds.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("dropped", "delayed")
+
+    rate = Parameter(float, min=1e-9, unit="1/s", doc="messages a second")
+    burst = Parameter(int, 1, min=1, doc="messages that may pass at once")
+    excess = Parameter(str, DROP, choices=(DROP, DELAY), doc="what happens to a message beyond that")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        # Permits below zero are promised to messages that wait.
+        permits, since = point.memory.get("permits", (float(self.burst), point.now))
+        permits = min(float(self.burst), permits + (point.now - since) * self.rate)
+        if permits >= 1.0 - 1e-9:  # rounding must not cost a message that comes exactly on time
+            point.memory["permits"] = (permits - 1.0, point.now)
+            point.forward(token)
+        elif self.excess == DROP:
+            point.memory["permits"] = (permits, point.now)
+            point.act("dropped", token)
+        else:
+            point.memory["permits"] = (permits - 1.0, point.now)
+            delay = (1.0 - permits) / self.rate
+            point.act("delayed", token, delay)
+            point.forward(token, delay)

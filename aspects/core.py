@@ -52,7 +52,7 @@ class JoinPoint:
         self.aspect = aspect
         self.port = port
         self.counts: dict[str, int] = {}
-        self.memory: dict[str, Any] = {}
+        self.memory: dict[Any, Any] = {}
         self.random: np.random.Generator = random_stream(weaver.seed, port, f"aspect {aspect}")
         self._weaver = weaver
         self._forward = forward
@@ -74,10 +74,13 @@ class JoinPoint:
         else:
             self._weaver.later(to_nanoseconds(delay), self._forward, token)
 
-    def act(self, event: str, token: Any) -> None:
-        """Count an event and write it, with the token as it came, into the event log."""
+    def act(self, event: str, token: Any, *details: Any) -> None:
+        """Count an event and write it into the event log: the token as it came, then what was done to it.
+
+        Details are a new token or a delay in seconds; with details the logged value is a list.
+        """
         self.counts[event] = self.counts.get(event, 0) + 1
-        self._weaver.note(self.aspect, self.port, event, token)
+        self._weaver.note(self.aspect, self.port, event, [token, *details] if details else token)
 
 
 class Aspect(Configurable):

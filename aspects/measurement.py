@@ -1,28 +1,199 @@
-"""Disturbances of measurement: they stand at output ports."""
+"""Disturbances of measurement: they stand at output ports, and decide what a sensor seems to have measured."""
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
-from epicycle.actors import Parameter
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.actors import EpicycleError, Parameter, texts_parameter
 
 from .core import JoinPoint, MeasurementAspect
-from .loss import loses
+from .loss import is_bad, loses, spared
+from .tokens import altered
+
+NORMAL, UNIFORM, LAPLACE = "normal", "uniform", "laplace"
+Numbers = NDArray[np.float64]
 
 
 class MeasurementFailure(MeasurementAspect):
-    """Suppresses each measurement with a fixed probability, before anybody receives it (Bernoulli).
+    """Suppresses measurements with a fixed probability, before anybody receives them.
 
+    Without ``burst`` each fails independently (Bernoulli).  With it, failures come in runs of that mean length (a
+    Markov chain over the measurements: failing ends with probability r = 1 / burst and begins with
+    p = r * probability / (1 - probability)).
     Event: ``failed``.  Paper: the sensor error of the disturbance level, section III.A.
     """
 
     events: ClassVar[tuple[str, ...]] = ("failed",)
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a measurement fails")
+    burst: Parameter[float | None] = Parameter(
+        float, None, min=1.0, doc="mean number of failures in a row; none: independent failures"
+    )
     spare_first = Parameter(bool, False, doc="measurements of the first tag always pass")
 
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        if self.burst is not None and self.probability > self.burst / (self.burst + 1.0):
+            raise EpicycleError(
+                f"a failure probability of {self.probability:g} cannot come in runs of {self.burst:g} in the mean: "
+                f"a working sensor works for one measurement at least; burst must be "
+                + ("infinite" if self.probability == 1.0 else f">= {self.probability / (1.0 - self.probability):g}")
+            )
+
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        if loses(point, self.probability, self.spare_first):
+        if self.burst is None:
+            failed = loses(point, self.probability, self.spare_first)
+        else:
+            recovers = 1.0 / self.burst
+            worsens = recovers * self.probability / (1.0 - self.probability)
+            failed = spared(point, is_bad(point, worsens, recovers), self.spare_first)
+        if failed:
             point.act("failed", token)
         else:
+            point.forward(token)
+
+
+class Alteration(MeasurementAspect, ABC):
+    """Base of the aspects that replace the numbers in a measurement: write ``alter``.
+
+    Event: ``replaced``, with the new measurement.  A measurement that stays the same leaves no trace.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("replaced",)
+
+    fields = texts_parameter((), doc="fields of the measurement that are altered; none: all numbers in it")
+
+    @abstractmethod
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        """What the numbers of one field (flat) become; called once a field, in their order."""
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        changed = False
+
+        def change(numbers: Numbers) -> Numbers:
+            nonlocal changed
+            new = self.alter(numbers, point)
+            changed = changed or not np.array_equal(new, numbers, equal_nan=True)
+            return new
+
+        new = altered(token, self.fields, change)
+        if not changed:
+            point.forward(token)
+            return
+        point.act("replaced", token, new)
+        point.forward(new)
+
+
+class Noise(Alteration):
+    """Adds independent random errors of mean 0 and the given standard deviation."""
+
+    deviation = Parameter(float, min=0.0, doc="standard deviation, in the number's own unit")
+    distribution = Parameter(str, NORMAL, choices=(NORMAL, UNIFORM, LAPLACE), doc="law of the error")
+
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        if self.distribution == NORMAL:
+            errors = point.random.normal(size=numbers.shape)
+        elif self.distribution == UNIFORM:
+            errors = point.random.uniform(-math.sqrt(3.0), math.sqrt(3.0), numbers.shape)
+        else:
+            errors = point.random.laplace(scale=math.sqrt(0.5), size=numbers.shape)
+        return numbers + self.deviation * errors
+
+
+class Bias(Alteration):
+    """Adds a constant error."""
+
+    by = Parameter(float, doc="what is added to each number, in its own unit")
+
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        return numbers + self.by
+
+
+class Drift(Alteration):
+    """Adds an error that grows: ``rate`` * t + ``walk`` * W(t), each number with a Wiener process W of its own.
+
+    t is counted from the first measurement; the variance of the random part is ``walk``^2 * t.
+    """
+
+    rate = Parameter(float, 0.0, doc="steady growth, in the number's own unit per second")
+    walk = Parameter(float, 0.0, min=0.0, doc="random growth, in the number's own unit per square root of a second")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        point.memory["field"] = 0
+        super().pass_token(token, point)
+        point.memory["last"] = point.now
+
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        field = point.memory["field"]
+        start: float = point.memory.setdefault("start", point.now)
+        step: float = point.now - point.memory.get("last", point.now)
+        point.memory["field"] = field + 1
+        place = (field, numbers.size)  # tokens of another size have errors of their own
+        walked: Numbers = point.memory.get(place, np.zeros(numbers.shape))
+        walked = walked + math.sqrt(step) * point.random.normal(size=numbers.shape)
+        point.memory[place] = walked
+        return numbers + self.rate * (point.now - start) + self.walk * walked
+
+
+class Outlier(Alteration):
+    """Adds a gross error N(0, deviation^2) now and then, to each number independently."""
+
+    probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a number is an outlier")
+    deviation = Parameter(float, min=0.0, doc="standard deviation of the gross error, in the number's own unit")
+
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        hit = point.random.random(numbers.shape) < self.probability
+        return numbers + np.where(hit, self.deviation * point.random.normal(size=numbers.shape), 0.0)
+
+
+class Quantise(Alteration):
+    """Rounds to the nearest multiple of a step, ties to the even one; 0 rounds nothing."""
+
+    step = Parameter(float, min=0.0, doc="size of the step, in the number's own unit")
+
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        return numbers if self.step == 0.0 else self.step * np.rint(numbers / self.step)
+
+
+class Saturate(Alteration):
+    """Cuts numbers off at what the sensor can show."""
+
+    low = Parameter(float, -math.inf, doc="smallest number, in its own unit")
+    high = Parameter(float, math.inf, doc="largest number, in its own unit")
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        if self.low > self.high:
+            raise EpicycleError(f"low {self.low:g} is above high {self.high:g}")
+
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        return np.clip(numbers, self.low, self.high)
+
+
+class StuckAt(MeasurementAspect):
+    """Repeats the last good measurement while the sensor is stuck.
+
+    From measurement to measurement a working sensor gets stuck with probability ``p`` and a stuck one comes free with
+    probability ``r``; the first measurement is always good.  Event: ``replaced``, with the old measurement.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("replaced",)
+
+    p = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability of getting stuck, per measurement")
+    r = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability of coming free, per measurement")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        stuck = point.memory.setdefault("bad", False)
+        if "good" in point.memory:
+            stuck = is_bad(point, self.p, self.r)
+        if stuck:
+            point.act("replaced", token, point.memory["good"])
+            point.forward(point.memory["good"])
+        else:
+            point.memory["good"] = token
             point.forward(token)

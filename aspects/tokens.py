@@ -1,0 +1,64 @@
+"""Changing the numbers inside a token, whatever its kind: for aspects that alter what a port carries."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.actors import EpicycleError
+
+Change = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+class FieldError(EpicycleError):
+    """A token without the field, or without the numbers, that an aspect is to alter."""
+
+
+def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
+    """The token with ``change`` applied to its numbers: all of them, or those of the named fields alone.
+
+    A token may be a number, an array, a list or tuple of these, a dataclass or a dict.  Texts and truth values stay as
+    they are, and an integer stays an integer (rounded to even).  Raises ``FieldError``.
+    """
+    if not fields:
+        return _changed(token, change)
+    if isinstance(token, dict):
+        names = list(token)
+    elif dataclasses.is_dataclass(token) and not isinstance(token, type):
+        names = [each.name for each in dataclasses.fields(token)]
+    else:
+        raise FieldError(f"a token of type {type(token).__name__} has no fields; leave out 'fields' to alter all of it")
+    for name in fields:
+        if name not in names:
+            raise FieldError(f"{type(token).__name__} has no field {name!r}; its fields: {', '.join(map(str, names))}")
+    if isinstance(token, dict):
+        return {name: _changed(value, change) if name in fields else value for name, value in token.items()}
+    return dataclasses.replace(token, **{name: _changed(getattr(token, name), change) for name in fields})
+
+
+def _changed(value: Any, change: Change) -> Any:
+    if isinstance(value, (bool, np.bool_, str)) or value is None:
+        return value
+    if isinstance(value, (int, np.integer)):
+        number = float(change(np.array([float(value)]))[0])
+        return round(number) if np.isfinite(number) else number
+    if isinstance(value, (float, np.floating)):
+        return float(change(np.array([float(value)]))[0])
+    if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
+        array = change(value.astype(np.float64).ravel()).reshape(value.shape)
+        if value.dtype.kind != "f":
+            array = np.rint(array)
+        array.flags.writeable = False
+        return array
+    if isinstance(value, (list, tuple)):
+        return type(value)([_changed(item, change) for item in value])
+    if isinstance(value, dict):
+        return {key: _changed(item, change) for key, item in value.items()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        names = [each.name for each in dataclasses.fields(value)]
+        return dataclasses.replace(value, **{name: _changed(getattr(value, name), change) for name in names})
+    raise FieldError(f"a token of type {type(value).__name__} holds no numbers to alter")
