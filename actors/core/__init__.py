@@ -13,6 +13,7 @@ from .parameter import (
     unknown_parameter,
     variants,
 )
+from .port_parameter import PortParameter
 from .ports import InputPort, OutputPort, PortError, accepts, type_name
 from .process import Process
 from .random import random_stream
@@ -31,6 +32,7 @@ __all__ = [
     "Parameter",
     "ParameterError",
     "PortError",
+    "PortParameter",
     "Process",
     "Tag",
     "UnitError",

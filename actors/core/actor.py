@@ -31,6 +31,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from .parameter import Configurable
+from .port_parameter import ParameterPort, PortParameter
 from .ports import InputPort, OutputPort
 from .random import random_stream
 from .tag import Tag, to_nanoseconds, to_seconds
@@ -95,7 +96,8 @@ class Actor(Configurable):
         self.outputs: dict[str, OutputPort[Any]] = {}
         for name, port in declared_ports(type(self)).items():
             bound = port.bind(self)
-            self.__dict__[name] = bound
+            if not isinstance(bound, ParameterPort):  # the name reads as the parameter's value
+                self.__dict__[name] = bound
             if isinstance(bound, InputPort):
                 self.inputs[name] = bound
             else:
@@ -115,6 +117,9 @@ class Actor(Configurable):
         """Engine: the actor becomes part of a run."""
         self._context = context
         self._streams.clear()
+        for port in self.inputs.values():
+            if isinstance(port, ParameterPort):
+                port.reset()
 
     @property
     def context(self) -> Context:
@@ -160,4 +165,6 @@ def declared_ports(cls: type) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         for name, value in vars(base).items():
             if isinstance(value, (InputPort, OutputPort)):
                 found[name] = value
+            elif isinstance(value, PortParameter):
+                found[name] = value.port
     return found

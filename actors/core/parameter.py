@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import math
+import types
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, overload
 
 import numpy as np
@@ -28,19 +30,30 @@ class _Required:
 
 
 REQUIRED: Any = _Required()
+_WORDS: dict[Any, str] = {
+    float: "number",
+    int | float: "number",
+    int: "integer",
+    bool: "true or false",
+    str: "text",
+    Path: "file",
+    object: "any value",
+}
 
 
 class Parameter(Generic[T]):
     """A declared parameter: reads as its value on an instance, as itself on the class.
 
-    ``type`` is ``float``, ``int``, ``bool``, ``str`` or a ``Configurable`` class (then the value is a mapping with a
-    ``type`` key that names one of its subclasses).  A number may come as text with a unit (``"8 m/s"``); it is
-    converted to ``unit``.  ``shape`` makes it an array of floats: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
+    ``type`` is ``float``, ``int``, ``bool``, ``str``, ``Path``, ``object`` (any value that YAML can write, for tokens)
+    or a ``Configurable`` class (then the value is a mapping with a ``type`` key that names one of its subclasses).
+    A number may come as text with a unit (``"8 m/s"``); it is converted to ``unit``.  ``shape`` makes it an array of
+    floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and ``object``, ``(None,)`` a tuple.
+    ``int | float`` is a number that stays an integer if it is one.
     """
 
     def __init__(
         self,
-        type: type[T],
+        type: type[T] | types.UnionType,
         default: T | None = REQUIRED,
         *,
         unit: str = "",
@@ -84,11 +97,11 @@ class Parameter(Generic[T]):
         """The type in words, for messages and the reference."""
         if isinstance(self.type, type) and issubclass(self.type, Configurable):
             return " or ".join(sorted(variants(self.type)))
-        word = {float: "number", int: "integer", bool: "true or false", str: "text"}[self.type]
+        word = _WORDS[self.type]
         if self.shape is None:
             return word
-        if self.type is str:
-            return "list of texts"
+        if self.type in (str, object):
+            return "list of texts" if self.type is str else "list of values"
         sizes = " x ".join("n" if size is None else str(size) for size in self.shape)
         return f"list of {sizes} {word}s"
 
@@ -100,9 +113,9 @@ class Parameter(Generic[T]):
             raise ParameterError(f"a value is missing, expected {self._expected()}")
         if isinstance(self.type, type) and issubclass(self.type, Configurable):
             return build_variant(self.type, value)  # type: ignore[return-value]
-        if self.shape is not None and self.type is str:
-            texts = [value] if isinstance(value, str) else self._rows(value, self.shape, value)
-            return tuple(texts)  # type: ignore[arg-type, return-value]
+        if self.shape is not None and self.type in (str, object):
+            items = [value] if self.type is str and isinstance(value, str) else self._rows(value, self.shape, value)
+            return tuple(items)  # type: ignore[arg-type, return-value]
         if self.shape is not None:
             return self._array(value)  # type: ignore[return-value]
         result: Any = self._scalar(value)
@@ -112,7 +125,7 @@ class Parameter(Generic[T]):
         text = self.describe_type()
         if self.choices:
             return f"one of {', '.join(self.choices)}"
-        if text in ("number", "integer", "text") or self.shape is not None:
+        if text in ("number", "integer", "text", "file") or self.shape is not None:
             text = f"an {text}" if text == "integer" else f"a {text}"
         if self.unit and self.unit != "1":
             text += f" in {self.unit}"
@@ -125,7 +138,12 @@ class Parameter(Generic[T]):
         return text
 
     def _scalar(self, value: object) -> object:
-        if self.type is bool:
+        if self.type is object:
+            return value
+        if self.type is Path:
+            if isinstance(value, (str, Path)) and str(value) and "\0" not in str(value):
+                return Path(value)
+        elif self.type is bool:
             if isinstance(value, (bool, np.bool_)):
                 return bool(value)
         elif self.type is str:
@@ -149,7 +167,7 @@ class Parameter(Generic[T]):
             number = float(value)
         except OverflowError:
             raise ParameterError(f"{_shown(value)} is too large, expected {self._expected()}") from None
-        if self.type is float:
+        if self.type is float or (self.type is not int and not isinstance(value, (int, np.integer))):
             return number
         if not number.is_integer():  # nor are nan and the infinities
             raise ParameterError(f"{_shown(value)} is not {self._expected()}")

@@ -7,6 +7,7 @@ computed from it is not judged; an actor that cannot be made leaves its ports in
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from pathlib import Path
 
 from epicycle.actors import (
     Actor,
@@ -21,6 +22,7 @@ from .catalogue import Catalogue
 from .checks import check
 from .declarations import CompositeText, ModelText, PartText
 from .document import Entry
+from .files import data_file
 from .graph import ModelGraph
 from .model import Model
 from .observation import Observation
@@ -202,6 +204,8 @@ class Elaborator:
                 continue
             try:
                 result[name] = parameter.convert(value)
+                if parameter.type is Path and result[name] is not None:
+                    result[name] = data_file(Path(value), node.position)
             except ParameterError as error:
                 self.problems.add(f"{label}.{name}: {error}", node.position, scope=composite)
         return result if complete and len(self.problems) == before else None

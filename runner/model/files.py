@@ -1,0 +1,35 @@
+"""Files that a model names: found from where the name is written, and never outside of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from epicycle.actors import ParameterError
+
+from .problems import Position, did_you_mean
+
+COMMAND_LINE = "command line"  # the file of a position in an option
+
+
+def data_file(name: Path, position: Position) -> Path:
+    """The file of that name; raises ``ParameterError`` if there is none, or if the model may not read it.
+
+    A name in a YAML file means a file in or below the folder of that YAML file, so that a model can be moved with its
+    data and cannot make us read anything else.  A name on the command line is the user's own word: it is taken from
+    the working directory and may lead anywhere.
+    """
+    folder = Path(position.file).parent
+    target = name if position.file == COMMAND_LINE else folder / name
+    try:
+        if position.file != COMMAND_LINE and not target.resolve().is_relative_to(folder.resolve()):
+            raise ParameterError(
+                f"{str(name)!r} cannot be read: a file named in a model lies in or below the folder of its YAML file"
+            )
+        if target.is_file():
+            return target
+        if target.is_dir():
+            raise ParameterError(f"{str(name)!r} is a folder, not a file")
+        beside = sorted(each.name for each in target.parent.iterdir()) if target.parent.is_dir() else []
+    except (OSError, RuntimeError, ValueError) as error:  # endless links, too long a name
+        raise ParameterError(f"{str(name)!r} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    raise ParameterError(f"there is no file {str(name)!r}{did_you_mean(name.name, beside)}")

@@ -1,0 +1,66 @@
+"""Files that a model names: beside or below its own YAML file, or named by the user."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from epicycle.actors import Actor, Parameter
+from epicycle.runner.model import ModelError, load_model
+
+
+class Reader(Actor):
+    """Names a file."""
+
+    file = Parameter(Path, doc="what is read")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    inner = tmp_path / "inner"
+    (inner / "data").mkdir(parents=True)
+    (inner / "data" / "a.csv").write_text("1")
+    (tmp_path / "secret.csv").write_text("2")
+    (inner / "link.csv").symlink_to(tmp_path / "secret.csv")
+    return inner
+
+
+def load(folder: Path, file: str, *settings: str) -> Path:
+    path = folder / "m.yaml"
+    path.write_text(f"model: m\nactors:\n  reader: {{type: Reader, file: {file}}}\n")
+    reader = load_model(path, set=settings, types=[Reader]).graph.actors["reader"]
+    assert isinstance(reader, Reader)
+    return reader.file
+
+
+def test_a_file_below_the_model(folder: Path) -> None:
+    assert load(folder, "data/a.csv").read_text() == "1"
+    assert load(folder, "data/../data/a.csv").read_text() == "1"
+
+
+def test_the_user_may_name_any_file(folder: Path) -> None:
+    assert load(folder, "data/a.csv", f"reader.file={folder.parent / 'secret.csv'}").read_text() == "2"
+
+
+OUTSIDE = "cannot be read: a file named in a model lies in or below the folder of its YAML file"
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("../secret.csv", f"'../secret.csv' {OUTSIDE}"),
+        ("link.csv", f"'link.csv' {OUTSIDE}"),
+        ("/etc/passwd", f"'/etc/passwd' {OUTSIDE}"),
+        ("data", "'data' is a folder, not a file"),
+        ("data/b.csv", "there is no file 'data/b.csv', did you mean 'a.csv'?"),
+        ("a" * 300, f"{'a' * 300!r} cannot be read: File name too long"),
+    ],
+)
+def test_what_cannot_be_read(folder: Path, file: str, message: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        load(folder, file)
+    [problem] = caught.value.problems
+    assert problem.message == f"reader.file: {message}"
+    assert problem.position is not None
+    assert (problem.position.line, problem.position.column) == (3, 32)
