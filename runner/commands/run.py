@@ -100,7 +100,7 @@ def progress(model: Model, until: float | None) -> Iterator[Callable[[float], No
         if not console.is_terminal:
             yield None
             return
-        end = until if until is not None else None if model.stop is None else model.stop / 1e9
+        end = until if until is not None else model.stop
         text = TextColumn("{task.description} {task.completed:.1f} s of model time")
         with Progress(text, BarColumn(), TimeElapsedColumn(), console=console, transient=True) as bar:
             task = bar.add_task(model.name, total=end)

@@ -3,7 +3,8 @@
 from .director import ActorError, Director, LoopError
 from .encoding import canonical, plain, scalars
 from .log import EventLog, LogError, Record, check_log_path, write_log
-from .results import Results, Signal
+from .results import Results
+from .signal import Signal, SignalError
 from .simulation import Simulation
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Record",
     "Results",
     "Signal",
+    "SignalError",
     "Simulation",
     "canonical",
     "check_log_path",

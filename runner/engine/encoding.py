@@ -113,19 +113,28 @@ def _named(name: str, value: Any) -> bytes:
     return _text(name) + canonical(value)
 
 
-def scalars(token: Any, field: str = "") -> Iterator[tuple[str, float]]:
-    """The numbers inside a token with the names of their places, e.g. ``("position[0]", 1.5)``."""
-    if isinstance(token, (bool, int, float, np.number, np.bool_)) and not isinstance(token, np.complexfloating):
-        try:
-            yield field, float(token)
-        except OverflowError:  # an int beyond all floats
-            yield field, float("inf") if token > 0 else float("-inf")
+def leaves(token: Any, field: str = "") -> Iterator[tuple[str, Any]]:
+    """What a token is made of in the end, with the names of the places, e.g. ``("position[0]", 1.5)``."""
+    if isinstance(token, np.ndarray) and token.ndim == 0:
+        yield field, token.item()
     elif isinstance(token, (np.ndarray, list, tuple)):
         for index, item in enumerate(token):
-            yield from scalars(item, f"{field}[{index}]")
+            yield from leaves(item, f"{field}[{index}]")
     elif isinstance(token, dict):
         for key, item in token.items():
-            yield from scalars(item, f"{field}.{key}" if field else str(key))
+            yield from leaves(item, f"{field}.{key}" if field else str(key))
     elif dataclasses.is_dataclass(token) and not isinstance(token, type):
         for name in field_names(type(token)):
-            yield from scalars(getattr(token, name), f"{field}.{name}" if field else name)
+            yield from leaves(getattr(token, name), f"{field}.{name}" if field else name)
+    else:
+        yield field, token
+
+
+def scalars(token: Any) -> Iterator[tuple[str, float]]:
+    """The numbers among the leaves of a token, as floats."""
+    for place, leaf in leaves(token):
+        if isinstance(leaf, (bool, int, float, np.number, np.bool_)) and not isinstance(leaf, np.complexfloating):
+            try:
+                yield place, float(leaf)
+            except OverflowError:  # an int beyond all floats
+                yield place, float("inf") if leaf > 0 else float("-inf")

@@ -6,11 +6,15 @@ import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, Tag, to_seconds
 
+from ..tables import pandas_module
 from .encoding import canonical, plain
+
+if TYPE_CHECKING:
+    import pandas
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
 FORMATS = (".parquet", ".csv", ".jsonl")
@@ -67,6 +71,14 @@ class EventLog:
         self._hash.update(canonical(value))
         if self._keep:
             self.records.append(Record(tag, event, actor, port, channel, aspect, value))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each record, with the columns of a log file; raises ``LogError`` if the records were not kept."""
+        if not self._keep:
+            raise LogError("the event log was not kept: make the run with Simulation(model, keep_log=True)")
+        rows = [(*record.row()[:-1], record.value) for record in self.records]
+        frame: pandas.DataFrame = pandas_module().DataFrame(rows, columns=list(COLUMNS))
+        return frame
 
     @property
     def digest(self) -> str:

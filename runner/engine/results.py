@@ -3,33 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import Tag, to_seconds
+from epicycle.actors import to_seconds
 
+from ..model import did_you_mean
+from ..tables import Table, as_html, as_text, pandas_module
 from .encoding import scalars
 from .log import EventLog
+from .signal import Signal, SignalError, short
 
-
-@dataclass
-class Signal:
-    """What one port sent: tags and tokens, in order."""
-
-    name: str
-    tags: list[Tag] = field(default_factory=list)
-    tokens: list[Any] = field(default_factory=list)
-
-    def add(self, tag: Tag, token: Any) -> None:
-        """Append a token."""
-        self.tags.append(tag)
-        self.tokens.append(token)
-
-    @property
-    def times(self) -> list[float]:
-        """The times in seconds."""
-        return [to_seconds(tag.time) for tag in self.tags]
+if TYPE_CHECKING:
+    import pandas
 
 
 class Reduction:
@@ -72,9 +59,13 @@ def _nan_or(choose: Callable[..., Any], first: Any, second: Any) -> Any:
     return math.nan if math.isnan(first) or math.isnan(second) else choose(first, second)
 
 
-@dataclass
+@dataclass(repr=False)
 class Results:
-    """The outcome of one run."""
+    """The outcome of one run: ``metrics``, recorded ``signals``, counts of ``aspects``, the ``log`` and its ``digest``.
+
+    >>> results = Simulation(model, seed=7).run()
+    >>> results.metrics["mean_wait"], results["server.output"].values
+    """
 
     model: str
     seed: int
@@ -87,6 +78,7 @@ class Results:
     stopped: str  # why the run ended
     firings: int
     wall_time: float  # s
+    units: dict[str, str] = field(default_factory=dict)  # of the metrics
 
     @property
     def events(self) -> int:
@@ -97,6 +89,21 @@ class Results:
     def digest(self) -> str:
         """SHA-256 of the event log."""
         return self.log.digest
+
+    def __getitem__(self, name: str) -> Signal:
+        """A recorded signal; raises ``SignalError``."""
+        if name not in self.signals:
+            known = list(self.signals)
+            raise SignalError(
+                f"{name!r} was not recorded{did_you_mean(name, known)}; recorded: {', '.join(known) or 'nothing'}"
+            )
+        return self.signals[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.signals)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
 
     def table(self) -> dict[str, list[Any]]:
         """All recorded numbers in long form, the columns of ``signals.parquet``."""
@@ -110,3 +117,50 @@ class Results:
                     table["field"].append(place)
                     table["value"].append(value)
         return table
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """All recorded numbers in long form: ``time`` (s), ``microstep``, ``signal``, ``field``, ``value``."""
+        frame: pandas.DataFrame = pandas_module().DataFrame(self.table())
+        return frame
+
+    def frame(self, name: str) -> pandas.DataFrame:
+        """One signal as ``Signal.to_pandas`` gives it."""
+        return self[name].to_pandas()
+
+    def __repr__(self) -> str:
+        return (
+            f"<Results of {self.model}, seed {self.seed}: {self.end:g} s, ended by {self.stopped}, "
+            f"{self.events:,} events, digest {self.digest[:16]}...>"
+        )
+
+    def __str__(self) -> str:
+        return as_text(self._caption(), self._tables())
+
+    def _repr_html_(self) -> str:
+        return as_html(self._caption(), self._tables())
+
+    def _caption(self) -> str:
+        return f"{self.model}, seed {self.seed}: {self.end:g} s of model time, ended by {self.stopped}"
+
+    def _tables(self) -> list[Table]:
+        counts = [
+            (name, event, f"{count:,}") for name, events in self.aspects.items() for event, count in events.items()
+        ]
+        run = [
+            ("events", f"{self.events:,}"),
+            ("firings", f"{self.firings:,}"),
+            ("wall time", f"{self.wall_time:.3f} s"),
+            ("digest", f"{self.digest[:16]}..."),
+        ]
+        return [
+            Table(
+                ("metric", "value", "unit"),
+                [
+                    (name, "-" if value is None else short(value), self.units.get(name, ""))
+                    for name, value in self.metrics.items()
+                ],
+            ),
+            Table(("aspect", "event", "count"), counts),
+            Table(("signal", "tokens"), [(name, f"{len(signal):,}") for name, signal in self.signals.items()]),
+            Table(("run", ""), run),
+        ]

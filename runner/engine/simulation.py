@@ -22,7 +22,8 @@ from epicycle.aspects import JoinPoint
 from ..model import Hop, Model, WovenAspect
 from .director import ActorError, Director, describe
 from .log import EventLog
-from .results import Reduction, Results, Signal
+from .results import Reduction, Results
+from .signal import Signal
 
 Deliver = Callable[[Any], None]
 Emit = Callable[[Any, int | None], None]
@@ -42,7 +43,7 @@ class Simulation:
         self.log = EventLog(keep_log)
         self.director = Director(model.graph.firing_order(), self.seed)
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
-        self.signals = {name: Signal(name) for name in model.record}
+        self.signals = {name: Signal(name) for name in model.recorded}
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
         self._listeners: dict[str, list[Deliver]] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
@@ -78,7 +79,7 @@ class Simulation:
         for metric, reduction in self._reductions:
             for path in metric.ports:
                 self._hear(path, reduction.add)
-        for path in self.model.stop_when:
+        for path in self.model.stop_ports:
             self._hear(path, self._ask_to_stop)
 
     def _hear(self, path: str, listener: Deliver) -> None:
@@ -212,7 +213,7 @@ class Simulation:
         if self._has_run:
             raise RuntimeError("a Simulation runs once: make another one for another run")
         self._has_run = True
-        stop = self.model.stop if until is None else to_nanoseconds(until)
+        stop = self.model.stop_time if until is None else to_nanoseconds(until)
         actors = list(self.model.graph.actors.values())
         director = self.director
         for actor in actors:
@@ -253,6 +254,7 @@ class Simulation:
             stopped=stopped,
             firings=self.director.firings,
             wall_time=time.perf_counter() - self._started,
+            units={metric.name: metric.unit for metric in self.model.metrics},
         )
 
     def _wrap_up(self, actors: list[Actor]) -> ActorError | None:

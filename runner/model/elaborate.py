@@ -78,14 +78,15 @@ class Elaborator:
         try:
             self._body("", root, names, ())
         except _TooLargeError:
-            return Model(root.name, root.doc, ModelGraph(), names)
+            return Model(root.name)
         for name, scope, part, scope_names in self._to_weave:
             self._aspect(name, scope, part, scope_names)
         for setting in self.settings:
             if not setting.used:
                 self._add_unused(setting)
         check(self.graph, self.problems)
-        model = Model(root.name, root.doc, self.graph, names, self.aspects)
+        model = Model(root.name, doc=root.doc)
+        model.graph, model.parameters, model.aspects = self.graph, names, self.aspects
         Observation(model, self.values, self.problems).read(self.text, names)
         for name, part in self.text.figures.items():
             values = {

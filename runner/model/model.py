@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+
+from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
 from .graph import ModelGraph
 from .problems import Position
@@ -20,18 +22,35 @@ class Metric:
     doc: str
 
 
-@dataclass
 class Model:
     """A model that can be run; ports are named by their paths, those of composites included."""
 
-    name: str
-    doc: str
-    graph: ModelGraph
-    parameters: dict[str, object]
-    aspects: list[WovenAspect] = field(default_factory=list)
-    stop: int | None = None  # ns
-    stop_when: list[str] = field(default_factory=list)
-    seed: int = 0
-    record: list[str] = field(default_factory=list)
-    metrics: list[Metric] = field(default_factory=list)
-    figures: dict[str, tuple[str, dict[str, object], Position]] = field(default_factory=dict)
+    def __init__(self, name: str, *, doc: str = "", stop: float | str | None = None, seed: int = 0) -> None:
+        self.name = name
+        self.doc = doc
+        self.graph = ModelGraph()
+        self.parameters: dict[str, object] = {}
+        self.aspects: list[WovenAspect] = []
+        self.stop_time: int | None = None  # ns
+        self.stop_ports: list[str] = []
+        self.seed = seed
+        self.recorded: list[str] = []
+        self.metrics: list[Metric] = []
+        self.figures: dict[str, tuple[str, dict[str, object], Position]] = {}
+        self.stop = stop
+
+    @property
+    def stop(self) -> float | None:
+        """When the run ends, in seconds; None if only an empty agenda or a port ends it.  ``"500 ms"`` may be set."""
+        return None if self.stop_time is None else to_seconds(self.stop_time)
+
+    @stop.setter
+    def stop(self, stop: float | str | None) -> None:
+        self.stop_time = None if stop is None else nanoseconds(stop)
+
+
+def nanoseconds(duration: float | str) -> int:
+    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
+    seconds = Parameter(float, unit="s", min=0.0).convert(duration)
+    assert seconds is not None
+    return to_nanoseconds(seconds)

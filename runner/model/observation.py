@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, accepts, to_nanoseconds, type_name
+from epicycle.actors import Parameter, ParameterError, accepts, type_name
 
 from .declarations import DeclarationReader, MetricText, ModelText, Text
-from .model import Metric, Model
+from .model import Metric, Model, nanoseconds
 from .patterns import PatternError, select
 from .problems import Problems, nearest
 from .values import Values
@@ -32,7 +32,7 @@ class Observation:
         for key, entry in text.run.items():
             if key == "record":
                 found = [path for each in reader.texts(entry.value, key) for path in self._select(each, key)]
-                self.model.record = list(dict.fromkeys(found))
+                self.model.recorded = list(dict.fromkeys(found))
             elif key == "stop_when":
                 for each in reader.texts(entry.value, key):
                     self._stop_when(each)
@@ -42,8 +42,7 @@ class Observation:
                     continue
                 try:
                     if key == "stop":
-                        seconds: Any = Parameter(float, unit="s", min=0.0).convert(value)
-                        self.model.stop = to_nanoseconds(seconds)
+                        self.model.stop_time = nanoseconds(value)
                     else:
                         seed: Any = Parameter(int, min=0, max=MAX_SEED).convert(value)
                         self.model.seed = seed
@@ -54,7 +53,7 @@ class Observation:
 
     def _stop_when(self, text: Text) -> None:
         for path in self._select(text, "stop_when"):
-            self.model.stop_when.append(path)
+            self.model.stop_ports.append(path)
             for port in self.graph.source_of(path):
                 if not accepts(float | bool, port.type):
                     self.problems.add(

@@ -35,9 +35,9 @@ def figures_of(model: Model, problems: Problems) -> dict[str, Figure]:
             figure: Figure = cls(**values)
             for pattern in figure.signal_patterns():
                 # A pattern over an array may rightly select nothing, a plain name may not.
-                if not select(pattern, model.record) and "*" not in pattern:
+                if not select(pattern, model.recorded) and "*" not in pattern:
                     problems.add(
-                        f"figure {name}: {pattern!r} is not recorded{did_you_mean(pattern, list(model.record))}",
+                        f"figure {name}: {pattern!r} is not recorded{did_you_mean(pattern, list(model.recorded))}",
                         position,
                         "add it to 'record' in the run section",
                     )

@@ -232,6 +232,6 @@ actors: {slow: {type: Slow}}
 run: {record: [slow.out, slow.t.output], stop: 1.5}
 """
     )
-    assert results.signals["slow.out"].times == [0.5, 1.5]
-    assert results.signals["slow.t.output"].times == [0.0, 1.0]
+    assert results.signals["slow.out"].times.tolist() == [0.5, 1.5]
+    assert results.signals["slow.t.output"].times.tolist() == [0.0, 1.0]
     assert sends(results, "slow.t") == [(0.0, 1, "slow.t.output", 0), (1.0, 1, "slow.t.output", 1)]

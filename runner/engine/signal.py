@@ -1,0 +1,160 @@
+"""Signal: what one port sent, as lists, NumPy arrays or a data frame."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.actors import EpicycleError, Tag, to_seconds
+
+from ..model import did_you_mean
+from ..tables import Table, as_html, as_text, pandas_module
+from .encoding import field_names, leaves
+
+if TYPE_CHECKING:
+    import pandas
+
+_SHOWN = 8  # tokens at the beginning and at the end
+
+
+class SignalError(EpicycleError):
+    """A signal, or a field of its tokens, that is not there."""
+
+
+@dataclass(repr=False)
+class Signal:
+    """What one port sent: tags and tokens, in order.
+
+    >>> state = results["main.state"]
+    >>> state.times, state["position"]          # arrays of shape (n,) and (n, 2)
+    """
+
+    name: str
+    tags: list[Tag] = field(default_factory=list)
+    tokens: list[Any] = field(default_factory=list)
+
+    def add(self, tag: Tag, token: Any) -> None:
+        """Append a token."""
+        self.tags.append(tag)
+        self.tokens.append(token)
+
+    def __len__(self) -> int:
+        return len(self.tokens)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The times in seconds."""
+        return np.array([to_seconds(tag.time) for tag in self.tags], dtype=float)
+
+    @property
+    def microsteps(self) -> NDArray[np.int64]:
+        """The microsteps."""
+        return np.array([tag.microstep for tag in self.tags], dtype=np.int64)
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """The tokens as an array: numbers as such, arrays of one shape stacked, anything else as objects."""
+        return as_array(self.tokens)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The names of the tokens' fields, if they are dataclasses or mappings."""
+        names: dict[str, None] = {}
+        for token in self.tokens:
+            names.update(dict.fromkeys(_fields(token)))
+        return tuple(names)
+
+    def field(self, name: str) -> NDArray[Any]:
+        """One field of all tokens as an array, also written ``signal[name]``; raises ``SignalError``."""
+        found = []
+        for token in self.tokens:
+            if name not in _fields(token):
+                valid = _fields(token)
+                raise SignalError(
+                    f"{self.name}: a token of type {type(token).__name__} has no field {name!r}"
+                    f"{did_you_mean(name, valid)}; its fields: {', '.join(valid) or 'none'}"
+                )
+            found.append(token[name] if isinstance(token, dict) else getattr(token, name))
+        return as_array(found)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.field(name)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each token, indexed by time in s: ``microstep``, and a column for each number or text in a token.
+
+        The column of a plain number is ``value``; others are called by their place, such as ``position[0]``.
+        """
+        frames = pandas_module()
+        index = frames.Index(self.times, name="time")
+        rows = [{place or "value": leaf for place, leaf in leaves(token)} for token in self.tokens]
+        columns = dict.fromkeys(place for row in rows for place in row)
+        frame: pandas.DataFrame = frames.DataFrame(rows, index=index, columns=list(columns))
+        frame.insert(0, "microstep", self.microsteps)
+        return frame
+
+    def __repr__(self) -> str:
+        if not self.tokens:
+            return f"<Signal {self.name}: no tokens>"
+        kind = type(self.tokens[0]).__name__
+        first, last = self.tags[0].seconds, self.tags[-1].seconds
+        tokens = "1 token" if len(self) == 1 else f"{len(self):,} tokens"
+        return f"<Signal {self.name}: {tokens} ({kind}) from {first:g} s to {last:g} s>"
+
+    def __str__(self) -> str:
+        return as_text(repr(self).strip("<>"), [self._table()])
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self).strip("<>"), [self._table()])
+
+    def _table(self) -> Table:
+        rows = [
+            (f"{tag.seconds:.9g}", str(tag.microstep), short(token))
+            for tag, token in zip(self.tags, self.tokens, strict=True)
+        ]
+        if len(rows) > 2 * _SHOWN:
+            rows = [*rows[:_SHOWN], ("...", "", ""), *rows[-_SHOWN:]]
+        return Table(("time (s)", "microstep", "token"), rows)
+
+
+def as_array(tokens: list[Any]) -> NDArray[Any]:
+    """Tokens as an array, whose first axis counts them."""
+    kinds = {type(token) for token in tokens}
+    if kinds <= {bool, int, float, str} and (len(kinds) < 2 or str not in kinds):
+        return np.array(tokens, dtype=None if tokens else float)
+    try:
+        array = np.array(tokens)
+    except ValueError:  # of different shapes
+        array = np.empty(0, dtype=object)
+    if array.ndim > 0 and len(array) == len(tokens) and array.dtype.kind in "biuf":
+        return array
+    return np.fromiter(tokens, dtype=object, count=len(tokens))
+
+
+def short(value: Any) -> str:
+    """A value in one short line; numbers to six digits."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        text = f"[{', '.join(short(item) for item in value[:20])}]"
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        inner = ", ".join(f"{name}={short(getattr(value, name))}" for name in field_names(type(value)))
+        text = f"{type(value).__name__}({inner})"
+    else:
+        text = value if isinstance(value, str) else repr(value)
+    text = " ".join(text.split())
+    return text if len(text) <= 100 else text[:97] + "..."
+
+
+def _fields(token: Any) -> tuple[str, ...]:
+    if isinstance(token, dict):
+        return tuple(str(key) for key in token)
+    if dataclasses.is_dataclass(token) and not isinstance(token, type):
+        return field_names(type(token))
+    return ()
