@@ -2,6 +2,7 @@
 
 from .actor import Actor, Context, Wake, declared_ports
 from .errors import EpicycleError
+from .nearest import did_you_mean, nearest
 from .parameter import (
     REQUIRED,
     Configurable,
@@ -42,6 +43,8 @@ __all__ = [
     "convert",
     "declared_parameters",
     "declared_ports",
+    "did_you_mean",
+    "nearest",
     "parse_unit",
     "random_stream",
     "texts_parameter",

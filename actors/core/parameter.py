@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import types
 from collections.abc import Mapping, Sequence
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import EpicycleError
+from .nearest import did_you_mean
 from .units import UnitError, convert
 
 T = TypeVar("T")
@@ -149,7 +149,7 @@ class Parameter(Generic[T]):
         elif self.type is str:
             if isinstance(value, str):
                 if self.choices and value not in self.choices:
-                    raise ParameterError(f"{value!r} is not {self._expected()}{_did_you_mean(value, self.choices)}")
+                    raise ParameterError(f"{value!r} is not {self._expected()}{did_you_mean(value, self.choices)}")
                 return value
         elif isinstance(value, (int, float, np.integer, np.floating, str)) and not isinstance(value, bool):
             return self._bounded(self._number(value))
@@ -272,7 +272,7 @@ def declared_parameters(cls: type) -> dict[str, Parameter[Any]]:
 
 def unknown_parameter(cls: type, name: str) -> str:
     """The message for a parameter that the class does not have."""
-    return f"{cls.__name__} has no parameter {name!r}{_did_you_mean(name, declared_parameters(cls))}"
+    return f"{cls.__name__} has no parameter {name!r}{did_you_mean(name, declared_parameters(cls))}"
 
 
 def variants(base: type) -> dict[str, type]:
@@ -296,13 +296,8 @@ def build_variant(base: type, value: object) -> object:
         raise ParameterError(f"{_shown(value)} is not a mapping with a 'type', one of {valid}")
     name = value["type"]
     if not isinstance(name, str) or name not in known:
-        raise ParameterError(f"{_shown(name)} is not one of {valid}{_did_you_mean(str(name), known)}")
+        raise ParameterError(f"{_shown(name)} is not one of {valid}{did_you_mean(str(name), known)}")
     return known[name](**{key: item for key, item in value.items() if key != "type"})
-
-
-def _did_you_mean(name: str, candidates: object) -> str:
-    close = difflib.get_close_matches(name, list(candidates), n=1)  # type: ignore[call-overload]
-    return f", did you mean {close[0]!r}?" if close else ""
 
 
 def _shown(value: object) -> str:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from keyword import iskeyword
 
 from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
+from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
-from .expression import CONSTANTS, FUNCTIONS
 from .problems import Position, Problems, did_you_mean, nearest
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")

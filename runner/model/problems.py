@@ -1,20 +1,19 @@
 """What is wrong with a model, said so that it can be mended: where, what, and what would be right."""
 
-import difflib
-import itertools
 import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, did_you_mean, nearest
+
+# The runner takes the last two from here, as it does all that makes a message.
+__all__ = ["ModelError", "Position", "Problem", "Problems", "did_you_mean", "nearest", "visible"]
 
 MAX_PROBLEMS = 100
 MAX_SOURCE_WIDTH = 120
 _CUT = "..."
 _INDEX = re.compile(r"\[[0-9]+\]")
-_MAX_NAME = 200  # comparing names takes quadratic time; nobody mistypes a name this long
-_MAX_CANDIDATES = 2_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,24 +119,6 @@ class Problems:
             return -1, 0, 0
         files = list(dict.fromkeys(each.position.file for each in self.found if each.position is not None))
         return files.index(at.file), at.line, at.column
-
-
-def nearest(name: str, candidates: Iterable[str]) -> str | None:
-    """Return the candidate that `name` was probably meant to be, or None if no one is near."""
-    if len(name) > _MAX_NAME:
-        return None
-    by_folded: dict[str, str] = {}
-    for candidate in itertools.islice(candidates, _MAX_CANDIDATES):
-        if candidate != name and len(candidate) <= _MAX_NAME:
-            by_folded.setdefault(candidate.casefold(), candidate)
-    found = difflib.get_close_matches(name.casefold(), by_folded, n=1)
-    return by_folded[found[0]] if found else None
-
-
-def did_you_mean(name: str, candidates: Iterable[str]) -> str:
-    """Return ", did you mean 'x'?" for the nearest candidate x, or nothing; to end a message with."""
-    found = nearest(name, candidates)
-    return "" if found is None else f", did you mean {found!r}?"
 
 
 def visible(text: str) -> str:

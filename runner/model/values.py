@@ -6,10 +6,10 @@ from collections.abc import Container
 from typing import Any
 
 from epicycle.actors import Parameter, ParameterError
+from epicycle.actors.expression import ExpressionError, interpolate, names_in
 
 from .declarations import ParameterText
 from .document import Mapping, Node, Scalar, Sequence
-from .expression import ExpressionError, interpolate, names_in
 from .problems import Position, Problems
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors.core.errors import EpicycleError
-from epicycle.runner.model.expression import FUNCTIONS, ExpressionError, evaluate, interpolate, names_in
+from epicycle.actors.expression import FUNCTIONS, ExpressionError, evaluate, interpolate, names_in
 
 NAMES: dict[str, object] = {
     "n": 3,

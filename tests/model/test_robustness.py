@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 
 import epicycle.actors
 from epicycle.actors import ChannelError, EpicycleError, FilterError, ParameterError, PortError, Tag, UnitError
+from epicycle.actors.expression import ExpressionError
 from epicycle.runner.engine import ActorError, LogError, LoopError
 from epicycle.runner.engine.encoding import TokenError
 from epicycle.runner.model import Model, ModelError, Position, Problem, load_model
-from epicycle.runner.model.expression_syntax import ExpressionError
 from epicycle.runner.model.load import model_folders
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -6,7 +6,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, Final
 
-from .problems import did_you_mean
+from ..core import did_you_mean
 
 MAX_STEPS = 100_000
 MAX_ELEMENTS = 100_000

@@ -1,4 +1,4 @@
-"""A safe evaluator for the `${...}` of a model: arithmetic, lists, conditions and a few functions, no more.
+"""A safe evaluator for expressions: arithmetic, lists, conditions and a few functions, no more.
 
 Python's parser reads the text; what it found is checked against a whitelist as a whole and then interpreted
 here, never by `eval`. Every cost (time, memory, depth, size of numbers) has a limit that is checked before it
@@ -12,8 +12,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import ParamSpec, TypeVar
 
-from .expression_syntax import ExpressionError, free_names, parse, targets
-from .expression_values import (
+from ..core import did_you_mean
+from .syntax import ExpressionError, free_names, parse, targets
+from .values import (
     BINARY,
     COMPARE,
     CONSTANTS,
@@ -28,9 +29,6 @@ from .expression_values import (
     subscript,
     text_of,
 )
-from .problems import did_you_mean
-
-__all__ = ["CONSTANTS", "FUNCTIONS", "ExpressionError", "evaluate", "interpolate", "names_in"]
 
 _MAX_NAMES_SHOWN = 20
 

@@ -6,10 +6,8 @@ import re
 import warnings
 from typing import Final, NoReturn
 
-from epicycle.actors import EpicycleError
-
-from .expression_values import FUNCTIONS, MAX_INT
-from .problems import did_you_mean
+from ..core import EpicycleError, did_you_mean
+from .values import FUNCTIONS, MAX_INT
 
 MAX_SOURCE = 2_000
 MAX_PARTS = 500

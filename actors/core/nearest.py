@@ -1,0 +1,28 @@
+"""The name that somebody probably meant: every message about an unknown name ends with it."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Iterable
+
+_MAX_NAME = 200  # comparing names takes quadratic time; nobody mistypes a name this long
+_MAX_CANDIDATES = 2_000
+
+
+def nearest(name: str, candidates: Iterable[str]) -> str | None:
+    """Return the candidate that `name` was probably meant to be, or None if no one is near."""
+    if len(name) > _MAX_NAME:
+        return None
+    by_folded: dict[str, str] = {}
+    for candidate in itertools.islice(candidates, _MAX_CANDIDATES):
+        if candidate != name and len(candidate) <= _MAX_NAME:
+            by_folded.setdefault(candidate.casefold(), candidate)
+    found = difflib.get_close_matches(name.casefold(), by_folded, n=1)
+    return by_folded[found[0]] if found else None
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """Return ", did you mean 'x'?" for the nearest candidate x, or nothing; to end a message with."""
+    found = nearest(name, candidates)
+    return "" if found is None else f", did you mean {found!r}?"

@@ -1,0 +1,92 @@
+"""Formula: an expression that an actor evaluates again and again, and the parameter that holds one."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..core import REQUIRED, EpicycleError, Parameter, ParameterError
+from .evaluation import evaluate
+from .syntax import ExpressionError, free_names, parse
+from .values import CONSTANTS, FUNCTIONS
+
+
+class Formula:
+    """A checked expression; ``names`` are what it asks for, in the order in which they first appear.
+
+    Raises ``ExpressionError`` if the text is no expression.
+    """
+
+    __slots__ = ("names", "source")
+
+    def __init__(self, source: str) -> None:
+        tree = parse(source)
+        places: dict[str, int] = {}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name):
+                places[node.id] = min(places.get(node.id, node.col_offset), node.col_offset)
+        free = free_names(tree, frozenset()) - CONSTANTS.keys()
+        for name in sorted(free & FUNCTIONS.keys()):
+            raise ExpressionError(f"'{name}' is a function: write {name}(...)", places[name], len(name))
+        self.source = source
+        self.names = tuple(sorted(free, key=places.__getitem__))
+
+    def __call__(self, values: Mapping[str, object]) -> Any:
+        """The value of the expression; raises ``EpicycleError`` telling the values of its names."""
+        try:
+            return evaluate(self.source, values)
+        except ExpressionError as error:
+            given = ", ".join(f"{name} = {values[name]!r}" for name in self.names if name in values)
+            raise EpicycleError(f"{self.source!r}: {error}{f', with {given}' if given else ''}") from None
+
+    def __repr__(self) -> str:
+        return repr(self.source)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Formula) and other.source == self.source
+
+    def __hash__(self) -> int:
+        return hash(self.source)
+
+
+class FormulaParameter(Parameter[Formula]):
+    """A parameter whose value is an expression: a text, or a number or truth value that stands for itself."""
+
+    def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
+        super().__init__(str, default, doc=doc)  # type: ignore[arg-type]
+
+    def describe_type(self) -> str:
+        return "expression"
+
+    def convert(self, value: object) -> Formula | None:
+        if value is None and self.optional:
+            return None
+        if isinstance(value, Formula):
+            return value
+        if isinstance(value, (bool, int, float, np.number)):
+            value = repr(value.item() if isinstance(value, np.number) else value)
+        if not isinstance(value, str):
+            raise ParameterError(f"{value!r} is not an expression")
+        try:
+            return Formula(value)
+        except ExpressionError as error:
+            raise ParameterError(f"{value!r} is not an expression: {error}") from None
+
+
+def operand(token: Any) -> Any:
+    """A token as the expression language knows it: arrays become lists, dataclasses dicts of their fields."""
+    if isinstance(token, (bool, int, float, str)) or token is None:
+        return token
+    if isinstance(token, (np.generic, np.ndarray)):
+        return token.tolist()
+    if isinstance(token, (list, tuple)):
+        return [operand(item) for item in token]
+    if isinstance(token, Mapping):
+        return {str(key): operand(item) for key, item in token.items()}
+    if dataclasses.is_dataclass(token) and not isinstance(token, type):
+        return {each.name: operand(getattr(token, each.name)) for each in dataclasses.fields(token)}
+    return token
