@@ -17,6 +17,7 @@ from .parameter import (
 from .port_parameter import PortParameter
 from .ports import InputPort, OutputPort, PortError, accepts, type_name
 from .process import Process
+from .quantity import Quantity, plain
 from .random import random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
@@ -35,6 +36,7 @@ __all__ = [
     "PortError",
     "PortParameter",
     "Process",
+    "Quantity",
     "Tag",
     "UnitError",
     "Wake",
@@ -46,6 +48,7 @@ __all__ = [
     "did_you_mean",
     "nearest",
     "parse_unit",
+    "plain",
     "random_stream",
     "texts_parameter",
     "to_nanoseconds",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .errors import EpicycleError
 from .nearest import did_you_mean
+from .quantity import Quantity, plain
 from .units import UnitError, convert
 
 T = TypeVar("T")
@@ -139,7 +140,7 @@ class Parameter(Generic[T]):
 
     def _scalar(self, value: object) -> object:
         if self.type is object:
-            return value
+            return plain(value)
         if self.type is Path:
             if isinstance(value, (str, Path)) and str(value) and "\0" not in str(value):
                 return Path(value)
@@ -156,13 +157,15 @@ class Parameter(Generic[T]):
         raise ParameterError(f"{_shown(value)} is not {self._expected()}")
 
     def _number(self, value: Any) -> float | int:
-        if isinstance(value, str):
-            if not self.unit:
-                raise ParameterError(f"{_shown(value)} is not {self._expected()}")
-            try:
+        if isinstance(value, str) and not self.unit:
+            raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+        try:
+            if isinstance(value, str):
                 value = convert(value, self.unit)
-            except UnitError as error:
-                raise ParameterError(str(error)) from None
+            elif isinstance(value, Quantity):
+                value = value.to(self.unit) if self.unit else float(value)
+        except UnitError as error:
+            raise ParameterError(str(error)) from None
         try:
             number = float(value)
         except OverflowError:

@@ -315,9 +315,28 @@ def _convert_text(text: str, unit: str, wanted: Unit) -> float:
     except UnitError as error:
         article = "an" if str(error).startswith("unreadable") else "the"
         raise UnitError(f"{_short(text)} has {article} {error}") from None
-    if own.dimension != wanted.dimension or _is_turns_for_radians(own_text, unit):
-        raise UnitError(f"{_short(text)} is {_kind(own_text, own)}, {_expected(unit, wanted)}")
+    _check_kind(text, own_text, own, unit, wanted)
     return _with_pi(number * own.scale / wanted.scale, own.pi_power - wanted.pi_power)
+
+
+def between(own: str, wanted: str, shown: str) -> tuple[Fraction, int]:
+    """How many of one unit are one of another, and the power of pi to be multiplied with it.
+
+    Raises ``UnitError`` about the quantity ``shown`` if the two do not measure the same.
+    """
+    from_unit, to_unit = parse_unit(own), parse_unit(wanted)
+    _check_kind(shown, own, from_unit, wanted, to_unit)
+    return from_unit.scale / to_unit.scale, from_unit.pi_power - to_unit.pi_power
+
+
+def is_compound(unit: str) -> bool:
+    """Whether a unit needs brackets to be divided by."""
+    return any(sign in unit for sign in "*·⋅/")
+
+
+def _check_kind(shown: str, own_text: str, own: Unit, unit: str, wanted: Unit) -> None:
+    if own.dimension != wanted.dimension or _is_turns_for_radians(own_text, unit):
+        raise UnitError(f"{_short(shown)} is {_kind(own_text, own)}, {_expected(unit, wanted)}")
 
 
 def _is_turns_for_radians(first: str, second: str) -> bool:

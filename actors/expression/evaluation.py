@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import ParamSpec, TypeVar
 
-from ..core import did_you_mean
+from ..core import UnitError, did_you_mean
 from .syntax import ExpressionError, free_names, parse, targets
 from .values import (
     BINARY,
@@ -161,7 +161,7 @@ class _Evaluation:
             message = f"{self._text(node)} divides by zero"
         except OverflowError:
             message = f"the result of {self._text(node)} is too large"
-        except (BudgetError, TypeError, ValueError) as error:
+        except (BudgetError, TypeError, UnitError, ValueError) as error:
             message = f"{self._text(node)}: {error}"
         except (RecursionError, MemoryError):
             message = f"{self._text(node)} needs too much memory"

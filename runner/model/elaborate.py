@@ -15,6 +15,7 @@ from epicycle.actors import (
     Parameter,
     ParameterError,
     declared_parameters,
+    plain,
     unknown_parameter,
 )
 
@@ -86,11 +87,13 @@ class Elaborator:
                 self._add_unused(setting)
         check(self.graph, self.problems)
         model = Model(root.name, doc=root.doc)
-        model.graph, model.parameters, model.aspects = self.graph, names, self.aspects
+        model.graph, model.aspects = self.graph, self.aspects
+        model.parameters = {name: plain(value) for name, value in names.items()}
         Observation(model, self.values, self.problems).read(self.text, names)
         for name, part in self.text.figures.items():
             values = {
-                key: self.values.of(entry.value, names, f"figure {name}.{key}") for key, entry in part.values.items()
+                key: plain(self.values.of(entry.value, names, f"figure {name}.{key}"))
+                for key, entry in part.values.items()
             }
             model.figures[name] = (part.type.text, values, part.type.position)
         return model

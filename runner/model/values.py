@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError
+from epicycle.actors import Parameter, ParameterError, Quantity, plain
 from epicycle.actors.expression import ExpressionError, interpolate, names_in
 
 from .declarations import ParameterText
@@ -76,7 +76,9 @@ class Values:
             return Parameter(str, choices=parameter.choices).convert(value)
         bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}
         if parameter.unit:
-            return Parameter(float, unit=parameter.unit, **bounds).convert(value)
+            number = Parameter(float, unit=parameter.unit, **bounds).convert(value)
+            return number if number is None or parameter.unit == "1" else Quantity(number, parameter.unit)
+        value = plain(value)
         if isinstance(default, bool):
             return Parameter(bool).convert(value)
         if isinstance(default, int):
