@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,6 +22,13 @@ def add_model(command: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         help="set a parameter, such as observers=3 or 'observer[*].sensor.max_range=5 m'; may be repeated",
+    )
+    command.add_argument(
+        "--overrides",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
     )
     command.add_argument(
         "--aspect",
@@ -42,12 +50,23 @@ def seed(text: str) -> int:
     return number
 
 
-def load(options: argparse.Namespace) -> tuple[Model, dict[str, Any]]:
-    """The model that the options describe, and its figures."""
-    from ..model import Problems, load_model
+def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, dict[str, Any]]:
+    """The model that the options describe, and its figures; warnings are printed, or with ``strict`` raised."""
+    from ..model import ModelError, Problems, load_model
     from ..show import figures_of
 
-    model = load_model(options.model, set=options.set, aspects=options.aspect, without_aspects=options.without)
+    model = load_model(
+        options.model,
+        set=options.set,
+        overrides=options.overrides,
+        aspects=options.aspect,
+        without_aspects=options.without,
+    )
+    if not strict:
+        for warning in model.warnings:
+            complain(str(warning))
+    elif model.warnings:
+        raise ModelError(replace(warning, severity="error") for warning in model.warnings)
     problems = Problems()
     figures = figures_of(model, problems)
     problems.raise_if_any()

@@ -12,11 +12,12 @@ DESCRIPTION = "Check a model without running it."
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle validate``."""
     add_model(command)
+    command.add_argument("--strict", action="store_true", help="take warnings for errors")
 
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Load the model, and say how large it is."""
-    model, _ = load(options)
+    model, _ = load(options, strict=options.strict)
     wires = sum(1 for _ in model.graph.wires())
     print(f"{options.model} is valid: {len(model.graph.actors)} actors, {wires} wires, {len(model.aspects)} aspects")
     return DONE

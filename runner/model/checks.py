@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import networkx as nx
 
-from epicycle.actors import accepts, type_name
+from epicycle.actors import InputPort, accepts, type_name
 
-from .graph import ModelGraph, Wire
+from .graph import Hop, ModelGraph, Wire
 from .problems import Position, Problems
 
 MAX_WIRES = 1_000_000
 MAX_PASSAGE = 200  # composite ports in a row
+MAX_SHOWN = 10  # names in one message
 
 
 def check(graph: ModelGraph, problems: Problems) -> None:
-    """Add every problem of wiring: types, missing connections, two writers, loops without delay."""
+    """Add every problem of wiring: types, missing connections, two writers, loops without delay; warn of idle ones."""
     if not check_passages(graph, problems):
         return
     check_types(graph, problems)
     check_connections(graph, problems)
     check_loops(graph, problems)
+    if not len(problems):
+        check_reach(graph, problems)
 
 
 def check_passages(graph: ModelGraph, problems: Problems) -> bool:
@@ -128,26 +133,94 @@ def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
 def check_loops(graph: ModelGraph, problems: Problems) -> None:
     """Every loop needs a delay somewhere, or no order of firing exists within a tag."""
     dependencies = graph.immediate_dependencies()
+    declared = {path: place for place, path in enumerate(graph.ports.nodes)}
     for component in nx.strongly_connected_components(dependencies):
         if len(component) < 2:
             continue
-        # A graph of our own in sorted order: a view would follow the order of a set, which varies between runs.
+        # A graph of our own in the order of declaration: a view would follow that of a set, which varies between runs.
         inner = nx.DiGraph()
-        for path in sorted(component):
+        for path in sorted(component, key=declared.__getitem__):
             inner.add_edges_from((path, far, data) for far, data in dependencies.adj[path].items() if far in component)
-        cycle = nx.find_cycle(inner, source=min(component))
-        wires = [inner.edges[edge]["wire"] for edge in cycle if "wire" in inner.edges[edge]]
+        wires = _shortest_loop(inner)
         actors = [wire.source.actor.path for wire in wires]
-        steps = []
-        for wire in wires:
-            hop = wire.hops[0]
-            where = f" ({hop.position.file}:{hop.position.line})" if hop.position else ""
-            steps.append(f"{wire.source.path} -> {wire.destination.path}{where}")
-        last = wires[-1]
+        # It begins with the actor that is declared first, so its last wire is the one that leads back.  Of that wire,
+        # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
+        back = min(wires[-1].hops, key=lambda hop: (_scope(graph, hop).count("."), hop.order))
         problems.add(
             f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
-            last.hops[0].position,
-            *steps,
-            "give one of these connections a delay, for example "
-            f"{{from: {last.hops[0].source}, to: {last.hops[0].destination}, delay: ...}}",
+            back.position,
+            *map(_step, wires),
+            f"give one of these connections a delay, best the one that leads back: {_with_delay(graph, back)}",
         )
+
+
+def _shortest_loop(inner: nx.DiGraph) -> list[Wire]:
+    """The wires of a loop from the first port of a strongly connected graph back to it."""
+    start = next(iter(inner))
+    ways = [nx.shortest_path(inner, after, start) for after in inner.successors(start)]
+    loop = [start, *min(ways, key=len)]
+    wires = [inner.edges[edge].get("wire") for edge in pairwise(loop)]
+    return [wire for wire in wires if wire is not None]
+
+
+def _step(wire: Wire) -> str:
+    ports = [wire.source.path, *(hop.destination for hop in wire.hops)]
+    places = [f"{hop.position.file}:{hop.position.line}" for hop in wire.hops if hop.position is not None]
+    return " -> ".join(ports) + (f" ({', '.join(dict.fromkeys(places))})" if places else "")
+
+
+def _scope(graph: ModelGraph, hop: Hop) -> str:
+    """The path of the composite inside which a connection is made, with a dot after each name."""
+    owner = hop.source.rpartition(".")[0]
+    # What comes from an input comes from the composite's own port, else from a port of one of its actors.
+    scope = owner if graph.direction(hop.source) == "input" else owner.rpartition(".")[0]
+    return f"{scope}." if scope else ""
+
+
+def _with_delay(graph: ModelGraph, hop: Hop) -> str:
+    scope = _scope(graph, hop)
+    ends = [end.removeprefix(scope) for end in (hop.source, hop.destination)]
+    source, destination = (f'"{end}"' if "[" in end else end for end in ends)
+    return f"{{from: {source}, to: {destination}, delay: ...}}"
+
+
+def check_reach(graph: ModelGraph, problems: Problems) -> None:
+    """Warn of actors that can never fire, because no source is before them."""
+    alive: set[str] = set()
+    waiting = [port.path for actor in graph.actors.values() if actor.is_source for port in actor.outputs.values()]
+    while waiting:
+        path = waiting.pop()
+        if path in alive:
+            continue
+        alive.add(path)
+        waiting += graph.ports.successors(path)
+        port = graph.ports.nodes[path]["port"]
+        if isinstance(port, InputPort):
+            waiting += [output.path for output in port.actor.outputs.values()]
+    idle = nx.DiGraph()
+    for actor in graph.actors.values():
+        if not actor.is_source and not any(port.path in alive for port in actor.inputs.values()):
+            idle.add_node(actor.path)
+    if not idle:
+        return
+    for wire in graph.wires():
+        if wire.destination.actor.path in idle:
+            idle.add_edge(wire.source.actor.path, wire.destination.actor.path)
+    groups = nx.condensation(idle)
+    order = {path: place for place, path in enumerate(idle)}
+    for group in groups:
+        if groups.in_degree(group):
+            continue  # told with what is before it
+        first, *others = sorted(groups.nodes[group]["members"], key=order.__getitem__)
+        behind = {path for after in nx.descendants(groups, group) for path in groups.nodes[after]["members"]}
+        in_loop = others or idle.has_edge(first, first)
+        why = f"only the loop {_some([first, *others])} feeds it" if in_loop else "nothing feeds it"
+        problems.warn(
+            f"{first} can never fire: it is no source, and {why}",
+            graph.positions.get(first),
+            *((f"nor can what it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
+        )
+
+
+def _some(paths: list[str]) -> str:
+    return ", ".join(paths[:MAX_SHOWN]) + (f" and {len(paths) - MAX_SHOWN} more" if len(paths) > MAX_SHOWN else "")

@@ -6,6 +6,7 @@ computed from it is not judged; an actor that cannot be made leaves its ports in
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
@@ -28,11 +29,12 @@ from .graph import ModelGraph
 from .model import Model
 from .observation import Observation
 from .problems import Position, Problems, did_you_mean, nearest
-from .settings import Setting
+from .settings import Setting, Settings
 from .values import Values
 from .weave import WovenAspect, select_ports
 from .wiring import Child, Wiring
 
+_INDEX = re.compile(r"\[\d+\]")
 MAX_COUNT = 100_000
 MAX_INSTANCES = 200_000  # of actors and composites together
 MAX_DEPTH = 50
@@ -49,7 +51,7 @@ class Elaborator:
         self,
         text: ModelText,
         composites: dict[str, CompositeText],
-        settings: list[Setting],
+        settings: Settings,
         problems: Problems,
         catalogue: Catalogue,
     ) -> None:
@@ -82,12 +84,12 @@ class Elaborator:
             return Model(root.name)
         for name, scope, part, scope_names in self._to_weave:
             self._aspect(name, scope, part, scope_names)
-        for setting in self.settings:
-            if not setting.used:
-                self._add_unused(setting)
+        for setting in self.settings.unused():
+            self._add_unused(setting)
         check(self.graph, self.problems)
         model = Model(root.name, doc=root.doc)
         model.graph, model.aspects = self.graph, self.aspects
+        model.warnings = self.problems.warnings
         model.parameters = {name: plain(value) for name, value in names.items()}
         Observation(model, self.values, self.problems).read(self.text, names)
         for name, part in self.text.figures.items():
@@ -99,8 +101,12 @@ class Elaborator:
         return model
 
     def _add_unused(self, setting: Setting) -> None:
-        """A setting that no parameter took."""
+        """A setting that no parameter took, unless it is meant for an array that is empty now."""
+        if self.graph.is_excused(setting.path):
+            return
         known = list(self.settable)
+        if "[*]" in setting.path:
+            known = list(dict.fromkeys(_INDEX.sub("[*]", path) for path in known))
         owner, _, last = setting.path.rpartition(".")
         beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
         # The nearest one of the same owner, or else the nearest of all.
@@ -156,14 +162,9 @@ class Elaborator:
         return names
 
     def _setting(self, full: str) -> Setting | None:
-        """The last setting for a parameter, all that match marked as used."""
+        """The setting for a parameter, if there is one."""
         self.settable[full] = None
-        found = None
-        for setting in self.settings:
-            if setting.matches(full):
-                setting.used = True
-                found = setting
-        return found
+        return self.settings.find(full)
 
     def _configuration(
         self,

@@ -12,7 +12,7 @@ from .document import read
 from .elaborate import Elaborator
 from .model import Model
 from .problems import Problems, did_you_mean
-from .settings import change_aspect, parse_setting, without
+from .settings import Settings, change_aspect, parse_setting, read_overrides, without
 
 MAX_INCLUDES = 200
 
@@ -54,16 +54,21 @@ def load_model(
     name: str | Path,
     *,
     set: Iterable[str] = (),
+    overrides: str | Path | Iterable[str | Path] = (),
     aspects: Iterable[str] = (),
     without_aspects: Iterable[str] = (),
     types: Iterable[type] = (),
 ) -> Model:
     """Read, change and check a model; raises ``ModelError`` with all that is wrong.
 
-    ``types`` are actor and aspect classes of your own that the model may name beside the installed ones.
+    ``set`` holds texts like ``"observer[*].sensor.range=5 m"``, ``overrides`` names a YAML file of such settings, or
+    several; of all that fit a parameter the last one wins, and ``set`` wins over files.  ``types`` are actor and aspect
+    classes of your own that the model may name beside the installed ones.  What is odd but not wrong is in
+    ``Model.warnings``.
     """
     problems = Problems()
-    settings = [found for text in set if (found := parse_setting(text, problems)) is not None]
+    settings = [each for file in _files(overrides) for each in read_overrides(file, problems)]
+    settings += [found for text in set if (found := parse_setting(text, problems)) is not None]
     path = find_model(str(name), problems)
     if path is None:
         problems.raise_if_any()
@@ -82,9 +87,13 @@ def load_model(
         without(text, change, problems)
     for change in aspects:
         change_aspect(text, change, problems)
-    model = Elaborator(text, composites, settings, problems, installed().with_types(types)).model()
+    model = Elaborator(text, composites, Settings(settings), problems, installed().with_types(types)).model()
     problems.raise_if_any()
     return model
+
+
+def _files(given: str | Path | Iterable[str | Path]) -> list[Path]:
+    return [Path(each) for each in ((given,) if isinstance(given, (str, Path)) else given)]
 
 
 def _composites(text: ModelText, path: Path, reader: DeclarationReader, problems: Problems) -> dict[str, CompositeText]:

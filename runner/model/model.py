@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
 from .graph import ModelGraph
-from .problems import Position
+from .problems import Position, Problem
 from .weave import WovenAspect
 
 
@@ -37,6 +37,7 @@ class Model:
         self.recorded: list[str] = []
         self.metrics: list[Metric] = []
         self.figures: dict[str, tuple[str, dict[str, object], Position]] = {}
+        self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.stop = stop
 
     @property

@@ -34,9 +34,10 @@ class Problem:
     message: str
     position: Position | None = None
     help: tuple[str, ...] = ()
+    severity: str = "error"  # or "warning"
 
     def __str__(self) -> str:
-        head = f"error: {visible(self.message)}"
+        head = f"{self.severity}: {visible(self.message)}"
         lines = [head]
         if (at := self.position) is not None:
             source, carets = _excerpt(at)
@@ -77,6 +78,7 @@ class Problems:
         # What is wrong in an array is told for the first instance; a composite class's fault, for its first use.
         self._kept: dict[tuple[str, Position | None], Problem] = {}
         self._left_out: set[int] = set()  # hashes will do: this is only a count
+        self._warnings: dict[tuple[str, Position | None], Problem] = {}
         self._unsaid = 0
         self.muted = False  # while true, problems count for len() alone: they repeat what has been said
 
@@ -91,6 +93,17 @@ class Problems:
     def found(self) -> tuple[Problem, ...]:
         """The problems kept so far, in the order they were found."""
         return tuple(self._kept.values())
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """What is odd but not wrong, as far as noted."""
+        return tuple(self._warnings.values())
+
+    def warn(self, message: str, position: Position | None = None, *hints: str) -> None:
+        """Note what may be meant, but most likely is not; it does not count as a problem."""
+        if len(self._warnings) < MAX_PROBLEMS:
+            key = _INDEX.sub("[]", message), position
+            self._warnings.setdefault(key, Problem(message, position, hints, "warning"))
 
     def add(self, message: str, position: Position | None = None, *hints: str, scope: str = "") -> None:
         """Note a problem; each hint becomes a line of help.

@@ -1,11 +1,15 @@
-"""What is said about a model from outside: ``--set path=value``, ``--aspect name=Type,...``, ``--without name``."""
+"""What is said about a model from outside: ``--set path=value``, ``--overrides file``, ``--aspect name=Type,...``,
+``--without name``.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from .declarations import NAME, ModelText, PartText, Text
-from .document import Entry, Mapping, Node, Scalar, Sequence, parse
+from .document import Entry, Mapping, Node, Scalar, Sequence, parse, read
 from .patterns import PatternError, matches
 from .problems import Position, Problems, did_you_mean
 
@@ -24,6 +28,61 @@ class Setting:
         return matches(self.path, full)
 
 
+class Settings:
+    """All that is set from outside, in the order in which it counts: the last one that fits a parameter wins."""
+
+    def __init__(self, settings: Iterable[Setting] = ()) -> None:
+        self._all = list(settings)
+        # An overrides file may name thousands of paths: only patterns are tried one after the other.
+        self._exact: dict[str, list[int]] = {}
+        self._patterns: list[int] = []
+        for number, setting in enumerate(self._all):
+            if "*" in setting.path:
+                self._patterns.append(number)
+            else:
+                self._exact.setdefault(setting.path, []).append(number)
+
+    def find(self, full: str) -> Setting | None:
+        """The setting for the parameter at this path; all that fit are marked as used."""
+        found = self._exact.get(full, [])
+        found = found + [number for number in self._patterns if self._all[number].matches(full)]
+        for number in found:
+            self._all[number].used = True
+        return self._all[max(found)] if found else None
+
+    def unused(self) -> list[Setting]:
+        """Those that no parameter has taken."""
+        return [setting for setting in self._all if not setting.used]
+
+
+def read_overrides(path: Path, problems: Problems) -> list[Setting]:
+    """The settings of a file: a mapping from paths or patterns to values, as ``--set`` takes them."""
+    node = read(path, problems)
+    if node is None:
+        return []
+    if not isinstance(node, Mapping):
+        problems.add(
+            f"{path} is not a mapping from parameters to values",
+            node.position,
+            "write lines like 'observer[*].sensor.range: 5 m'",
+        )
+        return []
+    return [
+        Setting(key, entry.value, entry.key.position)
+        for key, entry in node.entries.items()
+        if _is_pattern(key, entry.key.position, problems)
+    ]
+
+
+def _is_pattern(path: str, position: Position, problems: Problems) -> bool:
+    try:
+        matches(path, "")
+    except PatternError as error:
+        problems.add(f"{path!r} is no parameter path: {error}", position)
+        return False
+    return True
+
+
 def parse_setting(text: str, problems: Problems) -> Setting | None:
     """``path=value``, where value is a YAML value such as ``3``, ``5 m`` or ``[0, 1]``."""
     option = f"--set {text}"
@@ -33,10 +92,7 @@ def parse_setting(text: str, problems: Problems) -> Setting | None:
     if not equals or not path:
         problems.add(f"{text!r} is not of the form path=value", position)
         return None
-    try:
-        matches(path, "")
-    except PatternError as error:
-        problems.add(f"{path!r} is no parameter path: {error}", position)
+    if not _is_pattern(path, position, problems):
         return None
     node = _value(value, option, len(option) - len(value), problems)
     return None if node is None else Setting(path, node, position)
