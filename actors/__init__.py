@@ -35,6 +35,11 @@ from .core import (
     unknown_parameter,
     variants,
 )
+from .distributions import Distribution
+from .flow import BooleanSwitch, Merge, Repeat, Router, Select, Switch
+from .queues import Queue, Server
+from .random_source import Random
+from .replay import Replay, ReplayError
 from .robotics import (
     Barrier,
     BodyState,
@@ -59,7 +64,10 @@ from .robotics import (
     UnscentedEstimator,
     Vehicle,
 )
-from .sources import Clock
+from .sampling import MostRecent, Sampler, Synchronizer
+from .sources import Clock, PoissonClock, SingleEvent
+from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
+from .triggered import Const, CurrentMicrostep, CurrentTime, Ramp, Sequence
 
 __all__ = [
     "NANOSECONDS_PER_SECOND",
@@ -67,14 +75,19 @@ __all__ = [
     "Actor",
     "Barrier",
     "BodyState",
+    "BooleanSwitch",
     "BroadcastChannel",
     "Casadi",
     "ChannelError",
     "CircularMotion",
     "Clock",
     "Configurable",
+    "Const",
     "Context",
+    "CurrentMicrostep",
+    "CurrentTime",
     "DistanceMonitor",
+    "Distribution",
     "EpicycleError",
     "Estimate",
     "FilterError",
@@ -83,21 +96,42 @@ __all__ = [
     "Inform",
     "InputPort",
     "Measurement",
+    "Merge",
+    "MostRecent",
     "Objective",
     "OutputPort",
     "Parameter",
     "ParameterError",
     "Plan",
+    "PoissonClock",
     "PortError",
     "PortParameter",
     "Process",
     "Quantity",
+    "Queue",
+    "Ramp",
+    "Random",
     "ReachGoal",
+    "Repeat",
+    "Replay",
+    "ReplayError",
+    "ResettableTimer",
     "RobustController",
+    "Router",
+    "Sampler",
+    "Select",
     "Sensor",
     "SeparationMonitor",
+    "Sequence",
+    "Server",
+    "SingleEvent",
     "Solver",
+    "Switch",
+    "Synchronizer",
     "Tag",
+    "TimeDelay",
+    "TimeGap",
+    "Timer",
     "UnitError",
     "UnscentedEstimator",
     "Vehicle",

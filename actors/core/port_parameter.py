@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import types
 from typing import Any, TypeVar, overload
 
 from .parameter import Parameter, ParameterError
@@ -48,7 +49,7 @@ class PortParameter(Parameter[T]):
     reads as its value; the port is ``actor.inputs["delay"]`` and need not be connected.
     """
 
-    def __init__(self, type: Any, *arguments: Any, **keywords: Any) -> None:
+    def __init__(self, type: type[T] | types.UnionType, *arguments: Any, **keywords: Any) -> None:
         super().__init__(type, *arguments, **keywords)
         self.port: ParameterPort[T] = ParameterPort(self, type, self.doc)
 

@@ -1,0 +1,166 @@
+"""Probability distributions that a parameter may be given: ``distribution: {type: Exponential, mean: 2}``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .core import Configurable, Parameter, ParameterError, array_parameter
+from .tokens import token_type
+
+
+class Distribution(Configurable):
+    """Base of the distributions: what single values are drawn from.
+
+    Parameters are bare numbers in the unit of what is drawn; a time is drawn in seconds.
+    """
+
+    token_type: Any = float
+
+    def draw(self, random: np.random.Generator) -> Any:
+        """A value, from the stream given."""
+        raise NotImplementedError(f"{type(self).__name__} has no draw()")
+
+
+class Constant(Distribution):
+    """Always the same value."""
+
+    value = Parameter(float, doc="the value")
+
+    def draw(self, random: np.random.Generator) -> float:
+        return self.value
+
+
+class Uniform(Distribution):
+    """All numbers of an interval alike."""
+
+    low = Parameter(float, 0.0, doc="the least number")
+    high = Parameter(float, 1.0, doc="the bound above, not drawn itself")
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        _check_order("low", self.low, "high", self.high)
+
+    def draw(self, random: np.random.Generator) -> float:
+        return float(random.uniform(self.low, self.high))
+
+
+class Normal(Distribution):
+    """The normal (Gaussian) distribution."""
+
+    mean = Parameter(float, 0.0, doc="the mean")
+    standard_deviation = Parameter(float, 1.0, min=0, doc="the square root of the variance")
+
+    def draw(self, random: np.random.Generator) -> float:
+        return float(random.normal(self.mean, self.standard_deviation))
+
+
+class LogNormal(Distribution):
+    """A positive number whose logarithm is normally distributed."""
+
+    median = Parameter(float, 1.0, min=0, doc="the median, e to the mean of the logarithm")
+    sigma = Parameter(float, 1.0, min=0, doc="standard deviation of the logarithm")
+
+    def draw(self, random: np.random.Generator) -> float:
+        return float(self.median * np.exp(random.normal(0.0, self.sigma)))
+
+
+class Exponential(Distribution):
+    """The exponential distribution: waiting times without memory."""
+
+    mean = Parameter(float, 1.0, min=0, doc="the mean, one over the rate")
+
+    def draw(self, random: np.random.Generator) -> float:
+        return float(random.exponential(self.mean))
+
+
+class Gamma(Distribution):
+    """The gamma distribution; with a whole ``shape`` the Erlang distribution."""
+
+    shape = Parameter(float, 1.0, min=0, doc="the shape k; k = 1 is the exponential distribution")
+    mean = Parameter(float, 1.0, min=0, doc="the mean, shape times scale")
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        if self.shape == 0:
+            raise ParameterError("Gamma.shape: 0 is not above 0")
+
+    def draw(self, random: np.random.Generator) -> float:
+        return float(random.gamma(self.shape, self.mean / self.shape))
+
+
+class Triangular(Distribution):
+    """The triangular distribution: a least, a likeliest and a greatest number."""
+
+    low = Parameter(float, 0.0, doc="the least number")
+    mode = Parameter(float, 0.5, doc="the likeliest number")
+    high = Parameter(float, 1.0, doc="the greatest number")
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        _check_order("low", self.low, "mode", self.mode)
+        _check_order("mode", self.mode, "high", self.high)
+
+    def draw(self, random: np.random.Generator) -> float:
+        # NumPy refuses an interval without width.
+        return float(random.triangular(self.low, self.mode, self.high)) if self.low < self.high else self.low
+
+
+class Bernoulli(Distribution):
+    """True with a probability, otherwise false."""
+
+    token_type: Any = bool
+
+    probability = Parameter(float, 0.5, min=0, max=1, doc="of true")
+
+    def draw(self, random: np.random.Generator) -> bool:
+        return bool(random.random() < self.probability)
+
+
+class RandomInteger(Distribution):
+    """All integers from ``low`` to ``high`` alike, both included."""
+
+    token_type: Any = int
+
+    low = Parameter(int, 0, doc="the least integer")
+    high = Parameter(int, 1, doc="the greatest integer")
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        _check_order("low", self.low, "high", self.high)
+
+    def draw(self, random: np.random.Generator) -> int:
+        return int(random.integers(self.low, self.high, endpoint=True))
+
+
+class Choice(Distribution):
+    """One of several values of any kind, all alike or by weight."""
+
+    values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is chosen from")
+    weights: Parameter[Any] = array_parameter(
+        (None,), None, min=0, doc="how likely each is, relative to the others; all alike if left out"
+    )
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        if not self.values:
+            raise ParameterError("Choice.values: the list is empty, there is nothing to choose from")
+        if self.weights is not None and (len(self.weights) != len(self.values) or not 0 < self.weights.sum() < np.inf):
+            raise ParameterError(
+                f"Choice.weights: {self.weights.tolist()} does not give a weight to each of {len(self.values)} values"
+            )
+        self.token_type = token_type(self.values)
+        weights = np.ones(len(self.values)) if self.weights is None else self.weights
+        self._sums = np.cumsum(weights / weights.sum())
+
+    def draw(self, random: np.random.Generator) -> Any:
+        # The last sum may fall short of 1 by rounding.
+        return self.values[min(int(np.searchsorted(self._sums, random.random(), side="right")), len(self.values) - 1)]
+
+
+def _check_order(low_name: str, low: float, high_name: str, high: float) -> None:
+    if low > high:
+        raise ParameterError(
+            f"{low_name} is {low:g} and {high_name} is {high:g}: {low_name} may not be above {high_name}"
+        )

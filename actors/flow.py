@@ -1,0 +1,145 @@
+"""Actors that hand tokens on: Merge, Router, Switch, BooleanSwitch, Select, Repeat."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from .core import Actor, InputPort, OutputPort, Parameter, PortError, PortParameter
+
+
+class Merge(Actor):
+    """Joins the tokens of all its channels into one stream, one token per microstep.
+
+    Of tokens at the same tag, that of the lowest channel comes first and the others in the microsteps after; with
+    ``discard`` the others are lost.  Ptolemy: ``Merge``.
+    """
+
+    input: InputPort[Any] = InputPort(Any, multi=True, doc="the streams")
+    output: OutputPort[Any] = OutputPort(Any, doc="one token at a time")
+
+    discard = Parameter(bool, False, doc="whether all but the first token of a tag are lost")
+
+    def initialize(self) -> None:
+        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+
+    def fire(self) -> None:
+        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
+            queue.extend(tokens)
+        first = next((queue for queue in self._waiting if queue), None)
+        if first is None:
+            return
+        self.output.send(first.popleft())
+        if self.discard:
+            for queue in self._waiting:
+                queue.clear()
+        elif any(self._waiting):
+            self.wake_in(0)
+
+
+class Router(Actor):
+    """Sends each token to one channel of its output: to each in turn, or to one at random.
+
+    Ptolemy: ``Distributor``.
+    """
+
+    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
+    output: OutputPort[Any] = OutputPort(Any, multi=True, doc="a channel for each connection, in their order")
+
+    policy = Parameter(str, "in turn", choices=("in turn", "random"), doc="how the channel is chosen")
+
+    def initialize(self) -> None:
+        self._next = 0
+
+    def fire(self) -> None:
+        if not self.output.width:
+            return
+        for token in self.input.tokens:
+            if self.policy == "random":
+                self._next = int(self.random.integers(self.output.width))
+            self.output.send(token, self._next)
+            self._next = (self._next + 1) % self.output.width
+
+
+class Switch(Actor):
+    """Sends each token to the channel of its output that the latest ``control`` token names.
+
+    Ptolemy: ``Switch``.
+    """
+
+    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
+    control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
+    output: OutputPort[Any] = OutputPort(Any, multi=True, doc="a channel for each connection, in their order")
+
+    def initialize(self) -> None:
+        self._channel = 0
+
+    def fire(self) -> None:
+        if self.control.present:
+            self._channel = _channel(self.control.value, self.control, self.output.width, "output")
+        for token in self.input.tokens:
+            self.output.send(token, self._channel)
+
+
+class BooleanSwitch(Actor):
+    """Sends each token to ``true_output`` or ``false_output``, as the latest ``control`` token says.
+
+    Ptolemy: ``BooleanSwitch``.
+    """
+
+    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
+    control = InputPort(bool, doc="where to; false until a token comes")
+    true_output: OutputPort[Any] = OutputPort(Any, doc="the tokens that come while control is true")
+    false_output: OutputPort[Any] = OutputPort(Any, doc="the tokens that come while control is false")
+
+    def initialize(self) -> None:
+        self._control = False
+
+    def fire(self) -> None:
+        if self.control.present:
+            self._control = self.control.value
+        for token in self.input.tokens:
+            (self.true_output if self._control else self.false_output).send(token)
+
+
+class Select(Actor):
+    """Hands on the tokens of the channel that the latest ``control`` token names; those of the others are lost.
+
+    Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1); its ``Select`` keeps the others.
+    """
+
+    input: InputPort[Any] = InputPort(Any, multi=True, doc="a channel for each connection, in their order")
+    control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
+    output: OutputPort[Any] = OutputPort(Any, doc="the tokens of the channel chosen")
+
+    def initialize(self) -> None:
+        self._channel = 0
+
+    def fire(self) -> None:
+        if self.control.present:
+            self._channel = _channel(self.control.value, self.control, self.input.width, "input")
+        for token in self.input.by_channel()[self._channel]:
+            self.output.send(token)
+
+
+class Repeat(Actor):
+    """Sends each token several times.
+
+    Ptolemy: ``Repeat``.
+    """
+
+    input: InputPort[Any] = InputPort(Any, doc="what is repeated")
+    output: OutputPort[Any] = OutputPort(Any, doc="each token, as often as told")
+
+    times = PortParameter(int, 2, min=0, doc="how often each token is sent")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            for _ in range(self.times):
+                self.output.send(token)
+
+
+def _channel(number: int, control: InputPort[Any], width: int, name: str) -> int:
+    if not 0 <= number < max(width, 1):
+        raise PortError(f"{control.path} is {number}, but {name} has {width} channels, counted from 0")
+    return int(number)

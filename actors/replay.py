@@ -1,0 +1,97 @@
+"""Replay: tokens from a recorded table."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from pathlib import Path
+from typing import Any, ClassVar
+
+from .core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, texts_parameter, to_nanoseconds
+
+
+class ReplayError(EpicycleError):
+    """A table that cannot be replayed; the message names the file."""
+
+
+class Replay(Actor):
+    """Sends the rows of a CSV or Parquet table, each at its time.
+
+    A table with one value column gives bare tokens, and an empty cell gives none; with several columns a token is a
+    mapping from column to value, an empty cell None.  Rows with equal times come in successive microsteps.  The file
+    lies in or below the folder of the YAML file that names it.
+    """
+
+    is_source: ClassVar[bool] = True
+
+    output: OutputPort[Any] = OutputPort(Any, doc="the value of a row, or a mapping of its values")
+
+    file = Parameter(Path, doc="a .csv file with a header line, or a .parquet file")
+    time = Parameter(str, "time", doc="the column of times, in s, ascending from 0 on")
+    columns: Parameter[Any] = texts_parameter(None, doc="the columns to send; all but the time if left out")
+
+    def __init__(self, path: str, **parameters: object) -> None:
+        super().__init__(path, **parameters)
+        if self.file.suffix.lower() not in (".csv", ".parquet"):
+            raise ParameterError(f"file: {self.file.name!r} ends neither in .csv nor in .parquet")
+
+    def initialize(self) -> None:
+        self._times, self._values = self._read()
+        self._row = 0
+        self._wake_up()
+
+    def _wake_up(self) -> None:
+        if self._row < len(self._times):
+            self.context.wake(self, self._times[self._row])
+
+    def fire(self) -> None:
+        token = self._values[self._row]
+        self._row += 1
+        self._wake_up()
+        if token is not None:
+            self.output.send(token)
+
+    def _read(self) -> tuple[list[int], list[Any]]:
+        """The times in ns and the tokens."""
+        table = self._table()
+        names = list(dict.fromkeys(table.column_names))
+        if len(names) != table.num_columns:
+            raise self._error(f"two columns have the same name: {', '.join(table.column_names)}")
+        columns = [name for name in names if name != self.time] if self.columns is None else list(self.columns)
+        for name in (self.time, *columns):
+            if name not in names:
+                near = difflib.get_close_matches(name, names, n=1)
+                hint = f", did you mean {near[0]!r}?" if near else ""
+                raise self._error(f"there is no column {name!r}{hint}; columns: {', '.join(names)}")
+        if not columns:
+            raise self._error(f"there is no column of values beside {self.time!r}")
+        times = self._check_times(table.column(self.time).to_pylist())
+        values = [table.column(name).to_pylist() for name in columns]
+        if len(columns) == 1:
+            return times, values[0]
+        return times, [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
+
+    def _table(self) -> Any:
+        # Heavy, and needed by this actor alone.
+        import pyarrow as arrow
+        from pyarrow import csv, parquet
+
+        try:
+            if self.file.suffix.lower() == ".csv":
+                return csv.read_csv(self.file)
+            return parquet.read_table(self.file)
+        except (OSError, arrow.ArrowException) as error:
+            raise self._error(str(error)) from None
+
+    def _check_times(self, times: list[Any]) -> list[int]:
+        result: list[int] = []
+        for row, time in enumerate(times, 1):
+            if isinstance(time, bool) or not isinstance(time, (int, float)) or not math.isfinite(time) or time < 0:
+                raise self._error(f"row {row}: {self.time} is {time!r}, not a time in s from 0 on")
+            if result and to_nanoseconds(time) < result[-1]:
+                raise self._error(f"row {row}: {self.time} is {time!r}, which is before the row above")
+            result.append(to_nanoseconds(time))
+        return result
+
+    def _error(self, reason: str) -> ReplayError:
+        return ReplayError(f"{self.file} cannot be replayed: {reason}")

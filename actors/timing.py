@@ -1,0 +1,101 @@
+"""Actors that deal with time: TimeDelay, Timer, ResettableTimer, TimeGap."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .core import Actor, InputPort, OutputPort, Parameter, PortParameter, Tag, Wake, to_seconds
+from .pending import Pending
+from .tokens import token_type
+
+
+class TimeDelay(Actor):
+    """Sends each token on after a delay; with delay 0 at the next microstep.
+
+    A token is delayed by what ``delay`` is at its own tag, so one may overtake another.  The output does not depend
+    on the inputs at once: the actor may stand in a loop.  Ptolemy: ``TimeDelay``, ``TimedDelay``, ``VariableDelay``.
+    """
+
+    input: InputPort[Any] = InputPort(Any, doc="what is delayed")
+    output: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="each token after its delay")
+
+    delay = PortParameter(float, 1.0, unit="s", min=0, doc="how long each token is held")
+
+    def initialize(self) -> None:
+        self._held: Pending[Any] = Pending(self)
+
+    def fire(self) -> None:
+        for token in self._held.due():
+            self.output.send(token)
+        for token in self.input.tokens:
+            self._held.put(token, self.delay)
+
+
+class _Timing(Actor):
+    """What timers share: they tell that a time is over by sending a value."""
+
+    input = InputPort(float, doc="after how many s to send")
+    output: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="the value, when the time is over")
+
+    value: Parameter[Any] = Parameter(object, True, doc="what is sent")
+
+    def __init__(self, path: str, **parameters: object) -> None:
+        super().__init__(path, **parameters)
+        self.output.type = token_type([self.value])
+
+
+class Timer(_Timing):
+    """Sends a value after as many seconds as a token says; any number of tokens may be waiting at once.
+
+    Ptolemy: ``Timer``.
+    """
+
+    def initialize(self) -> None:
+        self._running: Pending[None] = Pending(self)
+
+    def fire(self) -> None:
+        for _ in self._running.due():
+            self.output.send(self.value)
+        for delay in self.input.tokens:
+            if delay < 0:
+                raise ValueError(f"{self.input.path} is {delay:g} s: a timer cannot run for less than no time")
+            self._running.put(None, delay)
+
+
+class ResettableTimer(_Timing):
+    """Sends a value after as many seconds as the latest token says.
+
+    A further token before that starts the time again, a negative one stops it.  A token at the very tag at which the
+    time is over comes too late to stop that.  Ptolemy: ``ResettableTimer``.
+    """
+
+    def initialize(self) -> None:
+        self._wake: Wake | None = None
+
+    def fire(self) -> None:
+        if self._wake is not None and self._wake.due:
+            self._wake = None
+            self.output.send(self.value)
+        for delay in self.input.tokens:
+            if self._wake is not None:
+                self._wake.cancel()
+            self._wake = self.wake_in(delay) if delay >= 0 else None
+
+
+class TimeGap(Actor):
+    """Sends how much time has passed since the token before; nothing for the first one.
+
+    Ptolemy: ``TimeGap``.
+    """
+
+    input: InputPort[Any] = InputPort(Any, doc="the tokens between which time is taken")
+    output = OutputPort(float, doc="time since the token before, in s")
+
+    def initialize(self) -> None:
+        self._last: Tag | None = None
+
+    def fire(self) -> None:
+        for _ in self.input.tokens:
+            if self._last is not None:
+                self.output.send(to_seconds(self.tag.time - self._last.time))
+            self._last = self.tag
