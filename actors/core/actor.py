@@ -26,7 +26,10 @@ so it cannot know which aspects stand around it, and a run is a function of mode
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -158,8 +161,13 @@ class Actor(Configurable):
         return self.context.wake(self, to_nanoseconds(time))
 
 
-def declared_ports(cls: type) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+_declared: WeakKeyDictionary[type, Mapping[str, InputPort[Any] | OutputPort[Any]]] = WeakKeyDictionary()
+
+
+def declared_ports(cls: type) -> Mapping[str, InputPort[Any] | OutputPort[Any]]:
     """The ports of an actor class by name, those of its bases first."""
+    if (known := _declared.get(cls)) is not None:  # asked for every instance of a class
+        return known
     found: dict[str, InputPort[Any] | OutputPort[Any]] = {}
     for base in reversed(cls.__mro__):
         for name, value in vars(base).items():
@@ -167,4 +175,4 @@ def declared_ports(cls: type) -> dict[str, InputPort[Any] | OutputPort[Any]]:
                 found[name] = value
             elif isinstance(value, PortParameter):
                 found[name] = value.port
-    return found
+    return _declared.setdefault(cls, MappingProxyType(found))

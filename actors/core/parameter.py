@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import types
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, overload
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +95,13 @@ class Parameter(Generic[T]):
     def required(self) -> bool:
         """Whether a value must be given."""
         return self.default is REQUIRED
+
+    @cached_property
+    def default_value(self) -> T | None:
+        """The default as it is stored in an instance."""
+        if self.default is None or isinstance(self.default, Configurable):
+            return self.default
+        return self.convert(self.default)
 
     def describe_type(self) -> str:
         """The type in words, for messages and the reference."""
@@ -244,7 +253,7 @@ class Configurable:
             elif parameter.required:
                 raise ParameterError(f"{type(self).__name__} needs a value for {name!r}")
             else:
-                self.__dict__[name] = _default(parameter)
+                self.__dict__[name] = parameter.default_value
 
     def __init_subclass__(cls, **keywords: object) -> None:
         super().__init_subclass__(**keywords)
@@ -257,20 +266,19 @@ class Configurable:
         return f"{type(self).__name__}({values})"
 
 
-def _default(parameter: Parameter[Any]) -> object:
-    if parameter.default is None or isinstance(parameter.default, Configurable):
-        return parameter.default
-    return parameter.convert(parameter.default)
+_declared: WeakKeyDictionary[type, Mapping[str, Parameter[Any]]] = WeakKeyDictionary()
 
 
-def declared_parameters(cls: type) -> dict[str, Parameter[Any]]:
+def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
     """The parameters of a class by name, those of its bases first."""
+    if (known := _declared.get(cls)) is not None:  # asked for every instance of a class
+        return known
     found: dict[str, Parameter[Any]] = {}
     for base in reversed(cls.__mro__):
         for name, value in vars(base).items():
             if isinstance(value, Parameter):
                 found[name] = value
-    return found
+    return _declared.setdefault(cls, types.MappingProxyType(found))
 
 
 def unknown_parameter(cls: type, name: str) -> str:

@@ -10,6 +10,7 @@ import contextlib
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from typing import ParamSpec, TypeVar
 
 from ..core import UnitError, did_you_mean
@@ -50,7 +51,7 @@ def interpolate(text: str, names: Mapping[str, object]) -> object:
 
     `$${` stands for `${` itself.
     """
-    pieces = list(_pieces(text))
+    pieces = _pieces(text)
     parts: list[str] = []
     for offset, source in pieces:
         if offset is None:
@@ -67,14 +68,15 @@ def interpolate(text: str, names: Mapping[str, object]) -> object:
     return whole
 
 
-def names_in(text: str) -> set[str]:
+@lru_cache(maxsize=4096)  # a model asks for the same few texts once per copy of an actor
+def names_in(text: str) -> frozenset[str]:
     """Return the names that the `${...}` of a text ask for; constants and functions are left out."""
     found: set[str] = set()
     for offset, source in _pieces(text):
         if offset is not None:
             with _shifted(offset):
                 found |= free_names(parse(source), frozenset())
-    return found - CONSTANTS.keys()
+    return frozenset(found - CONSTANTS.keys())
 
 
 # --- finding expressions in a text --------------------------------------------------------------------
@@ -85,8 +87,10 @@ _LEXEME = re.compile(
 )
 
 
-def _pieces(text: str) -> Iterator[tuple[int | None, str]]:
-    """Yield the text in pieces: literal text with None, expressions with the offset at which they start."""
+@lru_cache(maxsize=4096)
+def _pieces(text: str) -> tuple[tuple[int | None, str], ...]:
+    """Return the text in pieces: literal text with None, expressions with the offset at which they start."""
+    pieces: list[tuple[int | None, str]] = []
     literal = ""
     done = 0
     while opening := _OPENING.search(text, done):
@@ -96,17 +100,18 @@ def _pieces(text: str) -> Iterator[tuple[int | None, str]]:
             literal += "${"
             continue
         if literal:
-            yield None, literal
+            pieces.append((None, literal))
             literal = ""
         end = _end_of_expression(text, done)
         if end is None:
             start = opening.start()
             raise ExpressionError("this '${' has no closing '}'", start, len(text) - start)
-        yield done, text[done:end]
+        pieces.append((done, text[done:end]))
         done = end + 1
     literal += text[done:]
     if literal:
-        yield None, literal
+        pieces.append((None, literal))
+    return tuple(pieces)
 
 
 def _end_of_expression(text: str, start: int) -> int | None:

@@ -28,6 +28,7 @@ from .files import data_file
 from .graph import ModelGraph
 from .model import Model
 from .observation import Observation
+from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean, nearest
 from .settings import Setting, Settings
 from .values import Values
@@ -82,8 +83,9 @@ class Elaborator:
             self._body("", root, names, ())
         except _TooLargeError:
             return Model(root.name)
+        ports = PathIndex(self.graph.ports.nodes)
         for name, scope, part, scope_names in self._to_weave:
-            self._aspect(name, scope, part, scope_names)
+            self._aspect(name, scope, part, scope_names, ports)
         for setting in self.settings.unused():
             self._add_unused(setting)
         check(self.graph, self.problems)
@@ -336,7 +338,7 @@ class Elaborator:
 
     # -- aspects ------------------------------------------------------------------------------------
 
-    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> None:
+    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], all_ports: PathIndex) -> None:
         known = self.catalogue.aspects
         cls = known.get(part.type.text)
         if cls is None:
@@ -355,7 +357,7 @@ class Elaborator:
                 "add 'at:' with ports or patterns",
                 scope=scope,
             )
-        ports = select_ports(self.graph, name, cls, scope, part.at, self.problems)
+        ports = select_ports(self.graph, all_ports, name, cls, scope, part.at, self.problems)
         if self._is_enabled(name, scope, part, names) and values is not None:
             try:
                 self.aspects.append(WovenAspect(name, cls(**values), ports))

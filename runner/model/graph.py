@@ -6,7 +6,7 @@ an actor's output port, through any composite ports, to an actor's input port.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,6 +57,8 @@ class ModelGraph:
         self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
         self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
         self.is_wired = True  # whether every connection that the model declares has been made
+        self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
+        self._incoming: dict[str, list[Hop]] = {}
         self._order = 0
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
@@ -83,19 +85,21 @@ class ModelGraph:
         hop = Hop(source, destination, delay, position, self._order)
         self._order += 1
         self.ports.add_edge(source, destination, key=hop.order, hop=hop)
+        self._outgoing.setdefault(source, []).append(hop)
+        self._incoming.setdefault(destination, []).append(hop)
 
     def direction(self, path: str) -> str:
         """``input`` or ``output``."""
         direction: str = self.ports.nodes[path]["direction"]
         return direction
 
-    def outgoing(self, path: str) -> list[Hop]:
+    def outgoing(self, path: str) -> Sequence[Hop]:
         """The connections that leave a port, in the order of their declaration."""
-        return sorted((data["hop"] for *_, data in self.ports.out_edges(path, data=True)), key=_order)
+        return self._outgoing.get(path, ())
 
-    def incoming(self, path: str) -> list[Hop]:
+    def incoming(self, path: str) -> Sequence[Hop]:
         """The connections that enter a port, in the order of their declaration."""
-        return sorted((data["hop"] for *_, data in self.ports.in_edges(path, data=True)), key=_order)
+        return self._incoming.get(path, ())
 
     def wires_from(self, port: OutputPort[Any]) -> list[Wire]:
         """All wires that begin at an output port."""
@@ -188,7 +192,3 @@ class ModelGraph:
         # sorted() is stable, so declaration order decides ties.
         ranked = sorted(self.actors, key=lambda path: actor_depth(self.actors[path]))
         return {path: rank for rank, path in enumerate(ranked)}
-
-
-def _order(hop: Hop) -> int:
-    return hop.order

@@ -8,7 +8,7 @@ from epicycle.actors import Parameter, ParameterError, accepts, type_name
 
 from .declarations import DeclarationReader, MetricText, ModelText, Text
 from .model import Metric, Model, nanoseconds
-from .patterns import PatternError, select
+from .patterns import PathIndex, PatternError
 from .problems import Problems, nearest
 from .values import Values
 
@@ -24,7 +24,8 @@ class Observation:
         self.graph = model.graph
         self.values = values
         self.problems = problems
-        self._outputs = [path for path in self.graph.ports.nodes if self.graph.direction(path) == "output"]
+        ports = self.graph.ports.nodes(data="direction")
+        self._outputs = PathIndex(path for path, direction in ports if direction == "output")
 
     def read(self, text: ModelText, names: dict[str, object]) -> None:
         """Everything that the model file says about it."""
@@ -83,7 +84,7 @@ class Observation:
     def _select(self, text: Text, what: str) -> list[str]:
         """The output ports that a pattern selects, composites' included."""
         try:
-            found = select(text.text, self._outputs)
+            found = self._outputs.select(text.text)
         except PatternError as error:
             self.problems.add(f"{what}: {text.text!r} is no pattern: {error}", text.position)
             return []

@@ -7,8 +7,8 @@ segments.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from functools import lru_cache
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property, lru_cache
 
 _SEGMENT = re.compile(r"(\*\*|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?\Z")
 
@@ -20,14 +20,8 @@ class PatternError(ValueError):
 @lru_cache(maxsize=4096)
 def compile_pattern(text: str) -> re.Pattern[str]:
     """The regular expression of a pattern; raises ``PatternError``."""
-    if len(text) > 1000:
-        raise PatternError("a pattern has at most 1,000 characters")
     parts = []
-    for segment in text.split("."):
-        match = _SEGMENT.match(segment)
-        if match is None:
-            raise PatternError(f"{segment!r} is not a name, a name with an index, '*' or '**'")
-        name, index = match.group(1), match.group(3)
+    for name, index in _segments(text):
         if name == "**":
             parts.append(r"(?:[^.]+\.)*[^.]+")
         elif name == "*":
@@ -37,6 +31,19 @@ def compile_pattern(text: str) -> re.Pattern[str]:
         else:
             parts.append(re.escape(name) + (r"\[\d+\]" if index == "*" else re.escape(f"[{index}]")))
     return re.compile(r"\.".join(parts) + r"\Z")
+
+
+def _segments(text: str) -> list[tuple[str, str | None]]:
+    """The names and indices of a pattern; raises ``PatternError``."""
+    if len(text) > 1000:
+        raise PatternError("a pattern has at most 1,000 characters")
+    found = []
+    for segment in text.split("."):
+        match = _SEGMENT.match(segment)
+        if match is None:
+            raise PatternError(f"{segment!r} is not a name, a name with an index, '*' or '**'")
+        found.append((match.group(1), match.group(3)))
+    return found
 
 
 def matches(pattern: str, path: str) -> bool:
@@ -62,5 +69,43 @@ def could_be_within(pattern: str, path: str, *, array: bool) -> bool:
 
 def select(pattern: str, paths: Iterable[str]) -> list[str]:
     """The paths that the pattern selects, in their order."""
-    expression = compile_pattern(pattern)
-    return [path for path in paths if expression.match(path)]
+    return PathIndex(paths).select(pattern)
+
+
+class PathIndex:
+    """Paths, for patterns to choose from without a look at each of them: a model may have many of both."""
+
+    def __init__(self, paths: Iterable[str]) -> None:
+        self._place = {path: place for place, path in enumerate(paths)}
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._place)
+
+    def select(self, pattern: str) -> list[str]:
+        """The paths that the pattern selects, in their order; raises ``PatternError``."""
+        if "*" not in pattern:
+            _segments(pattern)
+            return [pattern] if pattern in self._place else []
+        expression = compile_pattern(pattern)
+        # Where the first wildcard stands, `name[*]` still says the name.
+        fixed = pattern.partition("*")[0].rstrip("[.")
+        candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else list(self._place)
+        return [path for path in candidates if expression.match(path)]
+
+    def in_order(self, paths: Iterable[str]) -> list[str]:
+        """The given paths in their order here."""
+        return sorted(paths, key=self._place.__getitem__)
+
+    @cached_property
+    def _within(self) -> dict[str, list[str]]:
+        """The paths by what they begin with: whole segments, the last one also without its index."""
+        found: dict[str, list[str]] = {}
+        for path in self._place:
+            end = len(path)
+            while (end := path.rfind(".", 0, end)) > 0:
+                found.setdefault(path[:end], []).append(path)
+                if path[end - 1] == "]":
+                    found.setdefault(path[: path.rindex("[", 0, end)], []).append(path)
+            if path[-1] == "]":
+                found.setdefault(path[: path.rindex("[")], []).append(path)
+        return found

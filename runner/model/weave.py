@@ -8,7 +8,7 @@ from epicycle.aspects import Aspect
 
 from .declarations import Text
 from .graph import ModelGraph
-from .patterns import PatternError, select
+from .patterns import PathIndex, PatternError
 from .problems import Problems, nearest
 
 
@@ -22,27 +22,34 @@ class WovenAspect:
 
 
 def select_ports(
-    graph: ModelGraph, name: str, aspect: type[Aspect], scope: str, pointcuts: list[Text], problems: Problems
+    graph: ModelGraph,
+    ports: PathIndex,
+    name: str,
+    aspect: type[Aspect],
+    scope: str,
+    pointcuts: list[Text],
+    problems: Problems,
 ) -> list[str]:
     """The ports that the pointcuts of an aspect select; a pointcut that selects none is a problem.
 
-    ``scope`` is the composite in which the aspect is declared, whose inside its pointcuts are relative to.
+    ``ports`` is the index of all ports; ``scope`` is the composite in which the aspect is declared, whose inside its
+    pointcuts are relative to.
     """
     chosen: dict[str, None] = {}
     for pointcut in pointcuts:
         full = f"{scope}.{pointcut.text}" if scope else pointcut.text
         try:
-            found = select(full, graph.ports.nodes)
+            found = ports.select(full)
         except PatternError as error:
             problems.add(f"aspect {name}: {pointcut.text!r} is no pointcut: {error}", pointcut.position, scope=scope)
             continue
         fitting = [port for port in found if graph.direction(port) in aspect.stands_at]
         if not found and not graph.is_excused(full):
-            close = nearest(full, [path for path in graph.ports.nodes if graph.direction(path) in aspect.stands_at])
+            close = nearest(full, [path for path in ports if graph.direction(path) in aspect.stands_at])
             problems.add(
                 f"aspect {name}: {pointcut.text!r} matches no port" + (f", did you mean {close!r}?" if close else ""),
                 pointcut.position,
-                _valid_ends(full, graph),
+                _valid_ends(full, ports),
                 scope=scope,
             )
         elif found and not fitting:
@@ -53,12 +60,11 @@ def select_ports(
                 scope=scope,
             )
         chosen.update(dict.fromkeys(fitting))
-    order = {path: index for index, path in enumerate(graph.ports.nodes)}
-    return sorted(chosen, key=order.__getitem__)
+    return ports.in_order(chosen)
 
 
-def _valid_ends(pattern: str, graph: ModelGraph) -> str:
+def _valid_ends(pattern: str, ports: PathIndex) -> str:
     """Port names that exist at the pattern's depth, to choose from."""
     depth = pattern.count(".")
-    ends = sorted({path.rpartition(".")[2] for path in graph.ports.nodes if path.count(".") == depth})
+    ends = sorted({path.rpartition(".")[2] for path in ports if path.count(".") == depth})
     return f"ports at this depth: {', '.join(ends)}" if ends else "no port has so many dots"
