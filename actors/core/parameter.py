@@ -237,7 +237,7 @@ class Configurable:
     """Something with declared parameters: actors, aspects and the parts that they are made of."""
 
     # Names that the YAML uses beside parameters, which no parameter may take.
-    reserved: ClassVar[frozenset[str]] = frozenset({"type", "count"})
+    reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority"})
 
     def __init__(self, **values: object) -> None:
         declared = declared_parameters(type(self))

@@ -3,8 +3,8 @@
 Order of events
 ---------------
 Events are ordered by tag, that is by time and then microstep.  Within a tag, tokens whose delay is over are put into
-their ports first, in the order in which they were sent; then actors fire by rank (``ModelGraph.firing_order``: depth
-in the graph of connections without delay, ties in the order of declaration).  A firing sees all tokens that its actor
+their ports first, in the order in which they were sent; then actors fire by rank (``firing_order``: depth in the graph
+of connections without delay, then priority, ties in the order of declaration).  A firing sees all tokens that its actor
 gets at this tag, because all that can still send to it within the tag have a lower rank.  An actor therefore fires
 once per tag; the exception is one with an output that does not depend on an input at once (``depends_on``), which
 may have to send before that input is there: it fires again when it comes.
@@ -117,6 +117,10 @@ class Director:
         """Put a token into a port at the present tag."""
         port.put(token, channel)
         self._want(port.actor, self.tag)
+
+    def trigger(self, actor: Actor) -> None:
+        """Fire ``actor`` at the present tag."""
+        self._want(actor, self.tag)
 
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""

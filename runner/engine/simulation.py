@@ -19,13 +19,13 @@ from epicycle.actors import (
 )
 from epicycle.aspects import JoinPoint
 
-from ..model import Hop, Model, WovenAspect
+from ..model import Hop, Model, WovenAspect, firing_order
 from .director import ActorError, Director, describe
+from .local import Deliver, LocalDirector, Passage
 from .log import EventLog
 from .results import Reduction, Results
 from .signal import Signal
 
-Deliver = Callable[[Any], None]
 Emit = Callable[[Any, int | None], None]
 
 
@@ -41,10 +41,12 @@ class Simulation:
         if self.seed < 0:
             raise ValueError(f"a seed is a whole number from 0 up, not {self.seed}")
         self.log = EventLog(keep_log)
-        self.director = Director(model.graph.firing_order(), self.seed)
+        self.director = Director(firing_order(model.graph), self.seed)
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
         self.signals = {name: Signal(name) for name in model.recorded}
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
+        self._directors: dict[str, Director | LocalDirector] = {}
+        self._passages: dict[str, Passage] = {}
         self._listeners: dict[str, list[Deliver]] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
         self._emits: list[tuple[OutputPort[Any], Emit]] = []
@@ -53,22 +55,6 @@ class Simulation:
         self._started = 0.0
         self._listen()
         self._wire()
-
-    # -- what aspects may ask, beside the director ----------------------------------------------------------------
-
-    @property
-    def tag(self) -> Tag:
-        """The present tag."""
-        return self.director.tag
-
-    def later(self, delay: int, deliver: Deliver, token: Any) -> None:
-        """Call ``deliver(token)`` after ``delay`` ns."""
-        self.director.later(delay, deliver, token)
-
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
-        """Write an act of an aspect into the log."""
-        actor, _, name = port.rpartition(".")
-        self.log.add(self.director.tag, event, actor, name, None, aspect, token)
 
     # -- wiring ---------------------------------------------------------------------------------------------------
 
@@ -95,6 +81,10 @@ class Simulation:
     def _wire(self) -> None:
         """Find the ways from every output port to the ports behind it, through delays and join points."""
         graph = self.model.graph
+        for composite, clock in graph.clocks.items():
+            self._directors[composite] = self.director if clock.is_global else LocalDirector(self.director, clock)
+            for paths in graph.borders(composite):
+                self._passages.update({path: Passage(path, self.director) for path in paths})
         for woven in self.model.aspects:
             for path in woven.ports:
                 self._woven_at.setdefault(path, []).append(woven)
@@ -153,27 +143,35 @@ class Simulation:
                 onward = self._put(port, channels[taken])
             else:
                 onward = _all(self._listeners.get(far, []) + self._branches(far, taken, channels))
-            ways.append(self._over(hop, onward))
+            ways.append(self._over(hop, onward, taken))
         return ways
 
     def _way(self, hops: tuple[Hop, ...], channel: int) -> Deliver:
         """The way along one wire alone, for tokens that are sent to one channel."""
         onward = self._put(self.model.graph.ports.nodes[hops[-1].destination]["port"], channel)
         for hop in reversed(hops):
-            onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]))
+            onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]), hops)
         return onward
 
-    def _over(self, hop: Hop, onward: Deliver) -> Deliver:
-        """One connection: its delay, and the aspects at its far end."""
-        onward = self._woven(hop.destination, onward)
-        return onward if hop.delay is None else self._delayed(hop.delay, onward)
+    def _over(self, hop: Hop, onward: Deliver, channel: tuple[Hop, ...]) -> Deliver:
+        """One connection: its delay, and the aspects and the passage at its far end."""
+        far = hop.destination
+        passage = self._passages.get(far)
+        # Aspects at a port of a composite stand outside of it.
+        if passage is not None and self.model.graph.direction(far) == "input":
+            onward = self._woven(far, passage.lane(channel, onward))
+        elif passage is not None:
+            onward = passage.lane(channel, self._woven(far, onward))
+        else:
+            onward = self._woven(far, onward)
+        return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
 
     def _put(self, port: InputPort[Any], channel: int) -> Deliver:
         put = self.director.put
         return lambda token: put(port, channel, token)
 
-    def _delayed(self, delay: int, onward: Deliver) -> Deliver:
-        later = self.director.later
+    def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:
+        later = self._directors[self.model.graph.director_over(hop)].later
         return lambda token: later(delay, onward, token)
 
     def _woven(self, path: str, onward: Deliver) -> Deliver:
@@ -192,13 +190,15 @@ class Simulation:
                 raise
             except Exception as error:
                 raise ActorError(
-                    f"aspect {woven.name}", self.tag, f"pass_token() at {path}", describe(error)
+                    f"aspect {woven.name}", self.director.tag, f"pass_token() at {path}", describe(error)
                 ) from error
 
         return through
 
     def _point(self, name: str, path: str, onward: Deliver) -> JoinPoint:
-        point = JoinPoint(name, path, self, onward)
+        graph = self.model.graph
+        loom = Loom(self._directors[graph.director_of(graph.owner(path))], self.director, self.log)
+        point = JoinPoint(name, path, loom, onward)
         first = self._points_at.setdefault((name, path), point)
         if first is point:
             self.points[name].append(point)
@@ -217,7 +217,7 @@ class Simulation:
         actors = list(self.model.graph.actors.values())
         director = self.director
         for actor in actors:
-            actor.enter(director)
+            actor.enter(self._directors[self.model.graph.director_of(actor.path)])
             for port in actor.inputs.values():
                 port.clear()  # of what a failed run has left there
         self._started = time.perf_counter()
@@ -271,7 +271,7 @@ class Simulation:
         try:
             getattr(actor, method)()
         except Exception as error:
-            raise ActorError(actor.path, self.tag, f"{method}()", describe(error)) from error
+            raise ActorError(actor.path, self.director.tag, f"{method}()", describe(error)) from error
 
     def _placed(self, error: ActorError) -> ActorError:
         """The error with the place in the model file where its actor is declared."""
@@ -289,6 +289,27 @@ class Simulation:
                     total[event] = total.get(event, 0) + number
             counts[woven.name] = total
         return counts
+
+
+class Loom:
+    """What the engine offers to a join point: the time of the director that it stands under, and the log."""
+
+    def __init__(self, local: Director | LocalDirector, director: Director, log: EventLog) -> None:
+        self.seed = director.seed
+        self.later = local.later
+        self._local = local
+        self._director = director
+        self._log = log
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag."""
+        return self._local.tag
+
+    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
+        """Write an act of an aspect into the log."""
+        actor, _, name = port.rpartition(".")
+        self._log.add(self._director.tag, event, actor, name, None, aspect, token)
 
 
 def _all(ways: list[Deliver]) -> Deliver:

@@ -1,12 +1,15 @@
 """From YAML text to a checked model: document, declarations, elaboration, graph."""
 
+from .clock import Clock
 from .graph import Hop, ModelGraph, Wire
 from .load import load_model, packaged_models
 from .model import Metric, Model
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
+from .schedule import firing_order
 from .weave import WovenAspect
 
 __all__ = [
+    "Clock",
     "Hop",
     "Metric",
     "Model",
@@ -18,6 +21,7 @@ __all__ = [
     "Wire",
     "WovenAspect",
     "did_you_mean",
+    "firing_order",
     "load_model",
     "packaged_models",
 ]

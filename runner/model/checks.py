@@ -10,6 +10,7 @@ from epicycle.actors import InputPort, accepts, type_name
 
 from .graph import Hop, ModelGraph, Wire
 from .problems import Position, Problems
+from .schedule import dependencies
 
 MAX_WIRES = 1_000_000
 MAX_PASSAGE = 200  # composite ports in a row
@@ -132,40 +133,52 @@ def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
 
 def check_loops(graph: ModelGraph, problems: Problems) -> None:
     """Every loop needs a delay somewhere, or no order of firing exists within a tag."""
-    dependencies = graph.immediate_dependencies()
     declared = {path: place for place, path in enumerate(graph.ports.nodes)}
-    for component in nx.strongly_connected_components(dependencies):
-        if len(component) < 2:
-            continue
-        # A graph of our own in the order of declaration: a view would follow that of a set, which varies between runs.
-        inner = nx.DiGraph()
-        for path in sorted(component, key=declared.__getitem__):
-            inner.add_edges_from((path, far, data) for far, data in dependencies.adj[path].items() if far in component)
-        wires = _shortest_loop(inner)
-        actors = [wire.source.actor.path for wire in wires]
-        # It begins with the actor that is declared first, so its last wire is the one that leads back.  Of that wire,
-        # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
-        back = min(wires[-1].hops, key=lambda hop: (_scope(graph, hop).count("."), hop.order))
-        problems.add(
-            f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
-            back.position,
-            *map(_step, wires),
-            f"give one of these connections a delay, best the one that leads back: {_with_delay(graph, back)}",
-        )
+    for region in dependencies(graph).values():
+        for component in nx.strongly_connected_components(region):
+            if len(component) > 1:
+                # A graph in the order of declaration: a view would follow that of a set, which varies between runs.
+                inner = nx.DiGraph()
+                for path in sorted(component, key=declared.__getitem__):
+                    inner.add_edges_from((path, far, way) for far, way in region.adj[path].items() if far in component)
+                _add_loop(graph, _shortest_loop(graph, inner), problems)
 
 
-def _shortest_loop(inner: nx.DiGraph) -> list[Wire]:
-    """The wires of a loop from the first port of a strongly connected graph back to it."""
-    start = next(iter(inner))
-    ways = [nx.shortest_path(inner, after, start) for after in inner.successors(start)]
-    loop = [start, *min(ways, key=len)]
-    wires = [inner.edges[edge].get("wire") for edge in pairwise(loop)]
-    return [wire for wire in wires if wire is not None]
+def _shortest_loop(graph: ModelGraph, inner: nx.DiGraph) -> list[list[Hop]]:
+    """The ways from actor to actor around a loop, from the first actor of a strongly connected graph back to it."""
+    start = next(path for path in inner if graph.is_end(path))
+    loop = [start, *min((nx.shortest_path(inner, after, start) for after in inner.successors(start)), key=len)]
+    ways: list[list[Hop]] = []
+    for edge in pairwise(loop):
+        hop = inner.edges[edge].get("hop")
+        if hop is not None:
+            if graph.is_end(hop.source):
+                ways.append([])
+            ways[-1].append(hop)
+    return ways
 
 
-def _step(wire: Wire) -> str:
-    ports = [wire.source.path, *(hop.destination for hop in wire.hops)]
-    places = [f"{hop.position.file}:{hop.position.line}" for hop in wire.hops if hop.position is not None]
+def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> None:
+    actors = [graph.owner(way[0].source) for way in ways]
+    # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
+    # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
+    back = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
+    problems.add(
+        f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
+        back.position,
+        *map(_step, ways),
+        *(
+            f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
+            for path in dict.fromkeys(actors)
+            if path in graph.clocks
+        ),
+        f"give one of these connections a delay, best the one that leads back: {_with_delay(graph, back)}",
+    )
+
+
+def _step(way: list[Hop]) -> str:
+    ports = [way[0].source, *(hop.destination for hop in way)]
+    places = [f"{hop.position.file}:{hop.position.line}" for hop in way if hop.position is not None]
     return " -> ".join(ports) + (f" ({', '.join(dict.fromkeys(places))})" if places else "")
 
 

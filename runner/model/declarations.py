@@ -29,7 +29,8 @@ MODEL_KEYS = (
     "figures",
 )
 LIBRARY_KEYS = ("doc", "include", "composites")
-COMPOSITE_KEYS = ("doc", "parameters", "inputs", "outputs", "actors", "connections", "aspects")
+COMPOSITE_KEYS = ("doc", "parameters", "inputs", "outputs", "director", "actors", "connections", "aspects")
+DIRECTOR_KEYS = ("start", "drift")
 PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
 CONNECTION_KEYS = ("from", "to", "delay")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
@@ -70,6 +71,7 @@ class PartText:
     count: Node | None = None
     at: list[Text] = field(default_factory=list)
     enabled: Node | None = None
+    priority: Node | None = None
 
 
 @dataclass
@@ -104,6 +106,7 @@ class CompositeText:
     parameters: dict[str, ParameterText] = field(default_factory=dict)
     inputs: dict[str, Position] = field(default_factory=dict)
     outputs: dict[str, Position] = field(default_factory=dict)
+    director: dict[str, Entry] | None = None  # what is said of its own one
     actors: dict[str, PartText] = field(default_factory=dict)
     connections: list[ConnectionText] = field(default_factory=list)
     is_wired: bool = True  # whether all its connections could be read
@@ -187,6 +190,9 @@ class DeclarationReader:
                     if port.text in result.inputs or port.text in result.outputs:
                         self.problems.add(f"port {port.text!r} is declared twice", port.position)
                     ports[port.text] = port.position
+        if "director" in entries:
+            director = self.entries(entries["director"].value, f"the director of {name!r}", DIRECTOR_KEYS)
+            result.director = {} if director is None else director
         for key, entry in self.named(entries, "actors"):
             if (part := self.part(key, entry, "actor")) is not None:
                 result.actors[key] = part
@@ -263,8 +269,10 @@ class DeclarationReader:
         if type_name is None:
             return None
         part = PartText(name, entry.key.position, Text(type_name, kind_entry.value.position), values)
-        if kind == "actor" and "count" in values:
-            part.count = values.pop("count").value
+        if kind == "actor":
+            for key in ("count", "priority"):
+                if key in values:
+                    setattr(part, key, values.pop(key).value)
         if kind == "aspect":
             if "at" in values:
                 part.at = self.texts(values.pop("at").value, "at")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
+from typing import Any
 
 from epicycle.actors import (
     Actor,
@@ -17,6 +18,7 @@ from epicycle.actors import (
     ParameterError,
     declared_parameters,
     plain,
+    to_nanoseconds,
     unknown_parameter,
 )
 
@@ -285,6 +287,7 @@ class Elaborator:
             instance = f"{path}[{index}]" if part.count is not None else path
             scope = {**names, "index": index} if part.count is not None else names
             child.paths.append(instance)
+            self._prioritise(instance, composite, inner, part, scope)
             if inner is not None:
                 self._composite(instance, inner, part, scope, within)
             elif actor_type is not None:
@@ -322,7 +325,48 @@ class Elaborator:
         for direction, ports in (("input", composite.inputs), ("output", composite.outputs)):
             for name in ports:
                 self.graph.add_composite_port(f"{path}.{name}", direction, part.position)
+        if composite.director is not None:
+            start, drift = self._clock(path, composite.director, inside)
+            self.graph.add_director(path, start, drift)
         self._body(path, composite, inside, (*within, composite.name))
+
+    def _clock(self, path: str, director: dict[str, Entry], names: dict[str, object]) -> tuple[int | None, float]:
+        """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""
+        found: dict[str, Any] = {"start": None, "drift": 1.0}
+        for key, entry in director.items():
+            value = self.values.of(entry.value, names, f"{path}: director.{key}", path)
+            if value is self.values.missing:
+                continue
+            try:
+                if key == "start":
+                    found[key] = to_nanoseconds(Parameter(float, unit="s").convert(value) or 0.0)
+                else:
+                    found[key] = Parameter(float, unit="1", min=1e-6, max=1e6).convert(value)
+            except (ParameterError, ValueError) as error:
+                self.problems.add(f"{path}: director.{key}: {error}", entry.value.position, scope=path)
+        return found["start"], found["drift"]
+
+    def _prioritise(
+        self, path: str, composite: str, inner: CompositeText | None, part: PartText, names: dict[str, object]
+    ) -> None:
+        """Note the priority of an actor, or of a composite that fires as one."""
+        if part.priority is None:
+            return
+        if inner is not None and inner.director is None:
+            self.problems.add(
+                f"{path}: {inner.name} has no priority, for its actors fire one by one",
+                part.priority.position,
+                f"give the actors inside a priority, or give {inner.name} a director of its own: 'director: {{}}'",
+                scope=composite,
+            )
+            return
+        value = self.values.of(part.priority, names, f"{path}: priority", composite)
+        if value is self.values.missing:
+            return
+        try:
+            self.graph.priorities[path] = Parameter(int).convert(value) or 0
+        except ParameterError as error:
+            self.problems.add(f"{path}: priority: {error}", part.priority.position, scope=composite)
 
     def _make(
         self, path: str, composite: str, actor_type: type[Actor], part: PartText, names: dict[str, object]

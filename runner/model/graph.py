@@ -14,6 +14,7 @@ import networkx as nx
 
 from epicycle.actors import Actor, InputPort, OutputPort, declared_ports
 
+from .clock import Clock
 from .patterns import could_be_within
 from .problems import Position
 
@@ -53,21 +54,34 @@ class ModelGraph:
         self.ports: Any = nx.MultiDiGraph()
         self.actors: dict[str, Actor] = {}
         self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
+        # The composites with a director of their own, which are actors to the graph around them; "" is the model.
+        self.clocks: dict[str, Clock] = {"": Clock()}
+        self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
+        self.priorities: dict[str, int] = {}
         self.positions: dict[str, Position] = {}
         self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
         self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
         self.is_wired = True  # whether every connection that the model declares has been made
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
+        self._borders: dict[str, tuple[list[str], list[str]]] = {}
         self._order = 0
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         """Add an actor and its ports."""
         self.actors[actor.path] = actor
+        self.members[self.director_of(actor.path)].append(actor.path)
         if position is not None:
             self.positions[actor.path] = position
         for port in (*actor.inputs.values(), *actor.outputs.values()):
             self.ports.add_node(port.path, port=port, direction=port.direction)
+
+    def add_director(self, path: str, start: int | None, drift: float) -> None:
+        """Give a composite a director of its own; ``start`` (ns) and ``drift`` are those of its clock."""
+        outer = self.director_of(path)
+        self.members[outer].append(path)
+        self.members[path] = []
+        self.clocks[path] = self.clocks[outer].inside(start, drift)
 
     def add_unmade(self, path: str, actor_type: type[Actor]) -> None:
         """Add the ports of an actor that could not be made, so that what names them is not wrong as well."""
@@ -77,6 +91,7 @@ class ModelGraph:
     def add_composite_port(self, path: str, direction: str, position: Position | None) -> None:
         """Add a port of a composite; tokens only pass through it."""
         self.ports.add_node(path, port=None, direction=direction)
+        self._borders.setdefault(self.owner(path), ([], []))[direction == "output"].append(path)
         if position is not None:
             self.positions[path] = position
 
@@ -92,6 +107,32 @@ class ModelGraph:
         """``input`` or ``output``."""
         direction: str = self.ports.nodes[path]["direction"]
         return direction
+
+    def owner(self, port: str) -> str:
+        """The actor or composite that a port belongs to."""
+        return port.rpartition(".")[0]
+
+    def director_of(self, path: str) -> str:
+        """The innermost composite with a director that an actor or composite stands in; "" is the model itself."""
+        around = path.rpartition(".")[0]
+        while around not in self.clocks:
+            around = around.rpartition(".")[0]
+        return around
+
+    def director_over(self, hop: Hop) -> str:
+        """The director in whose time a connection stands: of the composite that declares it."""
+        owner = self.owner(hop.source)
+        # A connection from a composite's own input is declared inside of that composite.
+        inside = owner in self.clocks and self.direction(hop.source) == "input"
+        return owner if inside else self.director_of(owner)
+
+    def borders(self, composite: str) -> tuple[list[str], list[str]]:
+        """The inputs and outputs of a composite; the model itself has none."""
+        return self._borders.get(composite, ([], []))
+
+    def is_end(self, path: str) -> bool:
+        """Whether a port belongs to something that fires, and tokens do not only pass through it."""
+        return self.ports.nodes[path]["port"] is not None or self.owner(path) in self.clocks
 
     def outgoing(self, path: str) -> Sequence[Hop]:
         """The connections that leave a port, in the order of their declaration."""
@@ -152,43 +193,3 @@ class ModelGraph:
         return any(could_be_within(pattern, path, array=True) for path in self.empty_arrays) or any(
             could_be_within(pattern, path, array=False) for path in self.unknown
         )
-
-    def immediate_dependencies(self) -> Any:
-        """The directed graph of what must be known first within a tag: actors' ports only, composites left out.
-
-        An edge from an output to an input is a wire without delay, one from an input to an output of an actor says
-        that the output depends on the input within the tag.
-        """
-        graph: Any = nx.DiGraph()
-        for actor in self.actors.values():
-            graph.add_nodes_from(port.path for port in (*actor.inputs.values(), *actor.outputs.values()))
-            for output in actor.outputs.values():
-                names = actor.inputs if output.depends_on is None else output.depends_on
-                graph.add_edges_from((actor.inputs[name].path, output.path) for name in names)
-        for wire in self.wires():
-            if wire.immediate:
-                graph.add_edge(wire.source.path, wire.destination.path, wire=wire)
-        return graph
-
-    def firing_order(self) -> dict[str, int]:
-        """The rank of each actor: within a tag, lower ranks fire first.
-
-        Depth as in Ptolemy II: of an input, one more than the outputs that reach it within the tag; of an output,
-        the largest of the inputs that it depends on; of an actor, the smallest of its outputs, or the largest of its
-        inputs if it has no outputs.  Actors of equal depth rank in the order of their declaration.  Raises
-        ``networkx.NetworkXUnfeasible`` if there is a loop without delay.
-        """
-        graph = self.immediate_dependencies()
-        depth: dict[str, int] = {}
-        for path in nx.topological_sort(graph):
-            step = 1 if isinstance(self.ports.nodes[path]["port"], InputPort) else 0
-            depth[path] = max((depth[before] + step for before in graph.predecessors(path)), default=0)
-
-        def actor_depth(actor: Actor) -> int:
-            if actor.outputs:
-                return min(depth[port.path] for port in actor.outputs.values())
-            return max((depth[port.path] for port in actor.inputs.values()), default=0)
-
-        # sorted() is stable, so declaration order decides ties.
-        ranked = sorted(self.actors, key=lambda path: actor_depth(self.actors[path]))
-        return {path: rank for rank, path in enumerate(ranked)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from epicycle.actors import Parameter, to_nanoseconds, to_seconds
+from epicycle.actors import Parameter, Tag, to_nanoseconds, to_seconds
 
 from .graph import ModelGraph
 from .problems import Position, Problem
@@ -48,6 +48,10 @@ class Model:
     @stop.setter
     def stop(self, stop: float | str | None) -> None:
         self.stop_time = None if stop is None else nanoseconds(stop)
+
+    def local_tag(self, actor: str, tag: Tag) -> Tag:
+        """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
+        return self.graph.clocks[self.graph.director_of(actor)].tag(tag)
 
 
 def nanoseconds(duration: float | str) -> int:

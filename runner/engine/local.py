@@ -1,0 +1,115 @@
+"""Composites with a director of their own: their local time, and their ports, which one token passes at a time.
+
+The director of the model fires all actors: those of such a composite come one after the other in its order, in the
+place of the composite (``firing_order``).  What is theirs alone is the time that they see.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import simpy
+from simpy.events import NORMAL, Event, EventPriority
+
+from epicycle.actors import Actor, Tag, Wake
+
+from ..model import Clock
+from .director import Director
+
+Deliver = Callable[[Any], None]
+
+
+class LocalDirector:
+    """The director as the actors and aspects inside a composite with a clock of its own see it."""
+
+    def __init__(self, director: Director, clock: Clock) -> None:
+        self.environment = LocalEnvironment(director.environment, clock)
+        self.seed = director.seed
+        self._director = director
+        self._clock = clock
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag in local time."""
+        return self._clock.tag(self._director.tag)
+
+    def wake(self, actor: Actor, time: int) -> Wake:
+        """Fire ``actor`` at a local time."""
+        wake = self._director.wake(actor, self._clock.outer(time))
+        wake.tag = self._clock.tag(wake.tag)
+        return wake
+
+    def later(self, delay: int, deliver: Deliver, token: Any) -> None:
+        """Call ``deliver(token)`` after ``delay`` ns of local time."""
+        self._director.later(self._clock.span(self._director.tag.time, delay), deliver, token)
+
+
+class LocalEnvironment(simpy.Environment):
+    """The run's SimPy environment in local time, for the processes inside: its events are the run's."""
+
+    def __init__(self, environment: simpy.Environment, clock: Clock) -> None:
+        super().__init__()
+        self._environment = environment
+        self._clock = clock
+
+    @property
+    def now(self) -> int | float:
+        """The local time (ns)."""
+        now, clock = self._environment.now, self._clock
+        if clock.rate == 1:
+            return clock.start + now
+        # SimPy's time need not be whole.
+        return clock.local(int(now)) if float(now).is_integer() else clock.start + float(clock.rate) * now
+
+    def schedule(self, event: Event, priority: EventPriority = NORMAL, delay: int | float = 0) -> None:
+        """Let an event happen after ``delay`` ns of local time."""
+        now, clock = self._environment.now, self._clock
+        if clock.rate != 1:
+            whole = float(now).is_integer() and float(delay).is_integer()
+            delay = clock.span(int(now), int(delay)) if whole else delay / float(clock.rate)
+        self._environment.schedule(event, priority, delay)
+
+
+class Passage(Actor):
+    """A port of a composite with a director of its own: at each tag it lets one token of each channel through.
+
+    What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.
+    """
+
+    def __init__(self, path: str, director: Director) -> None:
+        super().__init__(path)
+        self.enter(director)
+        self._director = director
+        self._lanes: dict[object, _Lane] = {}
+
+    def lane(self, channel: object, onward: Deliver) -> Deliver:
+        """What to do with a token of a channel that has come so far; ``onward`` is called with it when it passes."""
+        lane = self._lanes.setdefault(channel, _Lane())
+
+        def arrive(token: Any) -> None:
+            lane.waiting.append((onward, token))
+            self._director.trigger(self)
+
+        return arrive
+
+    def fire(self) -> None:
+        now = self.tag
+        for lane in self._lanes.values():
+            if lane.waiting and lane.passed != now:
+                lane.passed = now
+                onward, token = lane.waiting.popleft()
+                onward(token)
+        if any(lane.waiting for lane in self._lanes.values()):
+            self.wake_in(0)
+
+
+class _Lane:
+    """One channel of a passage: the tokens that wait, and the tag at which one has passed."""
+
+    __slots__ = ("passed", "waiting")
+
+    def __init__(self) -> None:
+        self.waiting: deque[tuple[Deliver, Any]] = deque()
+        self.passed: Tag | None = None
