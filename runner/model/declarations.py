@@ -32,7 +32,7 @@ LIBRARY_KEYS = ("doc", "include", "composites")
 COMPOSITE_KEYS = ("doc", "parameters", "inputs", "outputs", "director", "actors", "connections", "aspects")
 DIRECTOR_KEYS = ("start", "drift")
 PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
-CONNECTION_KEYS = ("from", "to", "delay")
+CONNECTION_KEYS = ("from", "to", "all", "delay")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
 METRIC_KEYS = ("of", "take", "unit", "doc")
 
@@ -76,12 +76,13 @@ class PartText:
 
 @dataclass
 class ConnectionText:
-    """One entry of ``connections``: every source is wired to every destination."""
+    """One entry of ``connections``; with ``to_all``, of several on both sides each goes to all, else in pairs."""
 
     sources: list[Text]
     destinations: list[Text]
     position: Position
     delay: Node | None = None
+    to_all: bool = False
 
 
 @dataclass
@@ -281,21 +282,25 @@ class DeclarationReader:
         return part
 
     def connection(self, node: Node) -> ConnectionText | None:
-        """``a.out -> b.in, c.in`` or ``{from: ..., to: ..., delay: ...}``."""
+        """``a.out -> b.in, c.in``, ``a[*].out => b[*].in`` or ``{from: ..., to: ..., all: ..., delay: ...}``."""
         if isinstance(node, Scalar):
             text = node.value if isinstance(node.value, str) else node.text
-            left, arrow, right = text.partition("->")
-            if not arrow or "->" in right:
+            places = [(start, end) for arrow in ("->", "=>") for start, end in split(text, arrow)[1:]]
+            if len(places) != 1:
                 self.problems.add(f"{text!r} is not a connection", node.position, "write 'actor.port -> actor.port'")
                 return None
-            sources, destinations = self.endpoints(left, node), self.endpoints(right, node)
+            right = places[0][0]
+            sources, destinations = (
+                self.endpoints(node, text, 0, right - 2),
+                self.endpoints(node, text, right, len(text)),
+            )
             if not sources or not destinations:
                 side = "right" if sources else "left"
                 self.problems.add(
                     f"{text!r} has no port on its {side}", node.position, "write 'actor.port -> actor.port'"
                 )
                 return None
-            return ConnectionText(sources, destinations, node.position)
+            return ConnectionText(sources, destinations, node.position, to_all=text[right - 2] == "=")
         if not isinstance(node, Mapping):
             self.problems.add(
                 "this is not a connection",
@@ -312,17 +317,26 @@ class DeclarationReader:
         if not ends["from"] or not ends["to"]:
             return None
         delay = entries["delay"].value if "delay" in entries else None
-        return ConnectionText(ends["from"], ends["to"], node.position, delay)
+        to_all = False
+        if "all" in entries:
+            said = entries["all"].value
+            if not isinstance(said, Scalar) or not isinstance(said.value, bool):
+                self.problems.add("'all' of a connection is neither true nor false", said.position)
+            else:
+                to_all = said.value
+        return ConnectionText(ends["from"], ends["to"], node.position, delay, to_all)
 
-    def endpoints(self, text: str, node: Scalar) -> list[Text]:
-        """The comma-separated ports of one side; brackets around the list are allowed."""
-        text = text.strip()
-        if text.startswith("[") and text.endswith("]"):
-            text = text[1:-1]
+    def endpoints(self, node: Scalar, text: str, start: int, end: int) -> list[Text]:
+        """The comma-separated ports of one side of a connection; brackets around the list are allowed."""
+        side = text[start:end]
+        if side.strip().startswith("[") and side.strip().endswith("]"):
+            start, end = start + side.index("[") + 1, start + side.rindex("]")
         found = []
-        for part in text.split(","):
+        for first, last in split(text[start:end], ","):
+            part = text[start + first : start + last]
             if name := part.strip():
-                found.append(Text(name, within(node.position, name)))
+                offset = start + first + len(part) - len(part.lstrip())
+                found.append(Text(name, inside(node, text, offset, name)))
         return found
 
     def metric(self, name: str, entry: Entry) -> MetricText | None:
@@ -430,9 +444,32 @@ def _is_empty(node: Node) -> bool:
     return isinstance(node, Scalar) and node.value is None
 
 
-def within(position: Position, name: str) -> Position:
-    """The stretch of ``position`` where ``name`` stands, or all of it."""
-    start = position.source.find(name, position.column - 1)
-    if start < 0:
-        return position
-    return Position(position.file, position.line, start + 1, len(name), position.source)
+def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
+    """Where a part of a scalar's text stands that begins at ``offset``; all of it if it is folded or has escapes."""
+    at = node.position
+    start = at.column - 1 + (0 if node.plain else 1)
+    if not at.source.startswith(text, start):
+        return at
+    return Position(at.file, at.line, start + offset + 1, len(part), at.source)
+
+
+def within(text: Text, part: str) -> Position:
+    """Where a part of a text stands; all of it if that cannot be seen in the file."""
+    at = text.position
+    start = at.source.find(part, at.column - 1)
+    return at if start < 0 else Position(at.file, at.line, start + 1, len(part), at.source)
+
+
+def split(text: str, sign: str) -> list[tuple[int, int]]:
+    """Where the parts begin and end that ``sign`` divides, inside of brackets left aside."""
+    parts, depth, start = [], 0, 0
+    for index, character in enumerate(text):
+        if character in "[{(":
+            depth += 1
+        elif character in "]})":
+            depth -= 1
+        elif depth == 0 and text.startswith(sign, index):
+            parts.append((start, index))
+            start = index + len(sign)
+    parts.append((start, len(text)))
+    return parts

@@ -65,7 +65,7 @@ class ModelGraph:
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}
-        self._order = 0
+        self.connections = 0
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         """Add an actor and its ports."""
@@ -97,8 +97,8 @@ class ModelGraph:
 
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
         """Add one connection between two ports."""
-        hop = Hop(source, destination, delay, position, self._order)
-        self._order += 1
+        hop = Hop(source, destination, delay, position, self.connections)
+        self.connections += 1
         self.ports.add_edge(source, destination, key=hop.order, hop=hop)
         self._outgoing.setdefault(source, []).append(hop)
         self._incoming.setdefault(destination, []).append(hop)

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .declarations import NAME, ModelText, PartText, Text
+from .declarations import NAME, ModelText, PartText, Text, split
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, read
 from .patterns import PatternError, matches
 from .problems import Position, Problems, did_you_mean
@@ -148,7 +148,7 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
     option = f"--aspect {change}"
     position = Position("command line", 1, 10, max(1, len(change)), option)
     name, equals, rest = change.partition("=")
-    places = _split(rest)
+    places = split(rest, ",")
     parts = [rest[start:end].strip() for start, end in places]
     if not equals or not name.strip() or not parts or not parts[0]:
         problems.add(f"{change!r} is not of the form name=Type,key=value", position)
@@ -187,23 +187,8 @@ def _pointcuts(value: str, option: str, offset: int) -> list[Text]:
     if value.startswith("[") and value.endswith("]"):
         value, offset = value[1:-1], offset + 1
     found = []
-    for start, end in _split(value):
+    for start, end in split(value, ","):
         text = value[start:end].strip(" '\"")
         column = offset + start + value[start:end].find(text) + 1
         found.append(Text(text, Position("command line", 1, column, max(1, len(text)), option)))
     return found
-
-
-def _split(text: str) -> list[tuple[int, int]]:
-    """Where the parts begin and end that commas divide, those inside brackets left aside."""
-    parts, depth, start = [], 0, 0
-    for index, character in enumerate(text):
-        if character in "[{(":
-            depth += 1
-        elif character in "]})":
-            depth -= 1
-        elif character == "," and depth == 0:
-            parts.append((start, index))
-            start = index + 1
-    parts.append((start, len(text)))
-    return parts

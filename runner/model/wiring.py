@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from epicycle.actors import Actor, Parameter, ParameterError, declared_ports, to_nanoseconds
 
-from .declarations import CompositeText, ConnectionText, Text
+from .declarations import CompositeText, ConnectionText, Text, within
+from .document import Scalar
 from .graph import ModelGraph
+from .indices import BadIndexError, resolve
 from .problems import Problems, did_you_mean
 from .values import Values
 
-_ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[(\*|\d{1,9})\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII)
+_ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
+MAX_CONNECTIONS = 300_000  # each takes about a kilobyte
+
+
+@dataclass
+class End:
+    """The ports behind one end of a connection, and how they are spoken of."""
+
+    text: Text
+    ports: list[str]
+    several: bool = False  # whether it may stand for any number of ports
+    own: bool = False  # whether it is a port of the composite itself
 
 
 @dataclass
@@ -61,29 +75,42 @@ class Wiring:
         self.problems = problems
 
     def connect(self, connection: ConnectionText, names: dict[str, object]) -> None:
-        """Every source to every destination; ``[*]`` on both sides connects equal indices."""
+        """Every source to every destination; where both stand for several, the first to the first and so on."""
         delay = self._delay(connection, names)
-        sources = [(text, self._endpoint(text, "output")) for text in connection.sources]
-        targets = [(text, self._endpoint(text, "input")) for text in connection.destinations]
-        for source_text, source in sources:
-            for target_text, target in targets:
+        sources = [self._endpoint(text, "output", names) for text in connection.sources]
+        targets = [self._endpoint(text, "input", names) for text in connection.destinations]
+        for source in sources:
+            for target in targets:
                 if source is None or target is None:
                     self.graph.is_wired = False
                     continue
-                if "[*]" not in source_text.text or "[*]" not in target_text.text:
-                    pairs = [(one, other) for one in source for other in target]
-                elif len(source) == len(target):
-                    pairs = list(zip(source, target, strict=True))
-                else:
-                    self._problem(
-                        f"{self._label(source_text)} stands for {len(source)} ports, "
-                        f"{self._label(target_text)} for {len(target)}",
-                        target_text,
-                        "[*] on both sides connects equal indices, so both arrays need the same count",
-                    )
-                    continue
-                for one, other in pairs:
-                    self.graph.connect(one, other, delay, source_text.position)
+                in_pairs = source.several and target.several and not connection.to_all
+                count = len(source.ports) * (1 if in_pairs else len(target.ports))
+                if self.graph.connections + count > MAX_CONNECTIONS:
+                    self.graph.is_wired = False
+                    self._problem(f"the model has more than {MAX_CONNECTIONS:,} connections", source.text)
+                    return
+                for one, other in self._pairs(source, target, in_pairs, connection.to_all):
+                    self.graph.connect(one, other, delay, source.text.position)
+
+    def _pairs(self, source: End, target: End, in_pairs: bool, to_all: bool) -> Iterator[tuple[str, str]]:
+        if not in_pairs:
+            # What all of a group say to all is not for themselves; '->' still connects each to itself.
+            spare_self = to_all and not source.own and not target.own
+            for one in source.ports:
+                owner = one.rpartition(".")[0] if spare_self else None
+                yield from ((one, other) for other in target.ports if other.rpartition(".")[0] != owner)
+        elif len(source.ports) == len(target.ports):
+            yield from zip(source.ports, target.ports, strict=True)
+        else:
+            self.graph.is_wired = False
+            self._problem(
+                f"{self._label(source.text)} stands for {_ports(source)}, {self._label(target.text)} for "
+                f"{_ports(target)}",
+                target.text,
+                "with several on both sides, '->' connects the first to the first and so on, so both need as many",
+                "to connect all to all, write '=>'",
+            )
 
     def _label(self, text: Text) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
@@ -105,19 +132,20 @@ class Wiring:
             self.problems.add(f"{label}: {error}", connection.delay.position, scope=self.path)
             return None
 
-    def _endpoint(self, text: Text, wanted: str) -> list[str] | None:
+    def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | None:
         """The port paths behind one end of a connection, as seen from inside the composite."""
         match = _ENDPOINT.match(text.text)
         if match is None:
             self._problem(
                 f"{text.text!r} is not a port that can be connected here",
                 text,
-                "write 'actor.port', 'array[*].port', 'array[0].port' or the name of an own port",
+                "write 'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or the name of an own port",
             )
             return None
         name, index, port = match.groups()
         if name is None:
-            return self._own(port, wanted, text)
+            own = self._own(port, wanted, text)
+            return None if own is None else End(text, own, own=True)
         child = self.children.get(name)
         if child is None:
             if name not in self.composite.actors:  # otherwise its own problem is told already
@@ -128,8 +156,11 @@ class Wiring:
                 )
             return None
         has_port = self._has_port(name, child, port, wanted, text)
-        paths = self._instances(name, index, child, port, text)
-        return [f"{instance}.{port}" for instance in paths] if has_port and paths is not None else None
+        found = self._instances(name, index, child, port, text, names)
+        if not has_port or found is None:
+            return None
+        paths, several = found
+        return End(text, [f"{instance}.{port}" for instance in paths], several)
 
     def _own(self, port: str, wanted: str, text: Text) -> list[str] | None:
         # Seen from inside, an own input is where tokens come from, an own output where they go.
@@ -154,29 +185,44 @@ class Wiring:
         self._problem(message, text, *hints)
         return None
 
-    def _instances(self, name: str, index: str | None, child: Child, port: str, text: Text) -> list[str] | None:
+    def _instances(
+        self, name: str, index: str | None, child: Child, port: str, text: Text, names: dict[str, object]
+    ) -> tuple[list[str], bool] | None:
+        """The paths of the instances that an endpoint names, and whether it may name several."""
         label = f"{self.path}.{name}" if self.path else name
         if not child.array:
             if index is None:
-                return child.paths
+                return child.paths, False
             self._problem(f"{label} is a single actor, it has no [{index}]", text, f"write {name}.{port}")
             return None
         if child.count is None:
             return None  # the count is wrong, and told so
         if index == "*":
-            return child.paths
+            return child.paths, True
         if index is None:
             self._problem(
                 f"{label} is an array of {child.count}: say which",
                 text,
                 f"write {name}[*].{port} for all, or {name}[0].{port} for the first",
             )
-        elif int(index) < child.count:
-            return [child.paths[int(index)]]
-        else:
-            last = f", the last is {name}[{child.count - 1}]" if child.count else ""
-            self._problem(f"there is no {label}[{index}]: the array has {child.count}{last}", text)
-        return None
+            return None
+
+        def value(expression: str) -> object:
+            at = within(text, expression)
+            found = self.values.of(Scalar(expression, expression, True, at), names, label, self.path)
+            if found is self.values.missing:
+                raise _ToldError
+            return found
+
+        try:
+            indices, several = resolve(index, label, child.count, value)
+        except _ToldError:
+            return None
+        except BadIndexError as error:
+            forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
+            self._problem(str(error), text, *((f"valid are {forms}",) if "no index" in str(error) else ()))
+            return None
+        return [child.paths[each] for each in indices], several
 
     def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Text) -> bool:
         """Whether the child's type has the port, in the direction that the connection needs."""
@@ -191,3 +237,11 @@ class Wiring:
             message = f"{path}: {child.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
         self._problem(message, text, f"valid {wanted} ports: {', '.join(valid) or 'none'}")
         return False
+
+
+class _ToldError(Exception):
+    """An expression that could not be evaluated, for a reason that has been told."""
+
+
+def _ports(end: End) -> str:
+    return f"{len(end.ports)} port{'s' if len(end.ports) != 1 else ''}"

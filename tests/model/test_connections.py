@@ -1,0 +1,116 @@
+"""Who is wired to whom: pairs, all to all, ranges and computed indices."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from epicycle.actors import Actor, InputPort, OutputPort
+from epicycle.runner.model import load_model
+from epicycle.runner.model.indices import BadIndexError, resolve
+
+sys.path.insert(0, str(Path(__file__).parent))
+from model_parts import TYPES
+
+
+def hops(text: str, tmp_path: Path, *settings: str) -> list[str]:
+    """The connections of a model, in their order, as 'source -> destination'."""
+    path = tmp_path / "m.yaml"
+    path.write_text("model: m\n" + text, encoding="utf-8")
+    graph = load_model(path, types=[*TYPES, Cell], set=settings).graph
+    found = sorted((data["hop"] for *_, data in graph.ports.edges(data=True)), key=lambda hop: hop.order)
+    return [str(hop).replace(".output", "").replace(".input", "") for hop in found]
+
+
+class Cell(Actor):
+    """Takes any number of connections, and may stand in a loop."""
+
+    input = InputPort(float, multi=True, required=False)
+    output = OutputPort(float, depends_on=())
+
+
+CELLS = "parameters: {n: 3, k: 1}\nactors: {c: {type: Cell, count: '${n}'}, s: {type: Cell, count: '${n + k - 1}'}}\n"
+CASES = [
+    ("c[*].output -> s[*].input", "c0-s0 c1-s1 c2-s2"),
+    ("c[1].output -> s[*].input", "c1-s0 c1-s1 c1-s2"),
+    ("c[*].output -> s[-1].input", "c0-s2 c1-s2 c2-s2"),
+    ("c[*].output => s[*].input", "c0-s0 c0-s1 c0-s2 c1-s0 c1-s1 c1-s2 c2-s0 c2-s1 c2-s2"),
+    ("c[*].output => c[*].input", "c0-c1 c0-c2 c1-c0 c1-c2 c2-c0 c2-c1"),  # not to themselves
+    ("c[0].output => c[*].input", "c0-c1 c0-c2"),
+    ("c[..-2].output -> c[1..].input", "c0-c1 c1-c2"),
+    ("c[*].output -> c[1.., 0].input", "c0-c1 c1-c2 c2-c0"),
+    ("c[*].output -> s[${[n - 1 - i for i in range(n)]}].input", "c0-s2 c1-s1 c2-s0"),
+    ("c[0..${n - 2}].output -> s[${k}..${n - 1}].input", "c0-s1 c1-s2"),
+    ("c[2, 0].output, c[1].output -> s[0, 1].input, s[2].input", "c2-s0 c0-s1 c2-s2 c0-s2 c1-s0 c1-s1 c1-s2"),
+    ("'[c[0].output, c[1].output] -> [s[0].input]'", "c0-s0 c1-s0"),
+]
+
+
+@pytest.mark.parametrize(("connection", "expected"), CASES)
+def test_three_of_each(connection: str, expected: str, tmp_path: Path) -> None:
+    found = hops(f"{CELLS}connections:\n  - {connection}\n", tmp_path)
+    assert " ".join(hop.replace("[", "").replace("]", "").replace(" -> ", "-") for hop in found) == expected
+
+
+def test_all_to_all_in_a_mapping(tmp_path: Path) -> None:
+    form = '{from: "c[*].output", to: ["c[*].input", "s[0].input"], all: true, delay: "${n * 10} ms"}'
+    assert hops(f"{CELLS}connections: [{form}]\n", tmp_path) == [
+        "c[0] -> c[1]", "c[0] -> c[2]", "c[1] -> c[0]", "c[1] -> c[2]", "c[2] -> c[0]", "c[2] -> c[1]",
+        "c[0] -> s[0]", "c[1] -> s[0]", "c[2] -> s[0]",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 5])
+def test_every_form_stands_at_every_count(n: int, tmp_path: Path) -> None:
+    lines = [
+        "c[*].output -> c[1.., 0].input",
+        "c[*].output => c[*].input",
+        "c[..-2].output -> c[1..].input",
+        "c[0..${n - 2}].output -> c[1..${n - 1}].input",
+        "c[0].output -> s[*].input",
+        "c[-1].output, c[*].output -> s[0].input",
+    ]
+    text = CELLS + "connections:\n" + "".join(f"  - {line}\n" for line in lines)
+    expected = n + n * (n - 1) + 2 * max(n - 1, 0) + n + (1 + n if n else 0)
+    assert len(hops(text, tmp_path, f"n={n}")) == expected
+
+
+def test_own_ports_and_the_order_of_channels(tmp_path: Path) -> None:
+    text = """
+composites:
+  Box: {inputs: [in], outputs: [out], connections: [in => out]}
+actors:
+  r: {type: Ramp, count: 3}
+  box: {type: Box}
+  s: {type: Sum}
+connections:
+  - r[2, 0].output -> s.input
+  - r[1].output -> box.in
+  - box.out -> s.input
+  - r[0].output -> s.input
+"""
+    path = tmp_path / "m.yaml"
+    path.write_text("model: m" + text)
+    graph = load_model(path, types=TYPES).graph
+    wires = graph.wires_to(graph.actors["s"].inputs["input"])
+    assert [wire.source.path for wire in wires] == [f"r[{i}].output" for i in (2, 0, 1, 0)]
+
+
+@given(st.integers(0, 8), st.one_of(st.none(), st.integers(-9, 9)), st.one_of(st.none(), st.integers(-9, 9)))
+def test_ranges_are_slices_with_both_ends(count: int, start: int | None, end: int | None) -> None:
+    text = f"{'' if start is None else start}..{'' if end is None else end}"
+    # Python's slices leave out their end, and cut whatever lies outside.
+    stop = None if end is None or end == -1 else end + 1
+    expected = list(range(count))[slice(start, stop)]
+    bounds = [each for each in (start, end) if each is not None]
+    closed = len(bounds) == 2 and min(bounds) >= 0
+    beyond = any(each >= count for each in bounds) and (closed or start is None or expected)
+    if count and ((closed and bounds[1] < bounds[0] - 1) or (beyond and not (closed and bounds[1] == bounds[0] - 1))):
+        with pytest.raises(BadIndexError):
+            resolve(text, "a", count, lambda _: None)
+    else:
+        assert resolve(text, "a", count, lambda _: None) == (expected, True)
