@@ -1,5 +1,7 @@
 """What can stand in a model graph: the actor contract, sources, and the robots of the example."""
 
+from .accumulation import Accumulator, Counter, Difference, Integrator
+from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
 from .core import (
     NANOSECONDS_PER_SECOND,
     REQUIRED,
@@ -24,6 +26,7 @@ from .core import (
     declared_parameters,
     declared_ports,
     did_you_mean,
+    has_own_ports,
     nearest,
     parse_unit,
     plain,
@@ -37,6 +40,8 @@ from .core import (
 )
 from .distributions import Distribution
 from .flow import BooleanSwitch, Merge, Repeat, Router, Select, Switch
+from .functions import Expression, Function, LookupTable
+from .logic import Comparator, LogicGate
 from .queues import Queue, Server
 from .random_source import Random
 from .replay import Replay, ReplayError
@@ -65,14 +70,18 @@ from .robotics import (
     Vehicle,
 )
 from .sampling import MostRecent, Sampler, Synchronizer
+from .sinks import Display, Histogram, Recorder, Stop, Test
 from .sources import Clock, PoissonClock, SingleEvent
+from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
 from .triggered import Const, CurrentMicrostep, CurrentTime, Ramp, Sequence
 
 __all__ = [
     "NANOSECONDS_PER_SECOND",
     "REQUIRED",
+    "Accumulator",
     "Actor",
+    "AddSubtract",
     "Barrier",
     "BodyState",
     "BooleanSwitch",
@@ -81,23 +90,37 @@ __all__ = [
     "ChannelError",
     "CircularMotion",
     "Clock",
+    "Comparator",
     "Configurable",
     "Const",
     "Context",
+    "Counter",
     "CurrentMicrostep",
     "CurrentTime",
+    "Difference",
+    "Display",
     "DistanceMonitor",
     "Distribution",
     "EpicycleError",
     "Estimate",
+    "Expression",
     "FilterError",
     "FilterPyEstimator",
+    "Function",
     "GoalMonitor",
+    "Histogram",
     "Inform",
     "InputPort",
+    "Integrator",
+    "LogicGate",
+    "LookupTable",
+    "MathFunction",
     "Measurement",
     "Merge",
     "MostRecent",
+    "MovingAverage",
+    "MovingStatistics",
+    "MultiplyDivide",
     "Objective",
     "OutputPort",
     "Parameter",
@@ -112,6 +135,7 @@ __all__ = [
     "Ramp",
     "Random",
     "ReachGoal",
+    "Recorder",
     "Repeat",
     "Replay",
     "ReplayError",
@@ -119,6 +143,7 @@ __all__ = [
     "RobustController",
     "Router",
     "Sampler",
+    "Scale",
     "Select",
     "Sensor",
     "SeparationMonitor",
@@ -126,9 +151,11 @@ __all__ = [
     "Server",
     "SingleEvent",
     "Solver",
+    "Stop",
     "Switch",
     "Synchronizer",
     "Tag",
+    "Test",
     "TimeDelay",
     "TimeGap",
     "Timer",
@@ -142,6 +169,7 @@ __all__ = [
     "declared_parameters",
     "declared_ports",
     "did_you_mean",
+    "has_own_ports",
     "nearest",
     "parse_unit",
     "plain",

@@ -1,6 +1,6 @@
 """What every actor is made of: ports, parameters, time, random streams, and the firing contract."""
 
-from .actor import Actor, Context, Wake, declared_ports
+from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .errors import EpicycleError
 from .nearest import did_you_mean, nearest
 from .parameter import (
@@ -46,6 +46,7 @@ __all__ = [
     "declared_parameters",
     "declared_ports",
     "did_you_mean",
+    "has_own_ports",
     "nearest",
     "parse_unit",
     "plain",

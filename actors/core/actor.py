@@ -35,7 +35,7 @@ import numpy as np
 
 from .parameter import Configurable
 from .port_parameter import ParameterPort, PortParameter
-from .ports import InputPort, OutputPort
+from .ports import InputPort, OutputPort, PortError
 from .random import random_stream
 from .tag import Tag, to_nanoseconds, to_seconds
 
@@ -73,6 +73,9 @@ class Context(Protocol):
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time`` (ns)."""
 
+    def stop(self, reason: str) -> None:
+        """End the run when the present tag has been handled; ``reason`` says why it ended."""
+
 
 class Actor(Configurable):
     """Base of all actors: declare ``InputPort``, ``OutputPort`` and ``Parameter`` in the class, write ``fire``.
@@ -105,6 +108,27 @@ class Actor(Configurable):
                 self.inputs[name] = bound
             else:
                 self.outputs[name] = bound
+        for name, port in self.own_ports().items():
+            self._add_own(name, port)
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        """Ports that this instance has beside those of its class, by name; they follow from its parameters.
+
+        They are found in ``inputs`` and ``outputs``, not as attributes, so their names are free.
+        """
+        return {}
+
+    def _add_own(self, name: str, port: InputPort[Any] | OutputPort[Any]) -> None:
+        if not name.isidentifier() or not name.isascii():
+            raise PortError(f"{name!r} cannot be the name of a port: use letters, digits and _, no digit first")
+        if name in self.inputs or name in self.outputs:
+            raise PortError(f"there would be two ports called {name!r}")
+        port.name = name
+        bound = port.bind(self)
+        if isinstance(bound, InputPort):
+            self.inputs[name] = bound
+        else:
+            self.outputs[name] = bound
 
     def initialize(self) -> None:
         """Called once before the first tag."""
@@ -162,6 +186,11 @@ class Actor(Configurable):
 
 
 _declared: WeakKeyDictionary[type, Mapping[str, InputPort[Any] | OutputPort[Any]]] = WeakKeyDictionary()
+
+
+def has_own_ports(cls: type[Actor]) -> bool:
+    """Whether instances of an actor class may have ports that the class does not tell."""
+    return cls.own_ports is not Actor.own_ports
 
 
 def declared_ports(cls: type) -> Mapping[str, InputPort[Any] | OutputPort[Any]]:

@@ -1,7 +1,7 @@
 """The expression language: what stands in the `${...}` of a model and in the parameters of actors that compute."""
 
 from .evaluation import evaluate, interpolate, names_in
-from .formula import Formula, FormulaParameter
+from .formula import Formula, FormulaParameter, operand
 from .syntax import ExpressionError
 from .values import CONSTANTS, FUNCTIONS
 
@@ -14,4 +14,5 @@ __all__ = [
     "evaluate",
     "interpolate",
     "names_in",
+    "operand",
 ]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import REQUIRED, EpicycleError, Parameter, ParameterError
+from ..core import REQUIRED, EpicycleError, Parameter, ParameterError, plain
 from .evaluation import evaluate
 from .syntax import ExpressionError, free_names, parse
 from .values import CONSTANTS, FUNCTIONS
@@ -18,10 +18,12 @@ from .values import CONSTANTS, FUNCTIONS
 class Formula:
     """A checked expression; ``names`` are what it asks for, in the order in which they first appear.
 
+    ``is_condition`` says whether its value is always true or false.
+
     Raises ``ExpressionError`` if the text is no expression.
     """
 
-    __slots__ = ("names", "source")
+    __slots__ = ("is_condition", "names", "source")
 
     def __init__(self, source: str) -> None:
         tree = parse(source)
@@ -33,6 +35,7 @@ class Formula:
         for name in sorted(free & FUNCTIONS.keys()):
             raise ExpressionError(f"'{name}' is a function: write {name}(...)", places[name], len(name))
         self.source = source
+        self.is_condition = _is_condition(tree)
         self.names = tuple(sorted(free, key=places.__getitem__))
 
     def __call__(self, values: Mapping[str, object]) -> Any:
@@ -53,6 +56,21 @@ class Formula:
         return hash(self.source)
 
 
+def _is_condition(node: ast.expr) -> bool:
+    """Whether the value of an expression is true or false whatever its names stand for."""
+    match node:
+        case ast.Compare() | ast.UnaryOp(op=ast.Not()) | ast.Constant(value=bool()):
+            return True
+        case ast.BoolOp():
+            return all(map(_is_condition, node.values))
+        case ast.IfExp():
+            return _is_condition(node.body) and _is_condition(node.orelse)
+        case ast.Call(func=ast.Name(id="bool")):
+            return True
+        case _:
+            return False
+
+
 class FormulaParameter(Parameter[Formula]):
     """A parameter whose value is an expression: a text, or a number or truth value that stands for itself."""
 
@@ -67,8 +85,8 @@ class FormulaParameter(Parameter[Formula]):
             return None
         if isinstance(value, Formula):
             return value
-        if isinstance(value, (bool, int, float, np.number)):
-            value = repr(value.item() if isinstance(value, np.number) else value)
+        if isinstance(value, (bool, int, float)):
+            value = repr(plain(value))  # of a quantity the number alone
         if not isinstance(value, str):
             raise ParameterError(f"{value!r} is not an expression")
         try:

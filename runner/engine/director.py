@@ -92,6 +92,7 @@ class Director:
         self._alarms: set[int] = set()
         self._firing = False
         self._stop_after: Tag | None = None
+        self._reason = "no events left"
         self._recent: list[str] = []
 
     @property
@@ -128,10 +129,11 @@ class Director:
         tag = Tag(now.time + delay, 1) if delay > 0 else Tag(now.time, now.microstep + 1)
         self._enter(tag, -1, lambda: deliver(token))
 
-    def stop_after_this_tag(self) -> None:
-        """End the run when the present tag has been handled."""
+    def stop(self, reason: str) -> None:
+        """End the run when the present tag has been handled; the first who asks gives the reason."""
         if self._stop_after is None:
             self._stop_after = self.tag
+            self._reason = reason
 
     def _tag_at(self, time: int) -> Tag:
         """The tag of a wake-up for ``time``."""
@@ -241,7 +243,7 @@ class Director:
             steps += 1
             if progress is not None and steps % 16 == 0:
                 progress(now / 1e9)
-        return "no events left" if self._stop_after is None else "stop_when"
+        return self._reason
 
     def _of_process(self, error: Exception, actors: list[Actor]) -> ActorError:
         """The error of a process that SimPy resumed: from there, no firing says whose it was."""

@@ -41,6 +41,10 @@ class LocalDirector:
         wake.tag = self._clock.tag(wake.tag)
         return wake
 
+    def stop(self, reason: str) -> None:
+        """End the run, not only what this composite does."""
+        self._director.stop(reason)
+
     def later(self, delay: int, deliver: Deliver, token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns of local time."""
         self._director.later(self._clock.span(self._director.tag.time, delay), deliver, token)

@@ -76,7 +76,7 @@ class Simulation:
 
     def _ask_to_stop(self, token: Any) -> None:
         if token:
-            self.director.stop_after_this_tag()
+            self.director.stop("stop_when")
 
     def _wire(self) -> None:
         """Find the ways from every output port to the ports behind it, through delays and join points."""

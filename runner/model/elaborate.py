@@ -291,7 +291,8 @@ class Elaborator:
             if inner is not None:
                 self._composite(instance, inner, part, scope, within)
             elif actor_type is not None:
-                self._make(instance, composite, actor_type, part, scope)
+                actor = self._make(instance, composite, actor_type, part, scope)
+                child.actors += [] if actor is None else [actor]
             if len(self.problems) > before:
                 self.problems.muted = True  # the other instances would only repeat it
         self.problems.muted = was_muted
@@ -370,15 +371,17 @@ class Elaborator:
 
     def _make(
         self, path: str, composite: str, actor_type: type[Actor], part: PartText, names: dict[str, object]
-    ) -> None:
+    ) -> Actor | None:
         values = self._configuration(path, actor_type, part.values, names, part.position, path, composite)
         if values is not None:
             try:
-                self.graph.add_actor(actor_type(path, **values), part.position)
-                return
+                actor = actor_type(path, **values)
+                self.graph.add_actor(actor, part.position)
+                return actor
             except (EpicycleError, ValueError) as error:  # what an actor's own __init__ has against it
                 self.problems.add(f"{path}: {error}", part.position, scope=composite)
         self.graph.add_unmade(path, actor_type)
+        return None
 
     # -- aspects ------------------------------------------------------------------------------------
 

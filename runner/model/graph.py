@@ -12,7 +12,7 @@ from typing import Any
 
 import networkx as nx
 
-from epicycle.actors import Actor, InputPort, OutputPort, declared_ports
+from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_own_ports
 
 from .clock import Clock
 from .patterns import could_be_within
@@ -87,6 +87,8 @@ class ModelGraph:
         """Add the ports of an actor that could not be made, so that what names them is not wrong as well."""
         for name, port in declared_ports(actor_type).items():
             self.ports.add_node(f"{path}.{name}", port=None, direction=port.direction, unmade=True)
+        if has_own_ports(actor_type):
+            self.unknown.add(path)
 
     def add_composite_port(self, path: str, direction: str, position: Position | None) -> None:
         """Add a port of a composite; tokens only pass through it."""

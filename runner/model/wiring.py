@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from epicycle.actors import Actor, Parameter, ParameterError, declared_ports, to_nanoseconds
+from epicycle.actors import Actor, Parameter, ParameterError, declared_ports, has_own_ports, to_nanoseconds
 
 from .declarations import CompositeText, ConnectionText, Text, within
 from .document import Scalar
@@ -38,6 +38,7 @@ class Child:
     composite: CompositeText | None
     actor_type: type[Actor] | None
     count: int | None
+    actors: list[Actor] = field(default_factory=list)  # the instances that could be made
 
     @property
     def kind(self) -> str:
@@ -52,7 +53,15 @@ class Child:
             return list(self.composite.inputs if direction == "input" else self.composite.outputs)
         if self.actor_type is None:
             return []
+        if has_own_ports(self.actor_type):
+            ports = [each.inputs if direction == "input" else each.outputs for each in self.actors]
+            return list(dict.fromkeys(name for each in ports for name in each))
         return [name for name, port in declared_ports(self.actor_type).items() if port.direction == direction]
+
+    @property
+    def ports_are_known(self) -> bool:
+        """Whether there are no ports but those that ``ports`` tells; an instance not made may have had others."""
+        return self.actor_type is None or not has_own_ports(self.actor_type) or len(self.actors) == self.count != 0
 
 
 class Wiring:
@@ -160,7 +169,12 @@ class Wiring:
         if not has_port or found is None:
             return None
         paths, several = found
-        return End(text, [f"{instance}.{port}" for instance in paths], several)
+        ports = [f"{instance}.{port}" for instance in paths]
+        if missing := [path for path in ports if path not in self.graph.ports]:
+            if child.ports_are_known:  # instances of one entry may differ in the ports of their own
+                self._problem(f"{child.kind} has no {wanted} port {missing[0]}, but others of its array have", text)
+            return None
+        return End(text, ports, several)
 
     def _own(self, port: str, wanted: str, text: Text) -> list[str] | None:
         # Seen from inside, an own input is where tokens come from, an own output where they go.
@@ -230,6 +244,8 @@ class Wiring:
         valid = child.ports(wanted)
         if port in valid:
             return True
+        if not child.ports_are_known:
+            return child.count == 0  # or else why it could not be made is told
         if port in child.ports("input" if wanted == "output" else "output"):
             direction, ends = ("an input", "come from it") if wanted == "output" else ("an output", "go to it")
             message = f"{path}.{port} is {direction} of {child.kind}, nothing can {ends}"

@@ -1,0 +1,117 @@
+"""Actors that add up what comes: Counter, Accumulator, Integrator, Difference."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .combining import present, rounds
+from .core import Actor, InputPort, OutputPort, Parameter, to_seconds
+
+
+class Counter(Actor):
+    """Counts tokens of any kind: up for each at ``increment``, down for each at ``decrement``.
+
+    The number is sent once per tag at which it was counted.  Ptolemy: ``Counter``.
+    """
+
+    increment: InputPort[Any] = InputPort(Any, multi=True, required=False, doc="each token counts one up")
+    decrement: InputPort[Any] = InputPort(Any, multi=True, required=False, doc="each token counts one down")
+    reset: InputPort[Any] = InputPort(Any, required=False, doc="sets the number back, before the tag is counted")
+    output = OutputPort(int, doc="the number")
+
+    initial = Parameter(int, 0, doc="the number at the start and after a reset")
+
+    def initialize(self) -> None:
+        self._number = self.initial
+
+    def fire(self) -> None:
+        if self.reset.present:
+            self._number = self.initial
+        self._number += len(self.increment.tokens) - len(self.decrement.tokens)
+        self.output.send(self._number)
+
+
+class Accumulator(Actor):
+    """The sum of all tokens so far, those of this tag included.
+
+    Ptolemy: ``Accumulator``.
+    """
+
+    input = InputPort(float, multi=True, doc="what is added up")
+    reset: InputPort[Any] = InputPort(Any, required=False, doc="sets the sum back, before the tag is added")
+    output = OutputPort(float, doc="the sum; sent for each round of tokens, and at a reset")
+
+    initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
+
+    def initialize(self) -> None:
+        self._sum = self.initial
+
+    def fire(self) -> None:
+        if self.reset.present:
+            self._sum = self.initial
+            if not self.input.present:
+                self.output.send(self._sum)
+        for (tokens,) in rounds(self.input):
+            self._sum += sum(present(tokens))
+            self.output.send(self._sum)
+
+
+class Integrator(Actor):
+    """The integral over time of a signal that comes as tokens.
+
+    ``hold``: the signal keeps the value of a token until the next one comes, ``sum(x[k] * (t[k+1] - t[k]))``, which is
+    exact for queue lengths and other step signals.  ``trapezoid``: it runs straight from token to token,
+    ``sum((x[k] + x[k+1]) / 2 * (t[k+1] - t[k]))``.  Before the first token the signal is 0.  The integral up to now is
+    sent for each token, and for each ``trigger``, where the signal is taken to hold its latest value.
+    The unit is that of the input times s.  Ptolemy: ``Integrator`` (which is continuous; see ``ODE`` for that).
+    """
+
+    input = InputPort(float, doc="the signal")
+    trigger: InputPort[Any] = InputPort(Any, required=False, doc="asks for the integral at other times")
+    output = OutputPort(float, doc="the integral up to now")
+
+    method = Parameter(str, "hold", choices=("hold", "trapezoid"), doc="what the signal does between two tokens")
+    initial = Parameter(float, 0.0, doc="the integral at the start")
+
+    def initialize(self) -> None:
+        self._integral = self.initial
+        self._value: float | None = None
+        self._since = 0
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            middle = token if self._value is None else (self._value + token) / 2
+            self._integral += self._elapsed() * (self._held if self.method == "hold" else middle)
+            self._value, self._since = token, self.tag.time
+            self.output.send(self._integral)
+        if self.trigger.present and not self.input.present:
+            self.output.send(self._integral + self._elapsed() * self._held)
+
+    @property
+    def _held(self) -> float:
+        return 0.0 if self._value is None else self._value
+
+    def _elapsed(self) -> float:
+        """Seconds since the latest token; none before the first, up to which the signal is 0."""
+        return 0.0 if self._value is None else to_seconds(self.tag.time - self._since)
+
+
+class Difference(Actor):
+    """Each token minus the one before.
+
+    Nothing is sent for the first token unless ``initial`` is given.  Ptolemy: ``Differential``.
+    """
+
+    input = InputPort(float, doc="the numbers")
+    output = OutputPort(float, doc="x[k] - x[k-1]")
+
+    initial: Parameter[float | None] = Parameter(int | float, None, doc="what counts as the token before the first")
+
+    def initialize(self) -> None:
+        self._before = self.initial
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            if self._before is not None:
+                self.output.send(token - self._before)
+            self._before = token

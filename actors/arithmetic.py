@@ -1,0 +1,111 @@
+"""Arithmetic on tokens: AddSubtract, MultiplyDivide, Scale, MathFunction.
+
+Integers stay integers where arithmetic keeps them.  A result that is no real number (a division by zero, the root of
+a negative number) ends the run with an error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+from .combining import present, rounds
+from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter
+
+
+class AddSubtract(Actor):
+    """The sum of what comes at ``plus`` minus the sum of what comes at ``minus``.
+
+    Channels without a token at this tag do not count.  Ptolemy: ``AddSubtract``.
+    """
+
+    plus = InputPort(float, multi=True, required=False, doc="what is added")
+    minus = InputPort(float, multi=True, required=False, doc="what is subtracted")
+    output = OutputPort(float, doc="sum(plus) - sum(minus)")
+
+    def fire(self) -> None:
+        for plus, minus in rounds(self.plus, self.minus):
+            self.output.send(sum(present(plus)) - sum(present(minus)))
+
+
+class MultiplyDivide(Actor):
+    """The product of what comes at ``multiply``, divided by all that comes at ``divide``.
+
+    Channels without a token at this tag do not count.  Ptolemy: ``MultiplyDivide``.
+    """
+
+    multiply = InputPort(float, multi=True, required=False, doc="the factors; their product is 1 if there are none")
+    divide = InputPort(float, multi=True, required=False, doc="the divisors")
+    output = OutputPort(float, doc="prod(multiply) / prod(divide)")
+
+    def fire(self) -> None:
+        for multiply, divide in rounds(self.multiply, self.divide):
+            product = math.prod(present(multiply))
+            for divisor in present(divide):
+                if divisor == 0:
+                    raise EpicycleError(f"{product!r} is to be divided by {divisor!r}")
+                product /= divisor
+            self.output.send(product)
+
+
+class Scale(Actor):
+    """Multiplies each token: ``factor * input + offset``.
+
+    Ptolemy: ``Scale``, ``AddSubtract`` with a constant.
+    """
+
+    input = InputPort(float, doc="what is multiplied")
+    output = OutputPort(float, doc="factor * input + offset")
+
+    factor: PortParameter[float] = PortParameter(int | float, 1, doc="what it is multiplied by")
+    offset: PortParameter[float] = PortParameter(int | float, 0, doc="what is added then")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self.output.send(self.factor * token + self.offset)
+
+
+def _sign(x: float) -> int:
+    return (x > 0) - (x < 0)
+
+
+FUNCTIONS: Final[dict[str, Callable[[Any], Any]]] = {
+    "abs": abs,
+    "negate": lambda x: -x,
+    "sign": _sign,
+    "square": lambda x: x**2,
+    "sqrt": math.sqrt,
+    "exp": math.exp,
+    "log": math.log,
+    "log10": math.log10,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "asin": math.asin,
+    "acos": math.acos,
+    "atan": math.atan,
+    "floor": math.floor,
+    "ceil": math.ceil,
+    "round": round,  # to the even neighbour, as Python does
+}
+
+
+class MathFunction(Actor):
+    """One of the usual functions of one number; angles in rad.
+
+    Ptolemy: ``AbsoluteValue``, ``MathFunction``, ``TrigFunction``, ``Round``.
+    """
+
+    input = InputPort(float, doc="the argument")
+    output = OutputPort(float, doc="the value of the function")
+
+    function = Parameter(str, choices=tuple(FUNCTIONS), doc="which function")
+
+    def fire(self) -> None:
+        function = FUNCTIONS[self.function]
+        for token in self.input.tokens:
+            try:
+                self.output.send(function(token))
+            except (ValueError, OverflowError):
+                raise EpicycleError(f"{self.function} of {token!r} is not a real number of bearable size") from None

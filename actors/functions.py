@@ -1,0 +1,253 @@
+"""Computed outputs: Expression, Function, LookupTable."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import typing
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from importlib.metadata import entry_points
+from types import UnionType
+from typing import Any
+
+import numpy as np
+
+from .combining import Latest
+from .core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    array_parameter,
+    declared_parameters,
+    did_you_mean,
+)
+from .expression import FormulaParameter, operand
+from .tokens import token_type
+
+FUNCTION_GROUP = "epicycle.functions"
+_KINDS: dict[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
+
+
+class Expression(Actor):
+    """Evaluates an expression whenever one of its inputs gets a token.
+
+    Every name in the expression is an input port: ``expression: a + 2 * b`` has the inputs ``a`` and ``b``.  ``time``
+    is the present time in s, ``pi``, ``e`` and ``inf`` are what they are called.  The language is that of ``${...}``:
+    nothing in it can reach files or Python.  An array comes as a list, a record as a dict of its fields
+    (``state['position'][0]``).  What ``${...}`` puts into the text is put in as it is written, so a value that may be
+    negative belongs in parentheses: ``(${a}) ** 2``.
+
+    Nothing is sent before every input has had a token.  Ptolemy: ``Expression``, which demands all tokens at once.
+    """
+
+    output: OutputPort[Any] = OutputPort(float, doc="the value of the expression")
+
+    expression = FormulaParameter(doc="what is computed; its names are the input ports")
+    gives: Parameter[str | None] = Parameter(
+        str,
+        None,
+        choices=tuple(_KINDS),
+        doc="what the value is; a truth value for a comparison and otherwise a number if left out",
+    )
+    hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+
+    def __init__(self, path: str, **parameters: object) -> None:
+        super().__init__(path, **parameters)
+        self._kind = self.gives or ("truth value" if self.expression.is_condition else "number")
+        self.output.type = _KINDS[self._kind]
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        names = [name for name in self.expression.names if name != "time"]
+        return {name: InputPort(Any, doc="a name of the expression") for name in names}
+
+    def initialize(self) -> None:
+        self._latest = Latest(list(self.inputs.values()), hold=self.hold)
+
+    def fire(self) -> None:
+        for values in self._latest.rounds():
+            names = {name: operand(token) for name, token in values.items()}
+            self.output.send(self._checked(self.expression({**names, "time": self.now})))
+
+    def _checked(self, value: Any) -> Any:
+        is_kind = {
+            "number": isinstance(value, (int, float)) and not isinstance(value, bool),
+            "truth value": isinstance(value, bool),
+            "text": isinstance(value, str),
+            "any value": True,
+        }
+        if is_kind[self._kind]:
+            return value
+        raise EpicycleError(f"{self.expression} gives {value!r}, which is not a {self._kind}: say so with 'gives'")
+
+
+class FunctionParameter(Parameter[Callable[..., Any]]):
+    """A function that a model file names: one of those given in Python, or one that an installed package offers."""
+
+    def __init__(self, given: Mapping[str, Callable[..., Any]], *, doc: str = "") -> None:
+        super().__init__(str, doc=doc)  # type: ignore[arg-type]
+        self.given = given
+
+    def describe_type(self) -> str:
+        return "function"
+
+    def convert(self, value: object) -> Callable[..., Any]:
+        if callable(value):  # from Python
+            return value
+        if not isinstance(value, str):
+            raise ParameterError(f"{value!r} is not the name of a function")
+        if value in self.given:
+            return self.given[value]
+        offered = entry_points(group=FUNCTION_GROUP)
+        for point in offered:
+            if value in (point.name, point.value):
+                try:
+                    found = point.load()
+                except Exception as error:
+                    raise ParameterError(f"{value!r} cannot be loaded: {type(error).__name__}: {error}") from None
+                if not callable(found):
+                    raise ParameterError(f"{value!r} is not a function but {type(found).__name__}")
+                return found  # type: ignore[no-any-return]
+        known = sorted({*self.given, *(point.name for point in offered)})
+        raise ParameterError(
+            f"{value!r} is not a function that models may call{did_you_mean(value, known)}; "
+            f"they may call {', '.join(known) or 'none'}; a package offers its functions as entry points of the group "
+            f"{FUNCTION_GROUP!r}, Python gives them with load_model(types=[Function.knowing(f)])"
+        )
+
+
+class Function(Actor):
+    """Calls a Python function whenever one of its inputs gets a token, and sends what it returns.
+
+    The parameters of the function are the input ports; those with a default need not be connected.  Annotations with
+    plain types are the types of the ports.  Nothing is sent before every connected input has had a token, nor when
+    the function returns ``None``.  The function should be pure: it is called whenever tokens come, and a state of its
+    own, or random numbers, would make runs differ.
+
+    A model file cannot make Epicycle run what it likes.  It may name functions that an installed package offers as
+    entry points of the group ``epicycle.functions`` (``magnitude = "my_package.geometry:magnitude"``), by their name
+    or as ``my_package.geometry:magnitude``; and those that a Python program hands over:
+    ``load_model("m.yaml", types=[Function.knowing(magnitude)])``.
+    """
+
+    output: OutputPort[Any] = OutputPort(Any, doc="what the function returns")
+
+    function = FunctionParameter({}, doc="which function, by its name or as package.module:name")
+    hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+
+    @classmethod
+    def knowing(cls, *functions: Callable[..., Any]) -> type[Function]:
+        """This actor, for models that may name these functions as well, by ``name`` or ``module:name``."""
+        before = declared_parameters(cls)["function"]
+        assert isinstance(before, FunctionParameter)
+        given = dict(before.given)
+        for function in functions:
+            given[function.__name__] = given[f"{function.__module__}:{function.__qualname__}"] = function
+        parameter = FunctionParameter(given, doc=before.doc)
+        return type(cls.__name__, (cls,), {"function": parameter, "__doc__": cls.__doc__, "__module__": cls.__module__})
+
+    def __init__(self, path: str, **parameters: object) -> None:
+        super().__init__(path, **parameters)
+        self.output.type = _port_type(_hints(self.function).get("return"))
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        name = getattr(self.function, "__name__", repr(self.function))
+        try:
+            parameters = inspect.signature(self.function).parameters.values()
+        except (TypeError, ValueError):
+            raise ParameterError(f"function: {name} does not tell its parameters, which would be the ports") from None
+        hints = _hints(self.function)
+        ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
+        for each in parameters:
+            if each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD):
+                raise ParameterError(
+                    f"function: {name} takes any number of arguments ({each.name}), which gives no ports"
+                )
+            ports[each.name] = InputPort(
+                _port_type(hints.get(each.name)), required=each.default is each.empty, doc=f"argument of {name}"
+            )
+        self._positional = [each.name for each in parameters if each.kind is each.POSITIONAL_ONLY]
+        return ports
+
+    def initialize(self) -> None:
+        self._latest = Latest(list(self.inputs.values()), hold=self.hold)
+
+    def fire(self) -> None:
+        for values in self._latest.rounds():
+            first = [values.pop(name) for name in self._positional if name in values]
+            result = self.function(*first, **values)
+            if result is not None:
+                self.output.send(result)
+
+
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    try:
+        return typing.get_type_hints(function)
+    except Exception:  # annotations may be anything, and need not make sense here
+        return {}
+
+
+def _port_type(hint: Any) -> Any:
+    """The port type for an annotation: that of a plain class or a union of them, or else any."""
+    if isinstance(hint, UnionType):
+        kinds = [each for each in typing.get_args(hint) if each is not type(None)]
+        return typing.Union[tuple(map(_port_type, kinds))]  # noqa: UP007
+    return hint if isinstance(hint, type) and hint is not type(None) else Any
+
+
+class LookupTable(Actor):
+    """Looks a number up in a table.
+
+    Without ``at``, the input is an index into ``values``, the first being 0.  With it, ``values[k]`` belongs to the
+    argument ``at[k]``, and between two arguments the values are interpolated linearly.
+    Ptolemy: ``LookupTable``, ``Interpolator``.
+    """
+
+    input = InputPort(float, doc="an index, or an argument if 'at' is given")
+    output: OutputPort[Any] = OutputPort(Any, doc="the value that belongs to it")
+
+    values: Parameter[Any] = Parameter(object, shape=(None,), doc="the table")
+    at: Parameter[Any] = array_parameter((None,), None, doc="the arguments of the values, ascending")
+    outside = Parameter(
+        str, "error", choices=("error", "nearest", "nothing"), doc="what is sent for an input beyond the table's ends"
+    )
+
+    def __init__(self, path: str, **parameters: object) -> None:
+        super().__init__(path, **parameters)
+        if not self.values:
+            raise ParameterError("values: the table is empty")
+        self.output.type = token_type(self.values)
+        numeric = self.output.type in (int, float)
+        if self.at is None:
+            return
+        self.output.type = float
+        if not numeric:
+            raise ParameterError("values: only numbers can be interpolated")
+        if len(self.at) != len(self.values):
+            raise ParameterError(f"at: there are {len(self.at)} arguments for {len(self.values)} values")
+        if not np.all(np.diff(self.at) > 0):
+            raise ParameterError(f"at: {self.at.tolist()} does not ascend")
+
+    def fire(self) -> None:
+        low, high = (0, len(self.values) - 1) if self.at is None else (self.at[0], self.at[-1])
+        for token in self.input.tokens:
+            inside = low <= token <= high
+            if not inside and (self.outside == "error" or math.isnan(token)):
+                raise EpicycleError(f"{token!r} lies outside of the table, which goes from {low:g} to {high:g}")
+            if inside or self.outside == "nearest":
+                self.output.send(self._at(min(max(token, low), high)))
+
+    def _at(self, argument: float) -> Any:
+        if self.at is None:
+            if int(argument) != argument:
+                raise EpicycleError(f"{argument!r} is not an index: with 'at' the table would be interpolated")
+            return self.values[int(argument)]
+        right = bisect_right(self.at, argument)
+        if right == len(self.at):
+            return self.values[-1]
+        left = right - 1
+        share = (argument - self.at[left]) / (self.at[right] - self.at[left])
+        return float(self.values[left] + share * (self.values[right] - self.values[left]))

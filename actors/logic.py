@@ -1,0 +1,83 @@
+"""Decisions: LogicGate, Comparator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from .combining import ABSENT, Latest, present, rounds
+from .core import Actor, InputPort, OutputPort, Parameter
+
+GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
+    "and": all,
+    "or": any,
+    "xor": lambda inputs: sum(inputs) % 2 == 1,
+    "nand": lambda inputs: not all(inputs),
+    "nor": lambda inputs: not any(inputs),
+    "xnor": lambda inputs: sum(inputs) % 2 == 0,
+}
+
+
+class LogicGate(Actor):
+    """Combines truth values: and, or, xor (an odd number is true), and their negations nand, nor, xnor.
+
+    ``not`` is ``nor`` of one input.  Channels without a token at this tag do not count, unless ``hold`` is set.
+    Ptolemy: ``LogicFunction``, ``LogicalNot``.
+    """
+
+    input = InputPort(bool, multi=True, doc="the truth values")
+    output = OutputPort(bool, doc="their combination")
+
+    function = Parameter(str, choices=(*GATES, "not"), doc="how they are combined")
+    hold = Parameter(bool, False, doc="whether a channel without a token counts with its latest one")
+
+    def initialize(self) -> None:
+        self._held: list[Any] = []
+
+    def fire(self) -> None:
+        gate = GATES["nor" if self.function == "not" else self.function]
+        for (tokens,) in rounds(self.input):
+            if self.hold:
+                before = self._held or tokens
+                tokens = [old if new is ABSENT else new for old, new in zip(before, tokens, strict=True)]
+                self._held = tokens
+            self.output.send(gate([bool(token) for token in present(tokens)]))
+
+
+def _equal(left: Any, right: Any, tolerance: float) -> bool:
+    return bool(left == right) if tolerance == 0 else abs(left - right) <= tolerance
+
+
+COMPARISONS: Final[dict[str, Callable[[Any, Any, float], bool]]] = {
+    "==": _equal,
+    "!=": lambda left, right, tolerance: not _equal(left, right, tolerance),
+    "<": lambda left, right, tolerance: bool(left < (right + tolerance if tolerance else right)),
+    "<=": lambda left, right, tolerance: bool(left <= (right + tolerance if tolerance else right)),
+    ">": lambda left, right, tolerance: bool(left > (right - tolerance if tolerance else right)),
+    ">=": lambda left, right, tolerance: bool(left >= (right - tolerance if tolerance else right)),
+}
+
+
+class Comparator(Actor):
+    """Compares ``left`` with ``right``, or with ``value`` if nothing is connected to ``right``.
+
+    A tolerance widens what passes: ``left >= right`` holds down to ``right - tolerance``.  Ptolemy: ``Comparator``,
+    ``Equals``.
+    """
+
+    left: InputPort[Any] = InputPort(float | bool | str, doc="the left side")
+    right: InputPort[Any] = InputPort(float | bool | str, required=False, doc="the right side")
+    output = OutputPort(bool, doc="whether the comparison holds")
+
+    comparison = Parameter(str, choices=tuple(COMPARISONS), doc="which comparison")
+    value: Parameter[Any] = Parameter(object, 0, doc="the right side if that port is not connected")
+    tolerance = Parameter(float, 0.0, min=0, doc="by how much numbers may differ and still count as equal")
+    hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+
+    def initialize(self) -> None:
+        self._latest = Latest([self.left, self.right], hold=self.hold)
+
+    def fire(self) -> None:
+        compare = COMPARISONS[self.comparison]
+        for values in self._latest.rounds():
+            self.output.send(compare(values["left"], values.get("right", self.value), self.tolerance))

@@ -1,0 +1,127 @@
+"""Statistics of the latest tokens: MovingAverage, MovingStatistics.
+
+Sums are kept as exact fractions, so that what leaves the window leaves no rounding error behind: after a million
+tokens the mean is as good as if the window were summed afresh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from fractions import Fraction
+
+from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
+
+
+class _Window(Actor):
+    """What these actors share: the window, and the exact sums over it."""
+
+    input = InputPort(float, doc="the numbers")
+
+    size: Parameter[int | None] = Parameter(int, None, min=1, doc="how many of the latest tokens count")
+    span: Parameter[float | None] = Parameter(
+        float, None, unit="s", min=0, doc="how old a token may be to count; a token of exactly this age still does"
+    )
+
+    def __init__(self, path: str, **parameters: object) -> None:
+        super().__init__(path, **parameters)
+        if self.size is None and self.span is None:
+            raise ParameterError("give the window: 'size', a number of tokens, or 'span', a time, or both")
+
+    def initialize(self) -> None:
+        self._times: deque[int] = deque()
+        self._values: deque[float] = deque()
+        self._sum = Fraction(0)
+
+    def _enter(self, value: float) -> None:
+        """Take a token into the window, and out of it those that it pushes out."""
+        if not math.isfinite(value):
+            raise EpicycleError(f"{value!r} has no place in a statistic")
+        now = self.tag.time
+        self._times.append(now)
+        self._values.append(value)
+        self._count(value, 1)
+        oldest = None if self.span is None else now - to_nanoseconds(self.span)
+        while (self.size is not None and len(self._values) > self.size) or (
+            oldest is not None and self._times[0] < oldest
+        ):
+            self._times.popleft()
+            self._count(self._values.popleft(), -1)
+
+    def _count(self, value: float, sign: int) -> None:
+        self._sum += sign * Fraction(value)
+
+    @property
+    def _mean(self) -> Fraction:
+        return self._sum / len(self._values)
+
+
+class MovingAverage(_Window):
+    """The mean of the latest tokens, correctly rounded.
+
+    It is sent for each token; until the window is full, the mean is over what has come so far.
+    Ptolemy: ``MovingAverage``.
+    """
+
+    output = OutputPort(float, doc="the mean")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self._enter(token)
+            self.output.send(float(self._mean))
+
+
+class MovingStatistics(_Window):
+    """Mean, standard deviation, least and greatest of the latest tokens; sent for each token.
+
+    ``std`` is the sample standard deviation ``sqrt(sum((x - mean)^2) / (n - 1))``, sent from two tokens on.
+    """
+
+    mean = OutputPort(float, doc="the mean")
+    std = OutputPort(float, doc="the sample standard deviation; nothing while there is one token only")
+    min = OutputPort(float, doc="the least")
+    max = OutputPort(float, doc="the greatest")
+    number = OutputPort(int, doc="how many tokens are in the window")
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._squares = Fraction(0)
+        # (number of the token, value): what is no longer the extreme of anything that will be asked is dropped.
+        self._least: deque[tuple[int, float]] = deque()
+        self._greatest: deque[tuple[int, float]] = deque()
+        self._entered = 0
+
+    def _count(self, value: float, sign: int) -> None:
+        super()._count(value, sign)
+        self._squares += sign * Fraction(value) ** 2
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self._enter(token)
+            self._rank(token)
+            number = len(self._values)
+            self.mean.send(float(self._mean))
+            if number > 1:
+                variance = (self._squares - self._sum**2 / number) / (number - 1)
+                self.std.send(root(variance))
+            self.min.send(self._least[0][1])
+            self.max.send(self._greatest[0][1])
+            self.number.send(number)
+
+    def _rank(self, token: float) -> None:
+        while self._least and self._least[-1][1] >= token:
+            self._least.pop()
+        while self._greatest and self._greatest[-1][1] <= token:
+            self._greatest.pop()
+        for extremes in (self._least, self._greatest):
+            extremes.append((self._entered, token))
+            while extremes[0][0] <= self._entered - len(self._values):
+                extremes.popleft()
+        self._entered += 1
+
+
+def root(square: Fraction) -> float:
+    """The square root of a fraction whose own size may be beyond all floats."""
+    shift = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
+    scaled = square / Fraction(4) ** shift  # close to 1
+    return math.ldexp(math.sqrt(scaled), shift)
