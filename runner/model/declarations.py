@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from keyword import iskeyword
 
 from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 
-from .document import Entry, Mapping, Node, Scalar, Sequence
-from .problems import Position, Problems, did_you_mean, nearest
+from .document import Entry, Mapping, Node, Scalar
+from .problems import Position, did_you_mean
+from .reading import NAME, NodeReader, Text, inside, split
 
-NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 REDUCTIONS = ("last", "first", "min", "max", "sum", "mean", "count")
 
 MODEL_KEYS = (
@@ -35,14 +34,6 @@ PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
 CONNECTION_KEYS = ("from", "to", "all", "delay")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
 METRIC_KEYS = ("of", "take", "unit", "doc")
-
-
-@dataclass
-class Text:
-    """A piece of text and where it stands."""
-
-    text: str
-    position: Position
 
 
 @dataclass
@@ -126,11 +117,8 @@ class ModelText:
     figures: dict[str, PartText] = field(default_factory=dict)
 
 
-class DeclarationReader:
+class DeclarationReader(NodeReader):
     """Reads one file's nodes; whatever is misshapen is added to ``problems`` and left out."""
-
-    def __init__(self, problems: Problems) -> None:
-        self.problems = problems
 
     def model(self, node: Node) -> ModelText | None:
         """A file that is a model: it has the key ``model``."""
@@ -363,113 +351,6 @@ class DeclarationReader:
         position = inner["of"].value.position
         return MetricText(name, Text(port, position), take, unit or "", doc or "", entry.key.position)
 
-    def entries(self, node: Node, what: str, valid: tuple[str, ...]) -> dict[str, Entry] | None:
-        """The entries of a mapping, unknown keys reported and left out; None if it is no mapping."""
-        if not isinstance(node, Mapping):
-            if isinstance(node, Scalar) and node.value is None:
-                return {}
-            self.problems.add(f"{what} is not a mapping", node.position, f"valid keys: {', '.join(valid)}")
-            return None
-        known = {}
-        for key, entry in node.entries.items():
-            if key in valid:
-                known[key] = entry
-            else:
-                self.problems.add(
-                    f"{what} has no key {key!r}{did_you_mean(key, valid)}",
-                    entry.key.position,
-                    f"valid keys: {', '.join(valid)}",
-                )
-                # Read on as if it had been written right, or else it would seem to be missing as well.
-                if (meant := nearest(key, valid)) is not None and meant not in node.entries:
-                    known.setdefault(meant, entry)
-        return known
-
-    def named(self, entries: dict[str, Entry], key: str) -> list[tuple[str, Entry]]:
-        """The entries of a mapping from names to things."""
-        if key not in entries:
-            return []
-        node = entries[key].value
-        if isinstance(node, Scalar) and node.value is None:
-            return []
-        if not isinstance(node, Mapping):
-            self.problems.add(f"{key} is not a mapping from names", node.position)
-            return []
-        found = []
-        for name, entry in node.entries.items():
-            if NAME.match(name):
-                found.append((name, entry))
-            else:
-                self.problems.add(
-                    f"{name!r} is not a name", entry.key.position, "use letters, digits and _, no digit first"
-                )
-        return found
-
-    def items(self, node: Node, what: str) -> tuple[Node, ...] | None:
-        if isinstance(node, Sequence):
-            return node.items
-        if isinstance(node, Scalar) and node.value is None:
-            return ()
-        self.problems.add(f"{what} is not a list", node.position, "begin each entry with '- '")
-        return None
-
-    def texts(self, node: Node, what: str) -> list[Text]:
-        """A text, or a list of texts."""
-        nodes = node.items if isinstance(node, Sequence) else (node,)
-        found = []
-        for item in nodes:
-            if isinstance(item, Scalar) and item.value is None:
-                continue
-            if (text := self.text(item, what)) is not None:
-                found.append(Text(text, item.position))
-        return found
-
-    def text(self, node: Node, what: str) -> str | None:
-        if isinstance(node, Scalar):
-            return node.value if isinstance(node.value, str) else node.text
-        self.problems.add(f"{what} is not a text", node.position)
-        return None
-
-    def name(self, node: Node, what: str) -> str | None:
-        text = self.text(node, what)
-        if text is not None and not NAME.match(text):
-            self.problems.add(
-                f"{what} {text!r} is not a name", node.position, "use letters, digits and _, no digit first"
-            )
-            return None
-        return text
-
 
 def _is_empty(node: Node) -> bool:
     return isinstance(node, Scalar) and node.value is None
-
-
-def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
-    """Where a part of a scalar's text stands that begins at ``offset``; all of it if it is folded or has escapes."""
-    at = node.position
-    start = at.column - 1 + (0 if node.plain else 1)
-    if not at.source.startswith(text, start):
-        return at
-    return Position(at.file, at.line, start + offset + 1, len(part), at.source)
-
-
-def within(text: Text, part: str) -> Position:
-    """Where a part of a text stands; all of it if that cannot be seen in the file."""
-    at = text.position
-    start = at.source.find(part, at.column - 1)
-    return at if start < 0 else Position(at.file, at.line, start + 1, len(part), at.source)
-
-
-def split(text: str, sign: str) -> list[tuple[int, int]]:
-    """Where the parts begin and end that ``sign`` divides, inside of brackets left aside."""
-    parts, depth, start = [], 0, 0
-    for index, character in enumerate(text):
-        if character in "[{(":
-            depth += 1
-        elif character in "]})":
-            depth -= 1
-        elif depth == 0 and text.startswith(sign, index):
-            parts.append((start, index))
-            start = index + len(sign)
-    parts.append((start, len(text)))
-    return parts

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from .declarations import split
+from .reading import split
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _EXPRESSION = re.compile(r"\$\{.*\}", re.DOTALL)

@@ -6,10 +6,11 @@ from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, accepts, type_name
 
-from .declarations import DeclarationReader, MetricText, ModelText, Text
+from .declarations import DeclarationReader, MetricText, ModelText
 from .model import Metric, Model, nanoseconds
 from .patterns import PathIndex, PatternError
 from .problems import Problems, nearest
+from .reading import Text
 from .values import Values
 
 # Larger seeds could not be told apart in the int64 columns of result files.

@@ -8,10 +8,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .declarations import NAME, ModelText, PartText, Text, split
+from .declarations import ModelText, PartText
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, read
 from .patterns import PatternError, matches
 from .problems import Position, Problems, did_you_mean
+from .reading import NAME, Text, split
 
 
 @dataclass

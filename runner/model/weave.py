@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from epicycle.aspects import Aspect
 
-from .declarations import Text
 from .graph import ModelGraph
 from .patterns import PathIndex, PatternError
 from .problems import Problems, nearest
+from .reading import Text
 
 
 @dataclass

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import Actor, Parameter, ParameterError, declared_ports, has_own_ports, to_nanoseconds
 
-from .declarations import CompositeText, ConnectionText, Text, within
+from .declarations import CompositeText, ConnectionText
 from .document import Scalar
 from .graph import ModelGraph
 from .indices import BadIndexError, resolve
 from .problems import Problems, did_you_mean
+from .reading import Text, within
 from .values import Values
 
 _ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)

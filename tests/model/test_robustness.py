@@ -16,7 +16,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import epicycle.actors
-from epicycle.actors import ChannelError, EpicycleError, FilterError, ParameterError, PortError, Tag, UnitError
+from epicycle.actors import (
+    ChannelError,
+    EpicycleError,
+    FilterError,
+    ParameterError,
+    PortError,
+    ReplayError,
+    Tag,
+    UnitError,
+)
 from epicycle.actors.expression import ExpressionError
 from epicycle.runner.engine import ActorError, LogError, LoopError
 from epicycle.runner.engine.encoding import TokenError
@@ -177,6 +186,7 @@ ERRORS = [
     ParameterError("no"),
     UnitError("no"),
     PortError("no"),
+    ReplayError("no"),
     ChannelError("no"),
     FilterError("no"),
     LogError("no"),
