@@ -22,7 +22,7 @@ from epicycle.actors import (
     unknown_parameter,
 )
 
-from .catalogue import Catalogue
+from .catalogue import Catalogue, CatalogueError
 from .checks import check
 from .declarations import CompositeText, ModelText, PartText
 from .document import Entry
@@ -248,7 +248,11 @@ class Elaborator:
     ) -> Child | None:
         """Make the instances of one entry of ``actors``."""
         inner = self.composites.get(part.type.text)
-        actor_type = self.catalogue.actors.get(part.type.text)
+        try:
+            actor_type = self.catalogue.actors.get(part.type.text) if inner is None else None
+        except CatalogueError as error:
+            self.problems.add(f"{path}: {error}", part.type.position, *error.help, scope=composite)
+            return None
         if inner is None and actor_type is None:
             known = [*self.composites, *self.catalogue.actors]
             self.problems.add(
@@ -387,7 +391,11 @@ class Elaborator:
 
     def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], all_ports: PathIndex) -> None:
         known = self.catalogue.aspects
-        cls = known.get(part.type.text)
+        try:
+            cls = known.get(part.type.text)
+        except CatalogueError as error:
+            self.problems.add(f"aspect {name}: {error}", part.type.position, *error.help, scope=scope)
+            return
         if cls is None:
             self.problems.add(
                 f"aspect {name}: there is no aspect type {part.type.text!r}{did_you_mean(part.type.text, known)}",

@@ -1,0 +1,170 @@
+"""What actors, aspects and the other parts of a model declare, as plain data: ports, parameters, events, docs."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from inspect import cleandoc
+
+import numpy as np
+
+from epicycle.actors import (
+    Actor,
+    Configurable,
+    Parameter,
+    declared_parameters,
+    declared_ports,
+    type_name,
+    variants,
+)
+from epicycle.aspects import Aspect
+
+
+@dataclass(frozen=True)
+class PortReference:
+    """A port of an actor type; ``depends_on`` is for outputs, None where it is all inputs."""
+
+    name: str
+    direction: str
+    type: str
+    multi: bool
+    required: bool
+    depends_on: tuple[str, ...] | None
+    doc: str
+
+
+@dataclass(frozen=True)
+class ParameterReference:
+    """A parameter of a type; ``type`` is in words, ``default`` as it would stand in a model file."""
+
+    name: str
+    type: str
+    unit: str
+    required: bool
+    optional: bool
+    default: object
+    min: float | None
+    max: float | None
+    choices: tuple[str, ...]
+    doc: str
+
+
+@dataclass(frozen=True)
+class TypeReference:
+    """A type that a model may name, and all that it declares."""
+
+    name: str
+    kind: str
+    group: str
+    about_group: str
+    doc: str
+    ports: tuple[PortReference, ...]
+    parameters: tuple[ParameterReference, ...]
+    stands_at: tuple[str, ...]
+    events: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """The first sentence of the doc."""
+        return first_sentence(self.doc)
+
+
+def describe(name: str, cls: type[Configurable]) -> TypeReference:
+    """What a type declares."""
+    group, about = _group(cls)
+    is_aspect = issubclass(cls, Aspect)
+    return TypeReference(
+        name=name,
+        kind="actor" if issubclass(cls, Actor) else "aspect" if is_aspect else "part",
+        group=group,
+        about_group=about,
+        doc=doc_of(cls),
+        ports=tuple(
+            PortReference(
+                port.name,
+                port.direction,
+                type_name(port.type),
+                port.multi,
+                getattr(port, "required", False),
+                getattr(port, "depends_on", None),
+                port.doc,
+            )
+            for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
+        ),
+        parameters=tuple(_parameter(each) for each in declared_parameters(cls).values()),
+        stands_at=tuple(sorted(cls.stands_at)) if is_aspect else (),
+        events=tuple(cls.events) if is_aspect else (),
+    )
+
+
+def _parameter(parameter: Parameter[object]) -> ParameterReference:
+    return ParameterReference(
+        parameter.name,
+        parameter.describe_type(),
+        parameter.unit if parameter.unit != "1" else "",
+        parameter.required,
+        parameter.optional,
+        None if parameter.required else as_written(parameter.default),
+        parameter.min,
+        parameter.max,
+        parameter.choices,
+        parameter.doc,
+    )
+
+
+def parts_of(types: Iterable[type[Configurable]]) -> dict[type[Configurable], dict[str, type[Configurable]]]:
+    """The bases whose variants are values of parameters (of these types, or of such variants), and their variants."""
+    found: dict[type[Configurable], dict[str, type[Configurable]]] = {}
+    waiting = list(types)
+    while waiting:
+        for parameter in declared_parameters(waiting.pop(0)).values():
+            if is_part(parameter) and parameter.type not in found:
+                found[parameter.type] = dict(sorted(variants(parameter.type).items()))
+                waiting += found[parameter.type].values()
+    return found
+
+
+def is_part(parameter: Parameter[object]) -> bool:
+    """Whether the parameter's value is a mapping with a type of its own."""
+    return isinstance(parameter.type, type) and issubclass(parameter.type, Configurable)
+
+
+def as_written(value: object) -> object:
+    """A default as it would stand in a model file."""
+    if isinstance(value, Configurable):
+        declared = declared_parameters(type(value))
+        given = {name: getattr(value, name) for name in declared}
+        changed = {n: as_written(v) for n, v in given.items() if as_written(v) != as_written(declared[n].default)}
+        return {"type": type(value).__name__, **changed}
+    if isinstance(value, np.ndarray):
+        return as_written(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [as_written(each) for each in value]
+    if isinstance(value, Mapping):
+        return {str(key): as_written(each) for key, each in value.items()}
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return int(value)
+    return value
+
+
+def doc_of(cls: type) -> str:
+    """The docstring of the class itself, code marked with single backquotes as in Markdown."""
+    own = vars(cls).get("__doc__") or ""
+    return re.sub(r"``(.+?)``", r"`\1`", cleandoc(own))
+
+
+def first_sentence(doc: str) -> str:
+    """The first sentence of a doc, on one line."""
+    paragraph = " ".join(doc.partition("\n\n")[0].split())
+    return re.split(r"(?<=[.!?:]) (?=[A-Z`])", paragraph)[0].rstrip(".:")
+
+
+def _group(cls: type) -> tuple[str, str]:
+    """The topic under which a type is listed, and what its module says of it."""
+    parts = cls.__module__.split(".")
+    # epicycle.actors.robotics.sensor is about robotics; acme_robots.lidar is of acme_robots.
+    depth = 3 if parts[0] == "epicycle" else 1
+    module = sys.modules.get(".".join(parts[:depth]))
+    return parts[depth - 1] if len(parts) >= depth else parts[-1], first_sentence(getattr(module, "__doc__", "") or "")

@@ -1,0 +1,312 @@
+"""A JSON Schema of model files, made from what is declared: the language's keys and the types of a catalogue.
+
+An editor's YAML language server completes, explains and checks with it while somebody types.  It knows one file at a
+time: what it refuses, ``epicycle validate`` refuses too, but not the other way round.  Wherever a value may be computed,
+a text with ``${...}`` in it passes.  Regular expressions keep to what Python and ECMAScript understand alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from keyword import kwlist
+from typing import Any
+
+from epicycle.actors import Actor, Configurable, Parameter, declared_parameters
+from epicycle.aspects import Aspect
+
+from . import declarations as language
+from .catalogue import Catalogue
+from .elaborate import MAX_COUNT
+from .expression import CONSTANTS, FUNCTIONS
+from .observation import MAX_SEED
+from .reference import as_written, doc_of, first_sentence, is_part, parts_of
+
+Schema = dict[str, Any]
+
+NAME = "[A-Za-z_][A-Za-z0-9_]*"
+EXPRESSION = r"\$\{"
+NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
+QUANTITY = rf"^\s*{NUMBER}\s*([A-Za-z%°µμ1(].*)?$"
+_ENDPOINT = rf"({NAME}(\[(\*|[0-9]{{1,9}})\])?\.)?{NAME}"
+_ENDPOINTS = rf"\s*\[?[\s,]*{_ENDPOINT}(\s*,[\s,]*{_ENDPOINT})*[\s,]*\]?\s*"
+CONNECTION = f"^{_ENDPOINTS}->{_ENDPOINTS}$"
+_SEGMENT = rf"(\*\*|(\*|{NAME})(\[(\*|[0-9]{{1,9}})\])?)"
+PATTERN = rf"^{_SEGMENT}(\.{_SEGMENT})*$"
+
+TEXT: Schema = {"type": ["string", "number", "boolean", "null"]}
+
+
+def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]]) -> Schema:
+    """The schema of model files and of files of composites that are included."""
+    actors, aspects = dict(catalogue.actors), dict(catalogue.aspects)
+    parts = parts_of([*actors.values(), *aspects.values(), *figures.values()])
+    definitions: Schema = {
+        "name": {"type": "string", "pattern": f"^{NAME}$"},
+        "text": TEXT,
+        "expression": {"type": "string", "pattern": EXPRESSION},
+        "patterns": _one_or_more({"type": "string", "pattern": PATTERN}),
+        "parameter": _parameter_declaration(),
+        "connection": _connection(),
+        "metric": _metric(),
+        "run": _mapping(language.RUN_KEYS, _RUN, "How long a run takes, and what it records."),
+        "composite": _mapping(language.COMPOSITE_KEYS, _BODY, "A composite class: a graph with ports of its own."),
+        "actor": _typed(actors, "actor", Actor.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
+        "aspect": _typed(aspects, "aspect", Aspect.reserved),
+        "figure": _typed(figures, "figure", frozenset({"type"})),
+    }
+    for kind, types, reserved in (
+        ("actor", actors, Actor.reserved),
+        ("aspect", aspects, Aspect.reserved),
+        ("figure", figures, frozenset({"type"})),
+    ):
+        for name, cls in types.items():
+            definitions[f"{kind}.{name}"] = _type(name, cls, reserved)
+    for base, known in parts.items():
+        definitions[base.__name__] = _part(base, known)
+        for name, cls in known.items():
+            definitions[f"{base.__name__}.{name}"] = _type(name, cls, frozenset({"type"}))
+    model_only = [key for key in language.MODEL_KEYS if key not in language.LIBRARY_KEYS]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Epicycle model",
+        "description": "A model, or a file of composite classes that models include.",
+        **_mapping(language.MODEL_KEYS, _BODY, None),
+        "minProperties": 1,
+        # Without a name it is a file to be included, which has composites only.
+        "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
+        "$defs": definitions,
+    }
+
+
+# -- what stands under each key of the language ---------------------------------------------------------------------
+
+
+def _ref(name: str) -> Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _one_or_more(item: Schema) -> Schema:
+    return {"anyOf": [item, {"type": "array", "items": {"anyOf": [item, {"type": "null"}]}}]}
+
+
+def _named(definition: str) -> Schema:
+    """A mapping from names; nothing at all counts as empty."""
+    return {"type": ["object", "null"], "propertyNames": _ref("name"), "additionalProperties": _ref(definition)}
+
+
+def _number(kind: str, low: float | None = None, high: float | None = None, unit: str = "") -> Schema:
+    """A number within bounds, a text with a unit, or an expression."""
+    found: Schema = {"type": [kind, "string"], "pattern": f"{EXPRESSION}|{QUANTITY}" if unit else EXPRESSION}
+    if low is not None:
+        found["minimum"] = as_written(low)
+    if high is not None:
+        found["maximum"] = as_written(high)
+    return found
+
+
+_BODY: dict[str, tuple[Schema, str]] = {
+    "model": (_ref("name"), "The name of the model."),
+    "doc": (_ref("text"), "What it shows or does."),
+    "include": (_one_or_more({"type": "string"}), "Files of composite classes, in or below this folder."),
+    "parameters": (
+        {
+            **_named("parameter"),
+            "propertyNames": {"pattern": f"^{NAME}$", "not": {"enum": sorted({*CONSTANTS, *FUNCTIONS, *kwlist})}},
+        },
+        "Parameters: 'name: value' or 'name: {value, unit, min, max, choices, doc}'.",
+    ),
+    "composites": (_named("composite"), "Composite classes, for the types of actors."),
+    "inputs": (_one_or_more(_ref("name")), "Names of the input ports."),
+    "outputs": (_one_or_more(_ref("name")), "Names of the output ports."),
+    "actors": (_named("actor"), "The actors of the graph: 'name: {type, count, <parameter>: <value>, ...}'."),
+    "connections": (
+        {"type": ["array", "null"], "items": _ref("connection")},
+        "What is wired to what: 'actor.port -> actor.port, actor.port' or {from, to, delay}.",
+    ),
+    "aspects": (_named("aspect"), "What is woven around ports: 'name: {type, at, enabled, <parameter>: <value>}'."),
+    "run": (_ref("run"), "How long a run takes, and what it records."),
+    "metrics": (_named("metric"), "Numbers taken from what ports send: 'name: {of, take, unit, doc}'."),
+    "figures": (_named("figure"), "Pictures of a run: 'name: {type, ...}'."),
+}
+_RUN: dict[str, tuple[Schema, str]] = {
+    "stop": (_number("number", 0.0, unit="s"), "Time at which a run ends, such as 30 s."),
+    "stop_when": (_ref("patterns"), "Output ports that end the run when they send true or a number other than 0."),
+    "seed": (_number("integer", 0, MAX_SEED), "Seed of all random streams."),
+    "record": (_ref("patterns"), "Output ports whose tokens are kept, as patterns."),
+}
+_PARAMETER: dict[str, tuple[Schema, str]] = {
+    "value": ({}, "The default; without one, a value must be given."),
+    "unit": (_ref("text"), "What numbers count in, such as m/s; 1 for a pure number."),
+    "min": ({"type": "number"}, "The smallest value."),
+    "max": ({"type": "number"}, "The greatest value."),
+    "choices": (_one_or_more(TEXT), "The texts to choose from."),
+    "doc": (_ref("text"), "What it is."),
+}
+_CONNECTION: dict[str, tuple[Schema, str]] = {
+    "from": (_one_or_more({"type": "string", "pattern": f"^{_ENDPOINT}$"}), "The sending ports."),
+    "to": (_one_or_more({"type": "string", "pattern": f"^{_ENDPOINT}$"}), "The receiving ports."),
+    "delay": (_number("number", 0.0, unit="s"), "How long a token takes, such as 100 ms; 0 is the next microstep."),
+}
+_METRIC: dict[str, tuple[Schema, str]] = {
+    "of": ({"type": "string", "pattern": PATTERN}, "The output port (or a pattern for several)."),
+    "take": ({"enum": list(language.REDUCTIONS)}, "What is taken from the numbers that it sends (default: last)."),
+    "unit": (_ref("text"), "What the number counts in."),
+    "doc": (_ref("text"), "What it is."),
+}
+# What stands beside the parameters of an actor, aspect or figure.
+_BESIDE: dict[str, tuple[Schema, str]] = {
+    "count": (_number("integer", 0, MAX_COUNT), "How many instances, name[0] to name[count - 1]; see 'index'."),
+    "at": (_ref("patterns"), "The ports that it stands at, as patterns."),
+    "enabled": ({"type": ["boolean", "string"], "pattern": EXPRESSION}, "Whether it does anything (default: true)."),
+}
+# A key of the language that is missing here is allowed to hold anything; a test says so.
+RULES = {
+    "MODEL_KEYS": _BODY,
+    "COMPOSITE_KEYS": _BODY,
+    "LIBRARY_KEYS": _BODY,
+    "RUN_KEYS": _RUN,
+    "PARAMETER_KEYS": _PARAMETER,
+    "CONNECTION_KEYS": _CONNECTION,
+    "METRIC_KEYS": _METRIC,
+}
+
+
+def _mapping(keys: Iterable[str], rules: dict[str, tuple[Schema, str]], doc: str | None) -> Schema:
+    """A mapping with these keys and no others."""
+    properties = {}
+    for key in keys:
+        schema, description = rules.get(key, ({}, ""))
+        properties[key] = {**schema, "description": description}
+    found: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    return {"description": doc, **found} if doc else found
+
+
+def _parameter_declaration() -> Schema:
+    declared = _mapping(language.PARAMETER_KEYS, _PARAMETER, None)
+    return {**declared, "type": ["object", "array", "string", "number", "boolean", "null"]}
+
+
+def _connection() -> Schema:
+    declared = _mapping(language.CONNECTION_KEYS, _CONNECTION, "Every port on the left to every port on the right.")
+    return {**declared, "type": ["object", "string"], "pattern": CONNECTION, "required": ["from", "to"]}
+
+
+def _metric() -> Schema:
+    return {**_mapping(language.METRIC_KEYS, _METRIC, "A number taken from what a port sends."), "required": ["of"]}
+
+
+# -- actors, aspects, figures and what their parameters hold --------------------------------------------------------
+
+
+def _choice(types: Mapping[str, type]) -> Schema:
+    return {"enum": list(types), "enumDescriptions": [first_sentence(doc_of(cls)) for cls in types.values()]}
+
+
+def _by_type(types: Mapping[str, type], prefix: str) -> list[Schema]:
+    """What else holds, depending on the type."""
+    return [
+        {
+            "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
+            "then": _ref(f"{prefix}.{name}"),
+        }
+        for name in types
+    ]
+
+
+def _typed(types: Mapping[str, type], kind: str, reserved: frozenset[str], open_to: str = "") -> Schema:
+    """A mapping with a type; types other than the known ones (composites, for actors) fit the pattern ``open_to``."""
+    choice = _choice(types)
+    if open_to:
+        choice = {"anyOf": [choice, {"type": "string", "pattern": open_to}]}
+    beside = {key: _beside(key) for key in sorted(reserved - {"type"})}
+    return {
+        "type": "object",
+        "properties": {"type": {**choice, "description": f"The type of the {kind}."}, **beside},
+        "required": ["type"],
+        "allOf": _by_type(types, kind),
+    }
+
+
+def _part(base: type, known: Mapping[str, type]) -> Schema:
+    """A parameter that is a mapping with a type of its own."""
+    return {
+        "type": ["object", "string"],
+        "pattern": EXPRESSION,
+        "description": first_sentence(doc_of(base)),
+        "properties": {"type": _choice(known)},
+        "required": ["type"],
+        "allOf": _by_type(known, base.__name__),
+    }
+
+
+def _beside(key: str) -> Schema:
+    schema, description = _BESIDE.get(key, ({}, ""))
+    return {**schema, "description": description}
+
+
+def _type(name: str, cls: type, reserved: frozenset[str]) -> Schema:
+    """What may and must be given for one type."""
+    declared = declared_parameters(cls)
+    return {
+        "description": doc_of(cls),
+        "properties": {
+            "type": {"const": name},
+            **{key: _beside(key) for key in sorted(reserved - {"type"})},
+            **{key: {**_value(parameter), "description": _about(parameter)} for key, parameter in declared.items()},
+        },
+        "required": [key for key, parameter in declared.items() if parameter.required],
+        "additionalProperties": False,
+    }
+
+
+def _value(parameter: Parameter[Any]) -> Schema:
+    """What may be given for a parameter."""
+    found = _plain_value(parameter)
+    if parameter.optional and "type" in found:
+        found["type"] = [*found["type"], "null"]
+    if not parameter.required and parameter.default is not None:
+        found["default"] = as_written(parameter.default)
+    return found
+
+
+def _plain_value(parameter: Parameter[Any]) -> Schema:
+    if is_part(parameter):
+        found = _ref(parameter.type.__name__)
+        return {"anyOf": [found, {"type": "null"}]} if parameter.optional else found
+    if parameter.shape is not None:
+        return _array(parameter, parameter.shape)
+    if parameter.choices:
+        null: list[Schema] = [{"type": "null"}] if parameter.optional else []
+        return {"anyOf": [{"enum": list(parameter.choices)}, _ref("expression"), *null]}
+    if parameter.type in (float, int):
+        kind = "number" if parameter.type is float else "integer"
+        return _number(kind, parameter.min, parameter.max, parameter.unit)
+    if parameter.type is bool:
+        return {"type": ["boolean", "string"], "pattern": EXPRESSION}
+    return {"type": ["string"]} if parameter.type is str else {}
+
+
+def _array(parameter: Parameter[Any], shape: tuple[int | None, ...]) -> Schema:
+    """A list of the parameter's shape; any level of it may be an expression."""
+    if not shape:
+        if parameter.type is str:
+            return {"type": "string"}
+        return _number("number", parameter.min, parameter.max, parameter.unit)
+    found: Schema = {"type": ["array", "string"], "items": _array(parameter, shape[1:])}
+    if parameter.type is not str:  # a single text will do for a list of texts
+        found["pattern"] = EXPRESSION
+    if shape[0] is not None:
+        found["minItems"] = found["maxItems"] = shape[0]
+    return found
+
+
+def _about(parameter: Parameter[Any]) -> str:
+    """The doc of a parameter with its unit and default, for an editor to show."""
+    facts = [parameter.describe_type()]
+    if parameter.unit and parameter.unit != "1":
+        facts.append(f"in {parameter.unit}")
+    if not parameter.required:
+        default = as_written(parameter.default)
+        facts.append(f"default {'none' if default is None else default}")
+    doc = parameter.doc[:1].upper() + parameter.doc[1:]
+    return f"{doc} ({', '.join(facts)})" if doc else ", ".join(facts).capitalize()
