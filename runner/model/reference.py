@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Iterable, Mapping
@@ -74,10 +75,9 @@ class TypeReference:
 def describe(name: str, cls: type[Configurable]) -> TypeReference:
     """What a type declares."""
     group, about = _group(cls)
-    is_aspect = issubclass(cls, Aspect)
     return TypeReference(
         name=name,
-        kind="actor" if issubclass(cls, Actor) else "aspect" if is_aspect else "part",
+        kind="actor" if issubclass(cls, Actor) else "aspect" if issubclass(cls, Aspect) else "part",
         group=group,
         about_group=about,
         doc=doc_of(cls),
@@ -94,8 +94,8 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),
         parameters=tuple(_parameter(each) for each in declared_parameters(cls).values()),
-        stands_at=tuple(sorted(cls.stands_at)) if is_aspect else (),
-        events=tuple(cls.events) if is_aspect else (),
+        stands_at=tuple(sorted(cls.stands_at)) if issubclass(cls, Aspect) else (),
+        events=tuple(cls.events) if issubclass(cls, Aspect) else (),
     )
 
 
@@ -144,9 +144,24 @@ def as_written(value: object) -> object:
         return [as_written(each) for each in value]
     if isinstance(value, Mapping):
         return {str(key): as_written(each) for key, each in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"  # JSON has no such numbers
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return int(value)
     return value
+
+
+def shown(value: object) -> str:
+    """A value of ``as_written`` on one line of YAML."""
+    if value is None:
+        return "none"
+    if isinstance(value, str):
+        return value or '""'
+    if isinstance(value, list):
+        return f"[{', '.join(map(shown, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key}: {shown(each)}' for key, each in value.items())}}}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def doc_of(cls: type) -> str:

@@ -1,12 +1,13 @@
 """A JSON Schema of model files, made from what is declared: the language's keys and the types of a catalogue.
 
 An editor's YAML language server completes, explains and checks with it while somebody types.  It knows one file at a
-time: what it refuses, ``epicycle validate`` refuses too, but not the other way round.  Wherever a value may be computed,
-a text with ``${...}`` in it passes.  Regular expressions keep to what Python and ECMAScript understand alike.
+time: what it refuses, ``epicycle validate`` refuses too, but not the other way round.  Wherever a value may be
+computed, a text with ``${...}`` in it passes.  Regular expressions keep to what Python and ECMAScript understand alike.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from keyword import kwlist
 from typing import Any
@@ -19,7 +20,7 @@ from .catalogue import Catalogue
 from .elaborate import MAX_COUNT
 from .expression import CONSTANTS, FUNCTIONS
 from .observation import MAX_SEED
-from .reference import as_written, doc_of, first_sentence, is_part, parts_of
+from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
 
 Schema = dict[str, Any]
 
@@ -28,8 +29,9 @@ EXPRESSION = r"\$\{"
 NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
 QUANTITY = rf"^\s*{NUMBER}\s*([A-Za-z%°µμ1(].*)?$"
 _ENDPOINT = rf"({NAME}(\[(\*|[0-9]{{1,9}})\])?\.)?{NAME}"
-_ENDPOINTS = rf"\s*\[?[\s,]*{_ENDPOINT}(\s*,[\s,]*{_ENDPOINT})*[\s,]*\]?\s*"
-CONNECTION = f"^{_ENDPOINTS}->{_ENDPOINTS}$"
+_LIST = rf"[\s,]*{_ENDPOINT}(\s*,[\s,]*{_ENDPOINT})*[\s,]*"
+_SIDE = rf"(\s*\[{_LIST}\]\s*|{_LIST})"
+CONNECTION = f"^{_SIDE}->{_SIDE}$"
 _SEGMENT = rf"(\*\*|(\*|{NAME})(\[(\*|[0-9]{{1,9}})\])?)"
 PATTERN = rf"^{_SEGMENT}(\.{_SEGMENT})*$"
 
@@ -41,17 +43,22 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
     actors, aspects = dict(catalogue.actors), dict(catalogue.aspects)
     parts = parts_of([*actors.values(), *aspects.values(), *figures.values()])
     definitions: Schema = {
-        "name": {"type": "string", "pattern": f"^{NAME}$"},
+        "name": {"type": "string", **_text(f"^{NAME}$", "a name has letters, digits and _, no digit first")},
         "text": TEXT,
         "expression": {"type": "string", "pattern": EXPRESSION},
-        "patterns": _one_or_more({"type": "string", "pattern": PATTERN}),
+        "port": {
+            "type": "string",
+            **_text(f"^{_ENDPOINT}$", "expected actor.port, array[*].port, array[0].port or an own port"),
+        },
+        "ports": {"anyOf": [_ref("port"), {"type": "array", "items": _ref("port"), "minItems": 1}]},
+        "patterns": _one_or_more(_PATTERN),
         "parameter": _parameter_declaration(),
         "connection": _connection(),
         "metric": _metric(),
         "run": _mapping(language.RUN_KEYS, _RUN, "How long a run takes, and what it records."),
         "composite": _mapping(language.COMPOSITE_KEYS, _BODY, "A composite class: a graph with ports of its own."),
         "actor": _typed(actors, "actor", Actor.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
-        "aspect": _typed(aspects, "aspect", Aspect.reserved),
+        "aspect": _typed(aspects, "aspect", Aspect.reserved, ("type", "at")),
         "figure": _typed(figures, "figure", frozenset({"type"})),
     }
     for kind, types, reserved in (
@@ -62,15 +69,16 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         for name, cls in types.items():
             definitions[f"{kind}.{name}"] = _type(name, cls, reserved)
     for base, known in parts.items():
-        definitions[base.__name__] = _part(base, known)
+        definitions[_part_name(base)] = _part(base, known)
         for name, cls in known.items():
-            definitions[f"{base.__name__}.{name}"] = _type(name, cls, frozenset({"type"}))
+            definitions[f"{_part_name(base)}.{name}"] = _type(name, cls, frozenset({"type"}))
     model_only = [key for key in language.MODEL_KEYS if key not in language.LIBRARY_KEYS]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Epicycle model",
         "description": "A model, or a file of composite classes that models include.",
         **_mapping(language.MODEL_KEYS, _BODY, None),
+        "type": "object",
         "minProperties": 1,
         # Without a name it is a file to be included, which has composites only.
         "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
@@ -86,7 +94,13 @@ def _ref(name: str) -> Schema:
 
 
 def _one_or_more(item: Schema) -> Schema:
-    return {"anyOf": [item, {"type": "array", "items": {"anyOf": [item, {"type": "null"}]}}]}
+    """One, or a list; empty entries are left out."""
+    return {"anyOf": [item, {"type": "array", "items": {"anyOf": [item, {"type": "null"}]}}, {"type": "null"}]}
+
+
+def _text(pattern: str, message: str) -> Schema:
+    """What a text must look like; the message is what editors show, which would be the pattern otherwise."""
+    return {"pattern": pattern, "patternErrorMessage": message}
 
 
 def _named(definition: str) -> Schema:
@@ -96,14 +110,21 @@ def _named(definition: str) -> Schema:
 
 def _number(kind: str, low: float | None = None, high: float | None = None, unit: str = "") -> Schema:
     """A number within bounds, a text with a unit, or an expression."""
-    found: Schema = {"type": [kind, "string"], "pattern": f"{EXPRESSION}|{QUANTITY}" if unit else EXPRESSION}
-    if low is not None:
-        found["minimum"] = as_written(low)
-    if high is not None:
-        found["maximum"] = as_written(high)
+    article = "an" if kind == "integer" else "a"
+    found: Schema = {"type": [kind, "string"], **_text(EXPRESSION, f"expected {article} {kind}")}
+    if unit:
+        found |= _text(f"{EXPRESSION}|{QUANTITY}", f"expected {article} {kind} in {unit}, alone or with its unit")
+    for key, bound in (("minimum", low), ("maximum", high)):
+        if bound is not None and math.isfinite(bound):
+            found[key] = as_written(bound)
     return found
 
 
+_PATTERN: Schema = {
+    "type": "string",
+    **_text(PATTERN, "expected a port as a dotted path; * is one segment, name[*] all of an array, ** any segments"),
+}
+_FLAG: Schema = {"type": ["boolean", "string"], **_text(EXPRESSION, "expected true or false")}
 _BODY: dict[str, tuple[Schema, str]] = {
     "model": (_ref("name"), "The name of the model."),
     "doc": (_ref("text"), "What it shows or does."),
@@ -143,12 +164,12 @@ _PARAMETER: dict[str, tuple[Schema, str]] = {
     "doc": (_ref("text"), "What it is."),
 }
 _CONNECTION: dict[str, tuple[Schema, str]] = {
-    "from": (_one_or_more({"type": "string", "pattern": f"^{_ENDPOINT}$"}), "The sending ports."),
-    "to": (_one_or_more({"type": "string", "pattern": f"^{_ENDPOINT}$"}), "The receiving ports."),
+    "from": (_ref("ports"), "The sending ports."),
+    "to": (_ref("ports"), "The receiving ports."),
     "delay": (_number("number", 0.0, unit="s"), "How long a token takes, such as 100 ms; 0 is the next microstep."),
 }
 _METRIC: dict[str, tuple[Schema, str]] = {
-    "of": ({"type": "string", "pattern": PATTERN}, "The output port (or a pattern for several)."),
+    "of": (_PATTERN, "The output port (or a pattern for several)."),
     "take": ({"enum": list(language.REDUCTIONS)}, "What is taken from the numbers that it sends (default: last)."),
     "unit": (_ref("text"), "What the number counts in."),
     "doc": (_ref("text"), "What it is."),
@@ -157,7 +178,7 @@ _METRIC: dict[str, tuple[Schema, str]] = {
 _BESIDE: dict[str, tuple[Schema, str]] = {
     "count": (_number("integer", 0, MAX_COUNT), "How many instances, name[0] to name[count - 1]; see 'index'."),
     "at": (_ref("patterns"), "The ports that it stands at, as patterns."),
-    "enabled": ({"type": ["boolean", "string"], "pattern": EXPRESSION}, "Whether it does anything (default: true)."),
+    "enabled": (_FLAG, "Whether it does anything (default: true)."),
 }
 # A key of the language that is missing here is allowed to hold anything; a test says so.
 RULES = {
@@ -177,7 +198,7 @@ def _mapping(keys: Iterable[str], rules: dict[str, tuple[Schema, str]], doc: str
     for key in keys:
         schema, description = rules.get(key, ({}, ""))
         properties[key] = {**schema, "description": description}
-    found: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    found: Schema = {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
     return {"description": doc, **found} if doc else found
 
 
@@ -188,11 +209,20 @@ def _parameter_declaration() -> Schema:
 
 def _connection() -> Schema:
     declared = _mapping(language.CONNECTION_KEYS, _CONNECTION, "Every port on the left to every port on the right.")
-    return {**declared, "type": ["object", "string"], "pattern": CONNECTION, "required": ["from", "to"]}
+    return {
+        **declared,
+        "type": ["object", "string"],
+        "required": ["from", "to"],
+        **_text(CONNECTION, "expected 'actor.port -> actor.port'"),
+    }
 
 
 def _metric() -> Schema:
-    return {**_mapping(language.METRIC_KEYS, _METRIC, "A number taken from what a port sends."), "required": ["of"]}
+    return {
+        **_mapping(language.METRIC_KEYS, _METRIC, "A number taken from what a port sends."),
+        "type": "object",
+        "required": ["of"],
+    }
 
 
 # -- actors, aspects, figures and what their parameters hold --------------------------------------------------------
@@ -213,7 +243,14 @@ def _by_type(types: Mapping[str, type], prefix: str) -> list[Schema]:
     ]
 
 
-def _typed(types: Mapping[str, type], kind: str, reserved: frozenset[str], open_to: str = "") -> Schema:
+def _typed(
+    types: Mapping[str, type],
+    kind: str,
+    reserved: frozenset[str],
+    required: tuple[str, ...] = ("type",),
+    *,
+    open_to: str = "",
+) -> Schema:
     """A mapping with a type; types other than the known ones (composites, for actors) fit the pattern ``open_to``."""
     choice = _choice(types)
     if open_to:
@@ -222,7 +259,7 @@ def _typed(types: Mapping[str, type], kind: str, reserved: frozenset[str], open_
     return {
         "type": "object",
         "properties": {"type": {**choice, "description": f"The type of the {kind}."}, **beside},
-        "required": ["type"],
+        "required": list(required),
         "allOf": _by_type(types, kind),
     }
 
@@ -231,12 +268,16 @@ def _part(base: type, known: Mapping[str, type]) -> Schema:
     """A parameter that is a mapping with a type of its own."""
     return {
         "type": ["object", "string"],
-        "pattern": EXPRESSION,
+        **_text(EXPRESSION, f"expected a mapping with a type, one of {', '.join(known)}"),
         "description": first_sentence(doc_of(base)),
-        "properties": {"type": _choice(known)},
+        "properties": {"type": {"anyOf": [_choice(known), _ref("expression")]}},
         "required": ["type"],
-        "allOf": _by_type(known, base.__name__),
+        "allOf": _by_type(known, _part_name(base)),
     }
+
+
+def _part_name(base: type) -> str:
+    return base.__name__ if base.__module__.startswith("epicycle.") else f"{base.__module__}.{base.__name__}"
 
 
 def _beside(key: str) -> Schema:
@@ -271,7 +312,7 @@ def _value(parameter: Parameter[Any]) -> Schema:
 
 def _plain_value(parameter: Parameter[Any]) -> Schema:
     if is_part(parameter):
-        found = _ref(parameter.type.__name__)
+        found = _ref(_part_name(parameter.type))
         return {"anyOf": [found, {"type": "null"}]} if parameter.optional else found
     if parameter.shape is not None:
         return _array(parameter, parameter.shape)
@@ -282,7 +323,7 @@ def _plain_value(parameter: Parameter[Any]) -> Schema:
         kind = "number" if parameter.type is float else "integer"
         return _number(kind, parameter.min, parameter.max, parameter.unit)
     if parameter.type is bool:
-        return {"type": ["boolean", "string"], "pattern": EXPRESSION}
+        return dict(_FLAG)
     return {"type": ["string"]} if parameter.type is str else {}
 
 
@@ -294,7 +335,7 @@ def _array(parameter: Parameter[Any], shape: tuple[int | None, ...]) -> Schema:
         return _number("number", parameter.min, parameter.max, parameter.unit)
     found: Schema = {"type": ["array", "string"], "items": _array(parameter, shape[1:])}
     if parameter.type is not str:  # a single text will do for a list of texts
-        found["pattern"] = EXPRESSION
+        found |= _text(EXPRESSION, f"expected a {parameter.describe_type()}")
     if shape[0] is not None:
         found["minItems"] = found["maxItems"] = shape[0]
     return found
@@ -306,7 +347,6 @@ def _about(parameter: Parameter[Any]) -> str:
     if parameter.unit and parameter.unit != "1":
         facts.append(f"in {parameter.unit}")
     if not parameter.required:
-        default = as_written(parameter.default)
-        facts.append(f"default {'none' if default is None else default}")
+        facts.append(f"default {shown(as_written(parameter.default))}")
     doc = parameter.doc[:1].upper() + parameter.doc[1:]
     return f"{doc} ({', '.join(facts)})" if doc else ", ".join(facts).capitalize()
