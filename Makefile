@@ -7,13 +7,14 @@ USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 
 .NOTPARALLEL:
-.PHONY: help run test check lint wheel clean
+.PHONY: help run test check lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
 	@echo "make test   the quick tests"
 	@echo "make lint   ruff, formatting and types"
 	@echo "make check  lint and every test, the slow ones too"
+	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
 	@echo "make wheel  build dist/epicycle-*.whl"
 	@echo "make clean  remove all that these made, except results/"
 
@@ -30,6 +31,9 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+reference: $(DEV)
+	$(BIN)/python tests/test_reference.py .
 
 wheel: $(DEV)
 	rm -rf build dist

@@ -30,7 +30,8 @@ def shipped_files() -> list[Path]:
         path.relative_to(ROOT)
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
-        if (path.suffix in {".py", ".yaml"} or path.name == "py.typed") and "__pycache__" not in path.parts
+        if (path.suffix in {".py", ".yaml"} or path.name in {"py.typed", "schema.json"})
+        and "__pycache__" not in path.parts
     )
 
 
@@ -95,9 +96,9 @@ def test_every_folder_with_code_has_an_init() -> None:
     assert without == []
 
 
-def test_models_hold_yaml_only() -> None:
+def test_models_hold_yaml_and_its_schema_only() -> None:
     models = [file for file in shipped_files() if file.parts[0] == "models"]
-    assert [file.as_posix() for file in models if file.suffix != ".yaml"] == []
+    assert [file.as_posix() for file in models if file.suffix != ".yaml"] == ["models/schema.json"]
 
 
 @pytest.mark.parametrize("folder", CODE_FOLDERS)

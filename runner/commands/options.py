@@ -16,6 +16,11 @@ DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 def add_model(command: argparse.ArgumentParser) -> None:
     """The options that say which model is meant, and what to change in it."""
     command.add_argument("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model")
+    add_changes(command)
+
+
+def add_changes(command: argparse.ArgumentParser) -> None:
+    """The options that change a model."""
     command.add_argument(
         "--set",
         metavar="PATH=VALUE",

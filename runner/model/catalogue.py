@@ -30,11 +30,12 @@ class CatalogueError(EpicycleError):
     """A type that cannot be had, or a name that means two; ``help`` says what to do."""
 
     def __init__(self, message: str, *help: str) -> None:
+        self.message = message
         self.help = help
         super().__init__(message, *help)
 
     def __str__(self) -> str:
-        return str(self.args[0])
+        return "\n   help: ".join((self.message, *self.help))
 
 
 @dataclass(frozen=True)
@@ -153,8 +154,8 @@ class Catalogue:
 
     def loaded(self) -> tuple[Catalogue, list[CatalogueError]]:
         """The catalogue with every type imported, and what is wrong with those that are left out."""
-        errors: list[CatalogueError] = []
-        return Catalogue(_load_all(self.actors, errors), _load_all(self.aspects, errors)), errors
+        (actors, wrong), (aspects, wrong_too) = load_all(self.actors), load_all(self.aspects)
+        return Catalogue(actors, aspects), [*wrong, *wrong_too]
 
 
 @cache
@@ -179,14 +180,15 @@ def _with(types: Mapping[str, type[T]], more: dict[str, type[T]]) -> Mapping[str
     return types.with_types(more) if isinstance(types, Types) else {**types, **more}
 
 
-def _load_all(types: Mapping[str, type[T]], errors: list[CatalogueError]) -> dict[str, type[T]]:
-    found = {}
+def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[CatalogueError]]:
+    """All types that can be imported, and what is wrong with the others."""
+    found, errors = {}, []
     for name in types:
         try:
             found[name] = types[name]
         except CatalogueError as error:
             errors.append(error)
-    return found
+    return found, errors
 
 
 def _public(module: Any, base: type) -> list[tuple[str, Any]]:

@@ -251,7 +251,7 @@ class Elaborator:
         try:
             actor_type = self.catalogue.actors.get(part.type.text) if inner is None else None
         except CatalogueError as error:
-            self.problems.add(f"{path}: {error}", part.type.position, *error.help, scope=composite)
+            self.problems.add(f"{path}: {error.message}", part.type.position, *error.help, scope=composite)
             return None
         if inner is None and actor_type is None:
             known = [*self.composites, *self.catalogue.actors]
@@ -394,7 +394,7 @@ class Elaborator:
         try:
             cls = known.get(part.type.text)
         except CatalogueError as error:
-            self.problems.add(f"aspect {name}: {error}", part.type.position, *error.help, scope=scope)
+            self.problems.add(f"aspect {name}: {error.message}", part.type.position, *error.help, scope=scope)
             return
         if cls is None:
             self.problems.add(

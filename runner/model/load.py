@@ -35,9 +35,14 @@ def packaged_models() -> dict[str, Path]:
     return found
 
 
+def is_path(name: str) -> bool:
+    """Whether the name of a model is a path, and not that of a packaged model."""
+    return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
+
+
 def find_model(name: str, problems: Problems) -> Path | None:
     """The file of a model: a path if it looks like one, otherwise a packaged model's name."""
-    if name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name:
+    if is_path(name):
         return Path(name)
     known = packaged_models()
     if name not in known:

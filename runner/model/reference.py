@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from inspect import cleandoc
+from pathlib import Path
 
 import numpy as np
 
@@ -148,7 +149,7 @@ def as_written(value: object) -> object:
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"  # JSON has no such numbers
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return int(value)
-    return value
+    return str(value) if isinstance(value, Path) else value
 
 
 def shown(value: object) -> str:
@@ -161,13 +162,19 @@ def shown(value: object) -> str:
         return f"[{', '.join(map(shown, value))}]"
     if isinstance(value, dict):
         return f"{{{', '.join(f'{key}: {shown(each)}' for key, each in value.items())}}}"
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def doc_of(cls: type) -> str:
-    """The docstring of the class itself, code marked with single backquotes as in Markdown."""
+    """The docstring of the class itself: a line for each paragraph, code in single backquotes as in Markdown."""
     own = vars(cls).get("__doc__") or ""
-    return re.sub(r"``(.+?)``", r"`\1`", cleandoc(own))
+    paragraphs = re.sub(r"``(.+?)``", r"`\1`", cleandoc(own), flags=re.DOTALL).split("\n\n")
+    # Lists and examples keep their lines.
+    return "\n\n".join(
+        each if re.search(r"^( |[-*>] )", each, re.MULTILINE) else " ".join(each.split()) for each in paragraphs
+    )
 
 
 def first_sentence(doc: str) -> str:

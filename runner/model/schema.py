@@ -7,18 +7,20 @@ computed, a text with ``${...}`` in it passes.  Regular expressions keep to what
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping
 from keyword import kwlist
+from pathlib import Path
 from typing import Any
 
 from epicycle.actors import Actor, Configurable, Parameter, declared_parameters
+from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
 from . import declarations as language
 from .catalogue import Catalogue
 from .elaborate import MAX_COUNT
-from .expression import CONSTANTS, FUNCTIONS
 from .observation import MAX_SEED
 from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
 
@@ -40,7 +42,7 @@ TEXT: Schema = {"type": ["string", "number", "boolean", "null"]}
 
 def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]]) -> Schema:
     """The schema of model files and of files of composites that are included."""
-    actors, aspects = dict(catalogue.actors), dict(catalogue.aspects)
+    actors, aspects = dict(sorted(catalogue.actors.items())), dict(sorted(catalogue.aspects.items()))
     parts = parts_of([*actors.values(), *aspects.values(), *figures.values()])
     definitions: Schema = {
         "name": {"type": "string", **_text(f"^{NAME}$", "a name has letters, digits and _, no digit first")},
@@ -84,6 +86,11 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
         "$defs": definitions,
     }
+
+
+def schema_text(schema: Schema) -> str:
+    """The schema as the text of a file."""
+    return json.dumps(schema, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 # -- what stands under each key of the language ---------------------------------------------------------------------
@@ -292,7 +299,7 @@ def _type(name: str, cls: type, reserved: frozenset[str]) -> Schema:
         "description": doc_of(cls),
         "properties": {
             "type": {"const": name},
-            **{key: _beside(key) for key in sorted(reserved - {"type"})},
+            **{key: {} for key in sorted(reserved - {"type"})},  # whose rules stand where the type does
             **{key: {**_value(parameter), "description": _about(parameter)} for key, parameter in declared.items()},
         },
         "required": [key for key, parameter in declared.items() if parameter.required],
@@ -319,20 +326,25 @@ def _plain_value(parameter: Parameter[Any]) -> Schema:
     if parameter.choices:
         null: list[Schema] = [{"type": "null"}] if parameter.optional else []
         return {"anyOf": [{"enum": list(parameter.choices)}, _ref("expression"), *null]}
-    if parameter.type in (float, int):
-        kind = "number" if parameter.type is float else "integer"
-        return _number(kind, parameter.min, parameter.max, parameter.unit)
+    return _scalar(parameter)
+
+
+def _scalar(parameter: Parameter[Any]) -> Schema:
     if parameter.type is bool:
         return dict(_FLAG)
-    return {"type": ["string"]} if parameter.type is str else {}
+    if parameter.type in (str, Path):
+        return {"type": ["string"]}
+    if parameter.type is int:
+        return _number("integer", parameter.min, parameter.max, parameter.unit)
+    if parameter.type in (float, int | float):
+        return _number("number", parameter.min, parameter.max, parameter.unit)
+    return {"type": ["array", "boolean", "number", "object", "string"]}
 
 
 def _array(parameter: Parameter[Any], shape: tuple[int | None, ...]) -> Schema:
     """A list of the parameter's shape; any level of it may be an expression."""
     if not shape:
-        if parameter.type is str:
-            return {"type": "string"}
-        return _number("number", parameter.min, parameter.max, parameter.unit)
+        return _scalar(parameter)
     found: Schema = {"type": ["array", "string"], "items": _array(parameter, shape[1:])}
     if parameter.type is not str:  # a single text will do for a list of texts
         found |= _text(EXPRESSION, f"expected a {parameter.describe_type()}")

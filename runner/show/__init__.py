@@ -1,8 +1,24 @@
-"""What people see of a run: summary, figures, results folder."""
+"""What people see: of a run summary, figures, results folder; of what is installed, the reference."""
 
 from .drawing import figures_of
 from .figures import Figure, Trajectories
 from .folder import write_folder
+from .reference import aspects_at, described, detail, figure_types, markdown, overview, parts_described, weaving
 from .summary import summary_object, summary_table
 
-__all__ = ["Figure", "Trajectories", "figures_of", "summary_object", "summary_table", "write_folder"]
+__all__ = [
+    "Figure",
+    "Trajectories",
+    "aspects_at",
+    "described",
+    "detail",
+    "figure_types",
+    "figures_of",
+    "markdown",
+    "overview",
+    "parts_described",
+    "summary_object",
+    "summary_table",
+    "weaving",
+    "write_folder",
+]

@@ -1,0 +1,24 @@
+"""list the actors, or describe one"""
+
+from __future__ import annotations
+
+import argparse
+
+from .options import DONE
+from .reference import add_json, print_reference
+
+DESCRIPTION = "List the actors that a model may use, or describe one: its ports and parameters."
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle actors``."""
+    command.add_argument("name", metavar="NAME", nargs="?", help="an actor type")
+    add_json(command)
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Print the reference."""
+    from ..model.catalogue import installed
+
+    print_reference(installed().actors, "actor", options.name, options.json)
+    return DONE

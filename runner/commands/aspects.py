@@ -1,0 +1,49 @@
+"""list the aspects, describe one, or show where they stand in a model"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from .options import DONE, add_changes
+from .reference import add_json, print_reference, show
+
+DESCRIPTION = (
+    "List the aspects that a model may use, describe one, or show which aspects stand at the ports of a model, in the "
+    "order in which a token meets them."
+)
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle aspects``."""
+    command.add_argument(
+        "name",
+        metavar="NAME or MODEL",
+        nargs="?",
+        help="an aspect type, a packaged model, or a path to a YAML file",
+    )
+    add_changes(command)
+    add_json(command)
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Print the reference, or a model's aspects."""
+    from epicycle.actors import EpicycleError
+
+    from ..model.catalogue import installed
+    from ..model.load import is_path, load_model, packaged_models
+
+    name, types, models = options.name, installed().aspects, packaged_models()
+    if name is None or name in types or not (name in models or is_path(name)):
+        if options.set or options.aspect or options.without:
+            raise EpicycleError("--set, --aspect and --without change a model: name one")
+        print_reference(types, "aspect", name, options.json, also=models)
+        return DONE
+    from ..show import aspects_at, weaving
+
+    model = load_model(name, set=options.set, aspects=options.aspect, without_aspects=options.without)
+    if options.json:
+        print(json.dumps(aspects_at(model), indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        show(weaving(model))
+    return DONE

@@ -1,0 +1,69 @@
+"""What ``epicycle actors`` and ``epicycle aspects`` share."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from .options import complain
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+def add_json(command: argparse.ArgumentParser) -> None:
+    """The option ``--json``."""
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+
+def print_reference(
+    types: Mapping[str, type[Any]], kind: str, name: str | None, as_json: bool, *, also: Iterable[str] = ()
+) -> None:
+    """The list of all types, or all about one; ``also`` are other names that could have been meant."""
+    from dataclasses import asdict
+
+    from epicycle.actors import EpicycleError
+
+    from ..model import did_you_mean
+    from ..model.catalogue import load_all
+    from ..show import described, detail, overview, parts_described
+
+    if name is not None:
+        if name not in types:
+            other = " or packaged model" if also else ""
+            raise EpicycleError(
+                f"there is no {kind} type{other} {name!r}{did_you_mean(name, [*types, *also])}\n"
+                f"   help: 'epicycle {kind}s' lists them"
+            )
+        (reference,) = described({name: types[name]})
+        parts = parts_described([types[name]])
+        if as_json:
+            write_json({**asdict(reference), "parts": {k: [asdict(each) for each in v] for k, v in parts.items()}})
+        else:
+            show(detail(reference, parts))
+        return
+    loaded, errors = load_all(types)
+    for error in errors:
+        complain(f"warning: {error}")
+    references = described(loaded)
+    if as_json:
+        write_json([asdict(each) for each in references])
+    else:
+        show(overview(references))
+
+
+def write_json(value: object) -> None:
+    """Print JSON."""
+    print(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def show(what: RenderableType) -> None:
+    """Print a table or text, to a terminal or into a pipe."""
+    from rich.console import Console
+
+    # Piped output has no width of its own; the default of 80 would fold the tables.
+    console = Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=120)
+    console.print(what)

@@ -1,0 +1,36 @@
+"""write a JSON Schema of model files, for editors"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .options import DONE, complain
+
+DESCRIPTION = (
+    "Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language "
+    "server completes and checks a model whose first line is '# yaml-language-server: $schema=FILE'."
+)
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle schema``."""
+    command.add_argument("-o", "--out", metavar="FILE", type=Path, help="write to FILE (default: standard output)")
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Write the schema."""
+    from ..model.catalogue import installed
+    from ..model.schema import json_schema, schema_text
+    from ..show import figure_types
+
+    catalogue, errors = installed().loaded()
+    for error in errors:
+        complain(f"warning: {error}")
+    text = schema_text(json_schema(catalogue, figure_types()))
+    if options.out is None:
+        print(text, end="")
+    else:
+        options.out.write_text(text, encoding="utf-8")
+        print(f"wrote {options.out}")
+    return DONE

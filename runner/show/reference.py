@@ -1,0 +1,215 @@
+"""The reference of actors and aspects: tables for a terminal, Markdown for ``docs/reference.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from epicycle.actors import Configurable, variants
+
+from ..model import Model
+from ..model.catalogue import Catalogue
+from ..model.reference import (
+    ParameterReference,
+    PortReference,
+    TypeReference,
+    as_written,
+    describe,
+    parts_of,
+    shown,
+)
+from .figures import Figure
+
+
+def figure_types() -> dict[str, type[Figure]]:
+    """The figures that a model may ask for, by name."""
+    return dict(sorted(variants(Figure).items()))
+
+
+def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
+    """What types declare, topic by topic and in the order of their names."""
+    found = [describe(name, cls) for name, cls in types.items()]
+    return sorted(found, key=lambda each: (each.group, each.name.casefold()))
+
+
+def parts_described(types: Iterable[type[Configurable]]) -> dict[str, list[TypeReference]]:
+    """What the parts declare that parameters of these types take, by the base of the parts."""
+    return {
+        base.__name__: [describe(name, cls) for name, cls in known.items()] for base, known in parts_of(types).items()
+    }
+
+
+# -- for a terminal -------------------------------------------------------------------------------------------------
+
+
+def overview(references: Sequence[TypeReference]) -> Group:
+    """A line for each type under the heading of its topic."""
+    width = max((len(each.name) for each in references), default=0)
+    blocks: list[RenderableType] = []
+    for (group, about), members in groupby(references, key=lambda each: (each.group, each.about_group)):
+        blocks += [Text(""), Text.assemble((group, "bold"), f"  {about}" if about else "")]
+        table = Table(box=None, show_header=False, pad_edge=False)
+        table.add_column(width=width + 2, no_wrap=True)
+        table.add_column()
+        for each in members:
+            table.add_row(Text(f"  {each.name}"), Text(each.summary))
+        blocks.append(table)
+    return Group(*blocks[1:])
+
+
+def detail(reference: TypeReference, parts: Mapping[str, Sequence[TypeReference]]) -> Group:
+    """All that is declared by one type, and by the parts that its parameters take."""
+    blocks: list[RenderableType] = [
+        Text.assemble((reference.name, "bold"), f"  {reference.kind}, {reference.group}"),
+        Text(""),
+        Text(reference.doc),
+        *_tables(reference),
+    ]
+    for base, known in parts.items():
+        for each in known:
+            blocks += [
+                Text(""),
+                Text.assemble((each.name, "bold"), f"  {base.lower()}"),
+                Padding(Group(Text(""), Text(each.doc), *_tables(each)), (0, 0, 0, 2)),
+            ]
+    return Group(*blocks)
+
+
+def _tables(reference: TypeReference) -> list[RenderableType]:
+    blocks: list[RenderableType] = []
+    for heading, rows in sections(reference):
+        table = Table(box=None, pad_edge=False, header_style="dim")
+        for title in heading:
+            table.add_column(title, no_wrap=title.endswith("port") or title in ("parameter", "unit"))
+        for row in rows:
+            table.add_row(*map(Text, row))
+        blocks += [Text(""), table]
+    return [*blocks, *(Text(f"\n{line}") for line in facts(reference))]
+
+
+def weaving(model: Model) -> RenderableType:
+    """Which aspects stand at each port of a model, in the order in which a token meets them."""
+    if not model.aspects:
+        return Text(f"{model.name} has no aspects")
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for title in ("port", "", "aspect", "type", "parameters"):
+        table.add_column(title, no_wrap=title == "port")
+    for port, woven in aspects_at(model).items():
+        for place, (name, kind, parameters) in enumerate(woven):
+            number = str(place + 1) if len(woven) > 1 else ""
+            table.add_row(*map(Text, ("" if place else port, number, name, kind, parameters)))
+    idle = [each for each in model.aspects if not each.ports]
+    return Group(table, *(Text(f"{each.name} ({type(each.aspect).__name__}) stands at no port") for each in idle))
+
+
+def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
+    """For each port where aspects stand, their names, types and given parameters, the first nearest to the sender."""
+    found: dict[str, list[tuple[str, str, str]]] = {}
+    for woven in model.aspects:
+        written = as_written(woven.aspect)
+        given = {name: value for name, value in written.items() if name != "type"} if isinstance(written, dict) else {}
+        parameters = ", ".join(f"{name}: {shown(value)}" for name, value in given.items())
+        for port in woven.ports:
+            found.setdefault(port, []).append((woven.name, type(woven.aspect).__name__, parameters))
+    return {port: found[port] for port in model.graph.ports.nodes if port in found}
+
+
+# -- as Markdown ----------------------------------------------------------------------------------------------------
+
+INTRODUCTION = """\
+# Reference
+
+Everything that a model may name, as declared in the code. This file is made by `make reference`; `epicycle actors`
+and `epicycle aspects` print the same for what is installed, with the types of other packages.
+"""
+
+
+def markdown(catalogue: Catalogue, figures: Mapping[str, type[Figure]]) -> str:
+    """The whole reference as a Markdown document."""
+    lines = [INTRODUCTION]
+    every: list[type[Configurable]] = [*catalogue.actors.values(), *catalogue.aspects.values(), *figures.values()]
+    actors, aspects = described(catalogue.actors), described(catalogue.aspects)
+    for title, references in (("Actors", actors), ("Aspects", aspects)):
+        lines.append(f"## {title}\n")
+        for (group, about), members in groupby(references, key=lambda each: (each.group, each.about_group)):
+            names = ", ".join(f"[{each.name}](#{each.name.lower()})" for each in members)
+            lines.append(f"**{group}** ({about}): {names}\n")
+        lines += [block for each in references for block in _markdown(each)]
+    for base, known in parts_described(every).items():
+        lines.append(f"## {base}\n\nA value of a parameter: `{{type: {known[0].name}, ...}}`.\n" if known else "")
+        lines += [block for each in known for block in _markdown(each)]
+    lines.append("## Figures\n")
+    lines += [block for each in described(figures) for block in _markdown(each)]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _markdown(reference: TypeReference) -> list[str]:
+    """One type under a heading of its own."""
+    blocks = [f"### {reference.name}\n", f"{reference.doc}\n"]
+    for heading, rows in sections(reference):
+        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+        for row in cells:
+            row[0] = f"`{row[0]}`"
+        lines = [f"| {' | '.join(row)} |" for row in (heading, ["---"] * len(heading), *cells)]
+        blocks.append("\n".join(lines) + "\n")
+    return [*blocks, *(f"{line}\n" for line in facts(reference))]
+
+
+# -- what both say --------------------------------------------------------------------------------------------------
+
+
+def sections(reference: TypeReference) -> list[tuple[Sequence[str], list[list[str]]]]:
+    """The tables of a type: ports and parameters, with their headings."""
+    found: list[tuple[Sequence[str], list[list[str]]]] = []
+    for direction in ("input", "output"):
+        rows = [_port_row(port) for port in reference.ports if port.direction == direction]
+        if rows:
+            found.append(((f"{direction} port", "type", "", "what it is"), rows))
+    if reference.parameters:
+        rows = [_parameter_row(parameter) for parameter in reference.parameters]
+        found.append((("parameter", "type", "unit", "default", "what it is"), rows))
+    return found
+
+
+def facts(reference: TypeReference) -> list[str]:
+    """What else there is to say of an aspect."""
+    found = []
+    if reference.stands_at:
+        found.append(f"Stands at {' and '.join(reference.stands_at)} ports.")
+    if reference.events:
+        found.append(f"Events: {', '.join(reference.events)}.")
+    return found
+
+
+def _port_row(port: PortReference) -> list[str]:
+    notes = []
+    if port.direction == "input":
+        notes += [] if port.required else ["optional"]
+    elif port.depends_on is not None:  # the port may stand in a loop
+        notes.append(f"depends at once on {' and '.join(port.depends_on) or 'no input'}")
+    notes += ["any number of connections"] if port.multi else []
+    return [port.name, port.type, ", ".join(notes), port.doc]
+
+
+def _parameter_row(parameter: ParameterReference) -> list[str]:
+    kind = parameter.type
+    if parameter.choices:
+        kind = " or ".join(parameter.choices)
+    elif parameter.min is not None and parameter.max is not None:
+        kind += f", {parameter.min:g} to {parameter.max:g}"
+    elif parameter.min is not None:
+        kind += f" >= {parameter.min:g}"
+    elif parameter.max is not None:
+        kind += f" <= {parameter.max:g}"
+    return [
+        parameter.name,
+        kind,
+        parameter.unit,
+        "required" if parameter.required else shown(parameter.default),
+        parameter.doc,
+    ]

@@ -1,0 +1,46 @@
+"""The files that are made from the declarations are up to date.  ``make reference`` writes them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FILES = ("models/schema.json", "docs/reference.md")
+
+
+def texts() -> dict[str, str]:
+    """What the files should hold: Epicycle's own types, whatever else is installed."""
+    from epicycle.runner.model.catalogue import built_in
+    from epicycle.runner.model.schema import json_schema, schema_text
+    from epicycle.runner.show import figure_types, markdown
+
+    own = built_in()
+    return dict(zip(FILES, (schema_text(json_schema(own, figure_types())), markdown(own, figure_types())), strict=True))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files, made in a process of its own: other tests define types."""
+    folder = tmp_path_factory.mktemp("made")
+    for name in FILES:
+        (folder / name).parent.mkdir()
+    subprocess.run([sys.executable, __file__, str(folder)], check=True, env={**os.environ, "PYTHONHASHSEED": "7"})
+    return folder
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_file_is_up_to_date(name: str, made: Path) -> None:
+    written = ROOT / name
+    assert written.is_file(), f"{name} is missing: run 'make reference'"
+    is_same = written.read_text(encoding="utf-8") == (made / name).read_text(encoding="utf-8")
+    assert is_same, f"{name} is not what the code declares: run 'make reference' and commit it"
+
+
+if __name__ == "__main__":
+    for name, text in texts().items():
+        (Path(sys.argv[1]) / name).write_text(text, encoding="utf-8")
