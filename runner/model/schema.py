@@ -58,6 +58,7 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "connection": _connection(),
         "metric": _metric(),
         "run": _mapping(language.RUN_KEYS, _RUN, "How long a run takes, and what it records."),
+        "director": _mapping(language.DIRECTOR_KEYS, _DIRECTOR, "A director of its own, with a local clock."),
         "composite": _mapping(language.COMPOSITE_KEYS, _BODY, "A composite class: a graph with ports of its own."),
         "actor": _typed(actors, "actor", Actor.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
         "aspect": _typed(aspects, "aspect", Aspect.reserved, ("type", "at")),
@@ -120,7 +121,8 @@ def _number(kind: str, low: float | None = None, high: float | None = None, unit
     article = "an" if kind == "integer" else "a"
     found: Schema = {"type": [kind, "string"], **_text(EXPRESSION, f"expected {article} {kind}")}
     if unit:
-        found |= _text(f"{EXPRESSION}|{QUANTITY}", f"expected {article} {kind} in {unit}, alone or with its unit")
+        where = "" if unit == "1" else f" in {unit}"
+        found |= _text(f"{EXPRESSION}|{QUANTITY}", f"expected {article} {kind}{where}, alone or with its unit")
     for key, bound in (("minimum", low), ("maximum", high)):
         if bound is not None and math.isfinite(bound):
             found[key] = as_written(bound)
@@ -146,6 +148,7 @@ _BODY: dict[str, tuple[Schema, str]] = {
     "composites": (_named("composite"), "Composite classes, for the types of actors."),
     "inputs": (_one_or_more(_ref("name")), "Names of the input ports."),
     "outputs": (_one_or_more(_ref("name")), "Names of the output ports."),
+    "director": (_ref("director"), "A director of its own: the composite fires as one actor, in local time."),
     "actors": (_named("actor"), "The actors of the graph: 'name: {type, count, <parameter>: <value>, ...}'."),
     "connections": (
         {"type": ["array", "null"], "items": _ref("connection")},
@@ -161,6 +164,10 @@ _RUN: dict[str, tuple[Schema, str]] = {
     "stop_when": (_ref("patterns"), "Output ports that end the run when they send true or a number other than 0."),
     "seed": (_number("integer", 0, MAX_SEED), "Seed of all random streams."),
     "record": (_ref("patterns"), "Output ports whose tokens are kept, as patterns."),
+}
+_DIRECTOR: dict[str, tuple[Schema, str]] = {
+    "start": (_number("number", unit="s"), "The local time when the run begins (default: as around it)."),
+    "drift": (_number("number", unit="1"), "How fast local time goes, 1 being as fast as around it."),
 }
 _PARAMETER: dict[str, tuple[Schema, str]] = {
     "value": ({}, "The default; without one, a value must be given."),
@@ -184,6 +191,10 @@ _METRIC: dict[str, tuple[Schema, str]] = {
 # What stands beside the parameters of an actor, aspect or figure.
 _BESIDE: dict[str, tuple[Schema, str]] = {
     "count": (_number("integer", 0, MAX_COUNT), "How many instances, name[0] to name[count - 1]; see 'index'."),
+    "priority": (
+        _number("integer"),
+        "Of two actors that could fire at the same tag and depth, the smaller one is first.",
+    ),
     "at": (_ref("patterns"), "The ports that it stands at, as patterns."),
     "enabled": (_FLAG, "Whether it does anything (default: true)."),
 }
@@ -193,6 +204,7 @@ RULES = {
     "COMPOSITE_KEYS": _BODY,
     "LIBRARY_KEYS": _BODY,
     "RUN_KEYS": _RUN,
+    "DIRECTOR_KEYS": _DIRECTOR,
     "PARAMETER_KEYS": _PARAMETER,
     "CONNECTION_KEYS": _CONNECTION,
     "METRIC_KEYS": _METRIC,
