@@ -30,10 +30,12 @@ NAME = "[A-Za-z_][A-Za-z0-9_]*"
 EXPRESSION = r"\$\{"
 NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
 QUANTITY = rf"^\s*{NUMBER}\s*([A-Za-z%°µμ1(].*)?$"
-_ENDPOINT = rf"({NAME}(\[(\*|[0-9]{{1,9}})\])?\.)?{NAME}"
+_BOUND = r"(-?[0-9]{1,9}|\$\{.*\})"
+_INDEX = rf"\s*(\*|{_BOUND}|{_BOUND}?\s*\.\.\s*{_BOUND}?)\s*"
+_ENDPOINT = rf"({NAME}(\[{_INDEX}(,{_INDEX})*\])?\.)?{NAME}"
 _LIST = rf"[\s,]*{_ENDPOINT}(\s*,[\s,]*{_ENDPOINT})*[\s,]*"
 _SIDE = rf"(\s*\[{_LIST}\]\s*|{_LIST})"
-CONNECTION = f"^{_SIDE}->{_SIDE}$"
+CONNECTION = f"^{_SIDE}(->|=>){_SIDE}$"
 _SEGMENT = rf"(\*\*|(\*|{NAME})(\[(\*|[0-9]{{1,9}})\])?)"
 PATTERN = rf"^{_SEGMENT}(\.{_SEGMENT})*$"
 
@@ -50,7 +52,9 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "expression": {"type": "string", "pattern": EXPRESSION},
         "port": {
             "type": "string",
-            **_text(f"^{_ENDPOINT}$", "expected actor.port, array[*].port, array[0].port or an own port"),
+            **_text(
+                f"^{_ENDPOINT}$", "expected actor.port, array[*].port, array[0].port, array[1..3].port or an own port"
+            ),
         },
         "ports": {"anyOf": [_ref("port"), {"type": "array", "items": _ref("port"), "minItems": 1}]},
         "patterns": _one_or_more(_PATTERN),
@@ -152,7 +156,7 @@ _BODY: dict[str, tuple[Schema, str]] = {
     "actors": (_named("actor"), "The actors of the graph: 'name: {type, count, <parameter>: <value>, ...}'."),
     "connections": (
         {"type": ["array", "null"], "items": _ref("connection")},
-        "What is wired to what: 'actor.port -> actor.port, actor.port' or {from, to, delay}.",
+        "Wires: 'actor.port -> actor.port, actor.port', '=>' for all to all; or {from, to, all, delay}.",
     ),
     "aspects": (_named("aspect"), "What is woven around ports: 'name: {type, at, enabled, <parameter>: <value>}'."),
     "run": (_ref("run"), "How long a run takes, and what it records."),
@@ -180,6 +184,7 @@ _PARAMETER: dict[str, tuple[Schema, str]] = {
 _CONNECTION: dict[str, tuple[Schema, str]] = {
     "from": (_ref("ports"), "The sending ports."),
     "to": (_ref("ports"), "The receiving ports."),
+    "all": ({"type": "boolean"}, "Each to all, as with '=>'; otherwise several and several are connected in pairs."),
     "delay": (_number("number", 0.0, unit="s"), "How long a token takes, such as 100 ms; 0 is the next microstep."),
 }
 _METRIC: dict[str, tuple[Schema, str]] = {
@@ -227,12 +232,12 @@ def _parameter_declaration() -> Schema:
 
 
 def _connection() -> Schema:
-    declared = _mapping(language.CONNECTION_KEYS, _CONNECTION, "Every port on the left to every port on the right.")
+    declared = _mapping(language.CONNECTION_KEYS, _CONNECTION, "From ports, to ports.")
     return {
         **declared,
         "type": ["object", "string"],
         "required": ["from", "to"],
-        **_text(CONNECTION, "expected 'actor.port -> actor.port'"),
+        **_text(CONNECTION, "expected 'actor.port -> actor.port', with => for all to all"),
     }
 
 

@@ -20,6 +20,7 @@ from epicycle.runner.model import Problems, packaged_models
 from epicycle.runner.model import declarations as language
 from epicycle.runner.model.catalogue import Catalogue, built_in
 from epicycle.runner.model.document import parse, plain
+from epicycle.runner.model.indices import BadIndexError, resolve
 from epicycle.runner.model.load import model_folders
 from epicycle.runner.model.patterns import PatternError, compile_pattern
 from epicycle.runner.model.schema import _BESIDE as BESIDE
@@ -162,7 +163,7 @@ def test_every_key_of_the_language_has_a_rule() -> None:
         ("model: m\naspects: {a: {type: PacketLos, at: a.b}}", ["$.aspects.a.type"]),
         ("model: m\naspects: {a: {type: PacketLoss, at: a.b, probability: 2}}", ["$.aspects.a.probability"]),
         ("model: m\naspects: {a: {type: PacketLoss, at: a.b, probability: 1, enabled: 1}}", ["$.aspects.a.enabled"]),
-        ("model: m\nconnections: [a.b => c.d]", ["$.connections[0]"]),
+        ("model: m\nconnections: [a.b > c.d]", ["$.connections[0]"]),
         ("model: m\nconnections: [{from: a.b, to: c.d, dealy: 1}]", ["$.connections[0]"]),
         ("model: m\nrun: {stop: -1}", ["$.run.stop"]),
         ("model: m\nmetrics: {a: {of: b.c, take: median}}", ["$.metrics.a.take"]),
@@ -179,19 +180,50 @@ def test_where_a_model_is_refused(text: str, where: list[str]) -> None:
 # -- the schema against the code that it stands for -----------------------------------------------------------------
 
 
-ENDS = st.sampled_from(
-    ["a", "b.c", "a[0].b", "a[*].b", "a[x].b", "a.b.c", "1a", "", " ", ",", "[", "]", "-", ">", "*", "**"]
+INDICES = (
+    "0",
+    "*",
+    "-1",
+    "1..",
+    "..",
+    "..-2",
+    "0 .. 1",
+    "1, 0",
+    "${n}",
+    "0..${n}",
+    "${[i, 0]}",
+    "x",
+    "",
+    "0..1..2",
+    "1.5",
 )
+ENDS = st.one_of(
+    st.sampled_from(INDICES).map(lambda index: f"a[{index}].b"),
+    st.sampled_from(["a", "b.c", "a.b.c", "1a", "", " ", ",", "[", "]", "-", ">", "*", "**"]),
+)
+ARROWS = st.sampled_from([" -> ", "=>", ", "])
 
 
-@given(st.lists(st.one_of(ENDS, st.just(" -> "), st.just(", ")), max_size=7).map("".join))
+@given(st.lists(st.one_of(ENDS, ENDS, ARROWS), max_size=7).map("".join))
 def test_connections_are_those_that_can_be_read(text: str) -> None:
     node = parse(f"connection: {text!r}", "m.yaml", Problems())
     reader = language.DeclarationReader(problems := Problems())
     connection = reader.connection(node.entries["connection"].value)  # type: ignore[union-attr]
     ports = [*connection.sources, *connection.destinations] if connection is not None else []
-    is_good = connection is not None and not len(problems) and all(ENDPOINT.match(port.text) for port in ports)
-    assert bool(re.search(CONNECTION, text)) == is_good
+    is_good = connection is not None and not len(problems) and all(is_endpoint(port.text) for port in ports)
+    assert bool(re.search(CONNECTION, text)) == is_good, text
+
+
+def is_endpoint(text: str) -> bool:
+    """Whether a text names a port, in an array that is large enough."""
+    found = ENDPOINT.match(text)
+    if found is None or found[2] is None:
+        return found is not None
+    try:
+        resolve(found[2], "a", 9, lambda _: 2)
+    except BadIndexError:
+        return False
+    return True
 
 
 @given(st.lists(st.sampled_from(["a", "*", "**", "[*]", "[0]", "[", "]", ".", "1", "-"]), max_size=7).map("".join))
