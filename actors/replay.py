@@ -81,13 +81,14 @@ class Replay(Actor):
                 return csv.read_csv(self.file)
             return parquet.read_table(self.file)
         except (OSError, arrow.ArrowException) as error:
-            raise self._error(str(error)) from None
+            raise self._error(" ".join(str(error).split())) from None
 
     def _check_times(self, times: list[Any]) -> list[int]:
         result: list[int] = []
         for row, time in enumerate(times, 1):
             if isinstance(time, bool) or not isinstance(time, (int, float)) or not math.isfinite(time) or time < 0:
-                raise self._error(f"row {row}: {self.time} is {time!r}, not a time in s from 0 on")
+                shown = "empty" if time is None else repr(time)
+                raise self._error(f"row {row}: {self.time} is {shown}, not a time in s from 0 on")
             if result and to_nanoseconds(time) < result[-1]:
                 raise self._error(f"row {row}: {self.time} is {time!r}, which is before the row above")
             result.append(to_nanoseconds(time))
