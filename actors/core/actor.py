@@ -7,12 +7,13 @@ A director brings every actor through ``initialize``, any number of ``fire`` and
 ``initialize`` is called once, before time starts.  An actor sets up its state here and may ask for wake-ups: one
 asked for at once comes at the first tag of the run, (start, 1).  Ports hold nothing yet, and nothing may be sent.
 
-``fire`` is called at a tag at which a token is present at an input or a wake-up is due, at most once per tag.  When
-it is called, every actor upstream (along connections without delay, and outputs that depend on their inputs at once)
-has finished with this tag: all tokens of the tag are there, and an absent token will not come.  In ``fire`` an actor
-may read its inputs (``port.present``, ``port.value``, ``port.tokens``), send any number of tokens, change its state
-and ask for wake-ups.  Tokens that it does not read are gone when it returns.  A token that it sends is received
-within the same tag unless the connection has a delay.
+``fire`` is called at a tag at which a token is present at an input or a wake-up is due.  When it is called, every
+actor upstream (along connections without delay, and outputs that depend on their inputs at once) has finished with
+this tag: all tokens of the tag are there, and an absent token will not come.  So it is called once per tag; only an
+actor with an output that does not depend on an input at once is called for the tokens of such inputs by themselves.
+In ``fire`` an actor may read its inputs (``port.present``, ``port.value``, ``port.tokens``), send any number of
+tokens, change its state and ask for wake-ups.  Tokens that it does not read are gone when it returns.  A token that
+it sends is received within the same tag unless the connection has a delay.
 
 ``wake_in(seconds)`` and ``wake_at(seconds)`` ask for a firing later: a wake-up for the present time comes at the
 same time, one microstep on; one in the future at microstep 1.  Asking for the past means now.  A ``Wake`` can be

@@ -67,12 +67,13 @@ class InputPort(_Port[T]):
         super().__init__(type, multi=multi, doc=doc)
         self.required = required
         self.width = 0
-        self._tokens: list[T] = []
-        self._channels: list[int] = []
+        self._arriving: tuple[list[T], list[int]] = [], []
+        self._tokens, self._channels = self._arriving
 
     def bind(self, actor: Any) -> InputPort[T]:
         bound: InputPort[T] = super().bind(actor)
-        bound._tokens, bound._channels = [], []
+        bound._arriving = [], []
+        bound.release()
         return bound
 
     @property
@@ -101,13 +102,22 @@ class InputPort(_Port[T]):
 
     def put(self, token: T, channel: int) -> None:
         """Engine: a token arrives."""
-        self._tokens.append(token)
-        self._channels.append(channel)
+        tokens, channels = self._arriving
+        tokens.append(token)
+        channels.append(channel)
 
     def clear(self) -> None:
-        """Engine: the tag is over."""
+        """Engine: forget the tokens that are shown."""
         self._tokens.clear()
         self._channels.clear()
+
+    def hold(self) -> None:
+        """Engine: until ``release`` show nothing, and keep what is there and what comes."""
+        self._tokens, self._channels = [], []
+
+    def release(self) -> None:
+        """Engine: show what has come."""
+        self._tokens, self._channels = self._arriving
 
 
 class OutputPort(_Port[T]):

@@ -7,7 +7,7 @@ their ports first, in the order in which they were sent; then actors fire by ran
 of connections without delay, then priority, ties in the order of declaration).  A firing sees all tokens that its actor
 gets at this tag, because all that can still send to it within the tag have a lower rank.  An actor therefore fires
 once per tag; the exception is one with an output that does not depend on an input at once (``depends_on``), which
-may have to send before that input is there: it fires again when it comes.
+may have to send before that input is there: its tokens are taken in a firing of their own, at the rank of the input.
 
 A token sent over a connection without delay arrives at the same tag; with delay d > 0 at (time + d, 1); with delay 0
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
@@ -84,6 +84,8 @@ class Director:
         self.firings = 0
         self.last = Tag(_START, 0)  # the latest tag that was handled, or is being handled
         self._rank = order
+        # By the rank of a firing, the ports whose tokens are taken in a later firing of the same actor.
+        self._later_ports: dict[int, list[InputPort[Any]]] = {}
         # (time, microstep, rank, sequence, what): deliveries have rank -1, so they come before all firings.
         self._agenda: list[tuple[int, int, int, int, Actor | Callable[[], None]]] = []
         self._sequence = count()
@@ -110,18 +112,18 @@ class Director:
         """Fire ``actor`` at ``time``; the present or past is the next microstep."""
         tag = self._tag_at(time)
         wake = Wake(tag)
-        key = self._want(actor, tag)
+        key = self._want(actor, tag, self._rank[actor.path])
         self._wakes.setdefault(key, []).append(wake)
         return wake
 
     def put(self, port: InputPort[Any], channel: int, token: Any) -> None:
         """Put a token into a port at the present tag."""
         port.put(token, channel)
-        self._want(port.actor, self.tag)
+        self._want(port.actor, self.tag, self._rank[port.path])
 
     def trigger(self, actor: Actor) -> None:
         """Fire ``actor`` at the present tag."""
-        self._want(actor, self.tag)
+        self._want(actor, self.tag, self._rank[actor.path])
 
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
@@ -142,8 +144,7 @@ class Director:
             return Tag(time, 1)
         return Tag(now.time, now.microstep + 1) if self._firing else now
 
-    def _want(self, actor: Actor, tag: Tag) -> tuple[int, int, int]:
-        rank = self._rank[actor.path]
+    def _want(self, actor: Actor, tag: Tag, rank: int) -> tuple[int, int, int]:
         key = (tag.time, tag.microstep, rank)
         if key not in self._wanted:
             self._wanted.add(key)
@@ -177,20 +178,20 @@ class Director:
                 if isinstance(what, Actor):
                     key = (now, microstep, rank)
                     self._wanted.discard(key)
-                    if self._is_idle(what, key):
+                    if self._is_idle(what, key, rank):
                         continue
                 self.last = tag
                 if microstep > MAX_MICROSTEPS:
                     raise LoopError(now, tuple(dict.fromkeys(self._recent)))
                 if isinstance(what, Actor):
-                    self._fire(what)
+                    self._fire(what, rank)
                 else:
                     what()
         finally:
             self._firing = False
             self._alarms.discard(now)
 
-    def _is_idle(self, actor: Actor, key: tuple[int, int, int]) -> bool:
+    def _is_idle(self, actor: Actor, key: tuple[int, int, int], rank: int) -> bool:
         """Make the wake-ups of a firing due; true if all were cancelled and there is nothing else to fire for."""
         wakes = self._wakes.pop(key, None)
         if wakes is None:
@@ -199,12 +200,16 @@ class Director:
         for wake in wakes:
             wake.due = not wake.cancelled
             due = due or wake.due
-        return not due and not any(port.present for port in actor.inputs.values())
+        later = self._later_ports.get(rank, ())
+        return not due and not any(port.present for port in actor.inputs.values() if port not in later)
 
-    def _fire(self, actor: Actor) -> None:
+    def _fire(self, actor: Actor, rank: int) -> None:
         self.firings += 1
         if self.last.microstep > MAX_MICROSTEPS - 10:
             self._recent.append(actor.path)
+        later = self._later_ports.get(rank, ())
+        for port in later:
+            port.hold()
         try:
             actor.fire()
         except ActorError:  # of an aspect on the way of a token
@@ -212,14 +217,18 @@ class Director:
         except Exception as error:
             doing = "run()" if isinstance(actor, Process) else "fire()"
             raise ActorError(actor.path, self.last, doing, describe(error)) from error
-        for port in actor.inputs.values():
-            port.clear()
+        finally:
+            for port in actor.inputs.values():
+                port.clear()  # which leaves what is held
+            for port in later:
+                port.release()
 
     def run(self, stop: int | None, actors: list[Actor], progress: Callable[[float], None] | None = None) -> str:
         """Handle events up to and including ``stop`` (ns), until none is left, or until a stop was asked for.
 
         Returns why it ended.
         """
+        self._find_later_ports(actors)
         environment = self.environment
         steps = here = 0
         now: float = _START
@@ -244,6 +253,12 @@ class Director:
             if progress is not None and steps % 16 == 0:
                 progress(now / 1e9)
         return self._reason
+
+    def _find_later_ports(self, actors: list[Actor]) -> None:
+        for actor in actors:
+            ranks = {self._rank[port.path] for port in actor.inputs.values()} | {self._rank[actor.path]}
+            for rank in ranks - {max(ranks)}:
+                self._later_ports[rank] = [port for port in actor.inputs.values() if self._rank[port.path] > rank]
 
     def _of_process(self, error: Exception, actors: list[Actor]) -> ActorError:
         """The error of a process that SimPy resumed: from there, no firing says whose it was."""

@@ -16,28 +16,28 @@ from .graph import Hop, ModelGraph
 
 
 def firing_order(graph: ModelGraph) -> dict[str, int]:
-    """The rank of each actor, and of each port of a composite with a director: lower ranks fire first within a tag.
+    """The rank of each actor, of each of its inputs, and of each port of a composite with a director.
 
-    Depth as in Ptolemy II: of an input, one more than the outputs that reach it within the tag; of an output, the
-    largest of the inputs that it depends on; of an actor, the smallest of its outputs, or the largest of its inputs if
-    it has no outputs.  Actors of equal depth rank by priority, those of equal priority in the order of declaration.
-    Raises ``networkx.NetworkXUnfeasible`` if there is a loop without delay.
+    Within a tag lower ranks come first.  An actor fires at its own rank for a wake-up and at that of an input for a
+    token there, which is the same unless it has outputs that do not depend on this input at once.  Ranks go by depth
+    (``depths``), at equal depth by priority, then in the order of declaration.  Raises
+    ``networkx.NetworkXUnfeasible`` if there is a loop without delay.
     """
     regions = dependencies(graph)
-    order: list[str] = []
+    order: list[list[str]] = []
 
     def unfold(director: str) -> None:
         inputs, outputs = graph.borders(director)
-        order.extend(inputs)
-        for member in _in_order(graph, director, regions[director]):
-            if member in graph.clocks:
-                unfold(member)
+        order.extend([port] for port in inputs)
+        for turn in _turns(graph, director, depths(graph, director, regions[director])):
+            if turn[0] in graph.clocks:
+                unfold(turn[0])
             else:
-                order.append(member)
-        order.extend(outputs)
+                order.append(turn)
+        order.extend([port] for port in outputs)
 
     unfold("")
-    return {path: rank for rank, path in enumerate(order)}
+    return {path: rank for rank, paths in enumerate(order) for path in paths}
 
 
 def dependencies(graph: ModelGraph) -> dict[str, Any]:
@@ -90,18 +90,42 @@ def _acts(graph: ModelGraph, director: str, region: Any, port: str) -> bool:
     return any(far in borders or region.out_degree(far) or not ports_of(graph, graph.owner(far))[1] for far in ends)
 
 
-def _in_order(graph: ModelGraph, director: str, region: Any) -> list[str]:
-    """The actors of one director in the order in which they fire within a tag."""
+def depths(graph: ModelGraph, director: str, region: Any) -> dict[str, int]:
+    """The depth of each port and actor of one director, as in Ptolemy II.
+
+    An output is as deep as the inputs that it depends on within the tag, and an input one deeper than the outputs that
+    reach it; an actor is as deep as its shallowest output, or its deepest input if it has no outputs.  Tokens of an
+    input are taken at the depth of the first output that depends on it, so that all that belongs to them is there;
+    those of the inputs on which no output depends at once are taken together, at the depth of the deepest.
+    """
     own, _ = graph.borders(director)
     depth: dict[str, int] = {}
     for path in nx.topological_sort(region):
         # Ports of composites without a director are no place to stop at: tokens only pass through them.
         step = int(graph.is_end(path) and graph.direction(path) == "input" and path not in own)
         depth[path] = max((depth[before] + step for before in region.predecessors(path)), default=0)
-
-    def key(member: str) -> tuple[int, int]:
+    result = dict(depth)
+    for member in graph.members[director]:
         inputs, outputs = ports_of(graph, member)
-        deep = min(map(depth.__getitem__, outputs)) if outputs else max(map(depth.__getitem__, inputs), default=0)
-        return deep, graph.priorities.get(member, 0)
+        deep = min(depth[port] for port in outputs) if outputs else max((depth[port] for port in inputs), default=0)
+        free = max((depth[port] for port in inputs if not region.out_degree(port)), default=deep)
+        for port in inputs:
+            result[port] = min((depth[output] for output in region.successors(port)), default=max(deep, free))
+        result[member] = deep
+    return result
 
-    return sorted(graph.members[director], key=key)  # which is stable: the order of declaration decides ties
+
+def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> list[list[str]]:
+    """The firings within a tag in their order: each a composite, or an actor and those of its inputs that go with it.
+
+    If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a turn of their own.
+    """
+    turns: list[tuple[int, int, list[str]]] = []
+    for member in graph.members[director]:
+        inputs = [] if member in graph.clocks else ports_of(graph, member)[0]
+        found: dict[int, list[str]] = {depth[member]: [member]}
+        for port in inputs:
+            found.setdefault(depth[port], []).append(port)
+        turns += [(deep, graph.priorities.get(member, 0), paths) for deep, paths in found.items()]
+    # The sort is stable: the order of declaration decides ties.
+    return [paths for _, _, paths in sorted(turns, key=lambda turn: turn[:2])]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter
+from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Tag
 
 
 class Scale(Actor):
@@ -83,15 +83,66 @@ class CancelFireAtTest(Actor):
             first.cancel()
 
 
-class PortDepths(Actor):
-    """Sends the depths of all actors and their ports; the test fills them in."""
+class TestActorPortDepth(Actor):
+    """Sends the depths of all actors and their ports, which the test tells it."""
 
+    __test__: ClassVar[bool] = False  # it is not for pytest to collect
     trigger: InputPort[Any] = InputPort(Any)
     output: OutputPort[Any] = OutputPort(Any)
-    depths: ClassVar[dict[str, dict[str, int]]] = {}
+    depths: ClassVar[dict[str, int]] = {}
 
     def fire(self) -> None:
         self.output.send(type(self).depths)
 
 
-TYPES = (Scale, AddSubtract, Comparator, GreaterThan, Sink, CancelFireAtTest, PortDepths)
+class _OfVariable(Actor):
+    """What has to do with a variable of the model, which Epicycle does not have: its parameters are fixed in a run.
+
+    An assignment counts from the tag after, as Ptolemy makes it when all actors of a tag have fired.
+    """
+
+    variable = Parameter(str)
+    initial: Parameter[Any] = Parameter(object)
+
+    def assignments(self) -> list[tuple[Tag, Any]]:
+        """The assignments of this run so far."""
+        found: list[tuple[Tag, Any]] = vars(self.context.environment).setdefault(self.variable, [])
+        return found
+
+    def value(self) -> Any:
+        """The value of the variable at this tag."""
+        return next((value for tag, value in reversed(self.assignments()) if tag < self.tag), self.initial)
+
+
+class SetVariable(_OfVariable):
+    """Assigns a token to a variable, and sends the value that it still has."""
+
+    input: InputPort[Any] = InputPort(Any)
+    output: OutputPort[Any] = OutputPort(Any)
+
+    def fire(self) -> None:
+        self.assignments().append((self.tag, self.input.value))
+        self.output.send(self.value())
+
+
+class ConstOfVariable(_OfVariable):
+    """Sends the value of a variable."""
+
+    trigger: InputPort[Any] = InputPort(Any)
+    output: OutputPort[Any] = OutputPort(Any)
+
+    def fire(self) -> None:
+        self.output.send(self.value())
+
+
+TYPES = (
+    AddSubtract,
+    CancelFireAtTest,
+    Comparator,
+    ConstOfVariable,
+    GreaterThan,
+    Scale,
+    SetVariable,
+    Sink,
+    TestActorPortDepth,
+)

@@ -56,7 +56,11 @@ def test_a_random_router_uses_every_channel_alike() -> None:
     sends = behave("{type: Router, policy: random}", [("input", [[0, 0]] * 3000)], outputs=3)
     counts = [len(tokens(sends, f"output/{channel}")) for channel in range(3)]
     # Binomial with mean 1000 and standard deviation 26.
-    assert sum(counts) == 3000 and all(abs(count - 1000) < 110 for count in counts)
+    assert sum(counts) == 3000
+    assert all(abs(count - 1000) < 110 for count in counts)
+
+
+ALIKE = "they must have equally many, for each channel of the input leads to one of the output"
 
 
 @pytest.mark.parametrize(
@@ -67,8 +71,7 @@ def test_a_random_router_uses_every_channel_alike() -> None:
         ("Select", [("input", [[0, 1]]), ("control", [[0, -1]])],
          "it.control is -1, but input has 1 channels, counted from 0"),
         ("Synchronizer", [("input", []), ("input", []), ("input", [])],
-         "it.input has 3 channels and it.output has 2; they must have equally many, "
-         "for each channel of the input leads to one of the output"),
+         f"it.input has 3 channels and it.output has 2; {ALIKE}"),
         ("Repeat", [("input", [[0, 1]]), ("times", [[0, -1]])],
          "it.times: -1 is out of bounds, expected an integer >= 0"),
     ],

@@ -118,7 +118,8 @@ def test_services_may_be_drawn() -> None:
     sends = [send for send in behave(server, [("input", [[0, n] for n in range(500)])], seed=5) if send[2] == "output"]
     found = np.sort([time for time, *_ in sends])
     assert sorted(token for *_, token in sends) == list(range(500))
-    assert found[0] > 1 and found[-1] < 2 and abs(found.mean() - 1.5) < 4 * np.sqrt(1 / 12 / 500)
+    assert 1 < found[0] < found[-1] < 2
+    assert abs(found.mean() - 1.5) < 4 * np.sqrt(1 / 12 / 500)
 
 
 def test_rounding_does_not_add_up_while_a_server_is_busy() -> None:
@@ -149,7 +150,7 @@ def test_wrong_servers(server: str, message: str) -> None:
         ("Server", [("input", [[0, 1]]), ("service_time", [[0, -1]])],
          "it.service_time: -1 is out of bounds, expected a number in s >= 0"),
         ("TimeDelay", [("input", [[0, 1]]), ("delay", [[0, "soon"]])],
-         "it.delay: unreadable"),
+         "it.delay: 'soon' is not a number with a unit, expected a time in s"),
         ("Timer", [("input", [[0, -1]])], "ValueError: it.input is -1 s: a timer cannot run for less than no time"),
     ],
 )  # fmt: skip

@@ -189,6 +189,7 @@ ERRORS = [
     ReplayError("no"),
     ChannelError("no"),
     FilterError("no"),
+    ReplayError("no"),
     LogError("no"),
     TokenError("no"),
     ExpressionError("no", 3, 4),
