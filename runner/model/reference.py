@@ -18,6 +18,7 @@ from epicycle.actors import (
     Parameter,
     declared_parameters,
     declared_ports,
+    has_own_ports,
     type_name,
     variants,
 )
@@ -55,7 +56,10 @@ class ParameterReference:
 
 @dataclass(frozen=True)
 class TypeReference:
-    """A type that a model may name, and all that it declares."""
+    """A type that a model may name, and all that it declares.
+
+    ``has_own_ports``: an instance has further ports, which follow from its parameters.
+    """
 
     name: str
     kind: str
@@ -64,6 +68,7 @@ class TypeReference:
     doc: str
     ports: tuple[PortReference, ...]
     parameters: tuple[ParameterReference, ...]
+    has_own_ports: bool
     stands_at: tuple[str, ...]
     events: tuple[str, ...]
 
@@ -95,6 +100,7 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),
         parameters=tuple(_parameter(each) for each in declared_parameters(cls).values()),
+        has_own_ports=issubclass(cls, Actor) and has_own_ports(cls),
         stands_at=tuple(sorted(cls.stands_at)) if issubclass(cls, Aspect) else (),
         events=tuple(cls.events) if issubclass(cls, Aspect) else (),
     )

@@ -335,6 +335,8 @@ def _value(parameter: Parameter[Any]) -> Schema:
 
 
 def _plain_value(parameter: Parameter[Any]) -> Schema:
+    if type(parameter).convert is not Parameter.convert:
+        return {}  # what a parameter with a conversion of its own takes, only the conversion knows
     if is_part(parameter):
         found = _ref(_part_name(parameter.type))
         return {"anyOf": [found, {"type": "null"}]} if parameter.optional else found

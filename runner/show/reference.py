@@ -177,8 +177,8 @@ def sections(reference: TypeReference) -> list[tuple[Sequence[str], list[list[st
 
 
 def facts(reference: TypeReference) -> list[str]:
-    """What else there is to say of an aspect."""
-    found = []
+    """What else there is to say of a type."""
+    found = ["Further ports follow from its parameters."] if reference.has_own_ports else []
     if reference.stands_at:
         found.append(f"Stands at {' and '.join(reference.stands_at)} ports.")
     if reference.events:

@@ -13,7 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from epicycle.actors import Parameter, ParameterError, array_parameter, declared_parameters, texts_parameter
+from epicycle.actors import (
+    EpicycleError,
+    Parameter,
+    ParameterError,
+    array_parameter,
+    declared_parameters,
+    texts_parameter,
+)
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
 from epicycle.runner.model import Problems, packaged_models
@@ -280,6 +287,30 @@ def test_values_are_those_that_the_parameter_takes(parameter: Parameter[Any], va
         assert is_valid
     elif is_valid:
         assert "-5 s" in repr(value)  # the bounds of a text with a unit are beyond a schema
+
+
+EXAMPLES = (
+    None, True, -3, 0, 1, 2, 7, 0.5, 1e9, "", "a", "a + b", "1 s", "2 m", "3 %", "out.csv", "last", [], [1], [1, 2],
+    [0.1, 0.9], ["a"], [[1, 2]], [[1, 2], [3, 4]], {}, {"type": "Normal"}, {"a": 1},
+)  # fmt: skip
+DECLARED = [
+    pytest.param(f"{kind}.{name}", key, parameter, id=f"{name}.{key}")
+    for kind, types in (("actor", built_in().actors), ("aspect", built_in().aspects))
+    for name, cls in types.items()
+    for key, parameter in declared_parameters(cls).items()
+]
+
+
+@pytest.mark.parametrize(("definition", "key", "parameter"), DECLARED)
+def test_schema_takes_what_a_declared_parameter_takes(definition: str, key: str, parameter: Parameter[Any]) -> None:
+    schema = validator().evolve(schema=validator().schema["$defs"][definition]["properties"][key])
+    default = schema.schema.get("default")
+    for value in (*EXAMPLES, *parameter.choices, *([default] if default is not None else [])):
+        try:
+            parameter.convert(value)
+        except EpicycleError:
+            continue
+        assert schema.is_valid(value), value
 
 
 def test_every_packaged_type_can_be_described() -> None:
