@@ -6,17 +6,30 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .engine import ActorError, Results, Simulation
-    from .model import Model, ModelError, load_model
+    from .engine import ActorError, Results, Signal, Simulation
+    from .model import Composite, Model, ModelError, load_composite, load_model
 
-__all__ = ["ActorError", "Model", "ModelError", "Results", "Simulation", "load_model"]
+__all__ = [
+    "ActorError",
+    "Composite",
+    "Model",
+    "ModelError",
+    "Results",
+    "Signal",
+    "Simulation",
+    "load_composite",
+    "load_model",
+]
 
 _HOMES = {
     "ActorError": "engine",
+    "Composite": "model",
     "Results": "engine",
+    "Signal": "engine",
     "Simulation": "engine",
     "Model": "model",
     "ModelError": "model",
+    "load_composite": "model",
     "load_model": "model",
 }
 
@@ -26,3 +39,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOMES:
         return getattr(import_module(f".{_HOMES[name]}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
 from typing import Any
+
+import numpy as np
 
 from epicycle.actors import EpicycleError
 
@@ -56,6 +59,25 @@ def as_html(caption: str, tables: Iterable[Table]) -> str:
         if more:
             parts.append(f"<p>{escape(more)}</p>")
     return f"<div>{''.join(parts)}</div>"
+
+
+def short(value: Any) -> str:
+    """A value in one short line; numbers to six digits."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        text = f"[{', '.join(short(item) for item in value[:20])}]"
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        inner = ", ".join(
+            f"{name}={short(getattr(value, name))}" for name in (each.name for each in dataclasses.fields(value))
+        )
+        text = f"{type(value).__name__}({inner})"
+    else:
+        text = value if isinstance(value, str) else repr(value)
+    text = " ".join(text.split())
+    return text if len(text) <= 100 else text[:97] + "..."
 
 
 def pandas_module() -> Any:

@@ -34,7 +34,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from .parameter import Configurable
+from .parameter import Configurable, ParameterError
 from .port_parameter import ParameterPort, PortParameter
 from .ports import InputPort, OutputPort, PortError
 from .random import random_stream
@@ -95,8 +95,12 @@ class Actor(Configurable):
     is_source: ClassVar[bool] = False
 
     def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(**parameters)
+        try:
+            super().__init__(**parameters)
+        except ParameterError as error:
+            raise ParameterError(f"{path}: {error}") from None
         self.path = path
+        self.home: object | None = None  # the graph that it is part of
         self._context: Context | None = None
         self._streams: dict[str, np.random.Generator] = {}
         self.inputs: dict[str, InputPort[Any]] = {}
@@ -130,6 +134,12 @@ class Actor(Configurable):
             self.inputs[name] = bound
         else:
             self.outputs[name] = bound
+
+    def move(self, path: str) -> None:
+        """Engine: the actor gets its full path in the model that it is added to."""
+        self.path = path
+        for port in (*self.inputs.values(), *self.outputs.values()):
+            port.path = f"{path}.{port.name}"
 
     def initialize(self) -> None:
         """Called once before the first tag."""

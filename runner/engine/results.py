@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import to_seconds
 
 from ..model import did_you_mean
-from ..tables import Table, as_html, as_text, pandas_module
+from ..tables import Table, as_html, as_text, pandas_module, short
 from .encoding import scalars
 from .log import EventLog
-from .signal import Signal, SignalError, short
+from .signal import Signal, SignalError
 
 if TYPE_CHECKING:
     import pandas

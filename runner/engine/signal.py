@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from epicycle.actors import EpicycleError, Tag, to_seconds
 
 from ..model import did_you_mean
-from ..tables import Table, as_html, as_text, pandas_module
+from ..tables import Table, as_html, as_text, pandas_module, short
 from .encoding import field_names, leaves
 
 if TYPE_CHECKING:
@@ -133,23 +133,6 @@ def as_array(tokens: list[Any]) -> NDArray[Any]:
     if array.ndim > 0 and len(array) == len(tokens) and array.dtype.kind in "biuf":
         return array
     return np.fromiter(tokens, dtype=object, count=len(tokens))
-
-
-def short(value: Any) -> str:
-    """A value in one short line; numbers to six digits."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if isinstance(value, (list, tuple)):
-        text = f"[{', '.join(short(item) for item in value[:20])}]"
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        inner = ", ".join(f"{name}={short(getattr(value, name))}" for name in field_names(type(value)))
-        text = f"{type(value).__name__}({inner})"
-    else:
-        text = value if isinstance(value, str) else repr(value)
-    text = " ".join(text.split())
-    return text if len(text) <= 100 else text[:97] + "..."
 
 
 def _fields(token: Any) -> tuple[str, ...]:

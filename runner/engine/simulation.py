@@ -30,12 +30,15 @@ Emit = Callable[[Any, int | None], None]
 
 
 class Simulation:
-    """One run of a model.
+    """One run of a model, which is checked first and may not be changed between this and ``run``.
+
+    A model can be run any number of times, each time by a Simulation of its own.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
 
     def __init__(self, model: Model, *, seed: int | None = None, keep_log: bool = False) -> None:
+        model.check()
         self.model = model
         self.seed = model.seed if seed is None else seed
         if self.seed < 0:

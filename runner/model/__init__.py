@@ -1,16 +1,23 @@
 """From YAML text to a checked model: document, declarations, elaboration, graph."""
 
 from .clock import Clock
+from .composite_class import CompositeClass, load_composite
 from .graph import Hop, ModelGraph, Wire
 from .load import load_model, packaged_models
-from .model import Metric, Model
+from .model import Model
+from .observation import Metric
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
+from .scope import Composite, CompositePort, Instance
 from .weave import WovenAspect
 
 __all__ = [
     "Clock",
+    "Composite",
+    "CompositeClass",
+    "CompositePort",
     "Hop",
+    "Instance",
     "Metric",
     "Model",
     "ModelError",
@@ -22,6 +29,7 @@ __all__ = [
     "WovenAspect",
     "did_you_mean",
     "firing_order",
+    "load_composite",
     "load_model",
     "packaged_models",
 ]

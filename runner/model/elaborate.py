@@ -104,6 +104,19 @@ class Elaborator:
             model.figures[name] = (part.type.text, values, part.type.position)
         return model
 
+    def instance(self, path: str, part: PartText) -> list[WovenAspect]:
+        """Unfold one instance of a composite class into the graph; the aspects that come with it."""
+        _, bracket, index = path.rpartition("[")
+        names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
+        try:
+            self._actor(path, path.rpartition(".")[0], part, names, ())
+        except _TooLargeError:
+            return []
+        ports = PathIndex(self.graph.ports.nodes)
+        for name, scope, aspect, scope_names in self._to_weave:
+            self._aspect(name, scope, aspect, scope_names, ports)
+        return self.aspects
+
     def _add_unused(self, setting: Setting) -> None:
         """A setting that no parameter took, unless it is meant for an array that is empty now."""
         if self.graph.is_excused(setting.path):

@@ -65,10 +65,12 @@ class ModelGraph:
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}
-        self.connections = 0
+        self._hops: dict[int, Hop] = {}  # by their order
+        self._order = 0
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         """Add an actor and its ports."""
+        actor.home = self
         self.actors[actor.path] = actor
         self.members[self.director_of(actor.path)].append(actor.path)
         if position is not None:
@@ -99,11 +101,58 @@ class ModelGraph:
 
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
         """Add one connection between two ports."""
-        hop = Hop(source, destination, delay, position, self.connections)
-        self.connections += 1
+        hop = Hop(source, destination, delay, position, self._order)
+        self._order += 1
+        self._hops[hop.order] = hop
         self.ports.add_edge(source, destination, key=hop.order, hop=hop)
         self._outgoing.setdefault(source, []).append(hop)
         self._incoming.setdefault(destination, []).append(hop)
+
+    @property
+    def connections(self) -> int:
+        """How many there are."""
+        return len(self._hops)
+
+    def disconnect(self, hop: Hop) -> None:
+        """Take a connection out."""
+        del self._hops[hop.order]
+        self.ports.remove_edge(hop.source, hop.destination, key=hop.order)
+        self._outgoing[hop.source].remove(hop)
+        self._incoming[hop.destination].remove(hop)
+
+    def mark(self) -> int:
+        """Where the next connection will stand, for ``since``."""
+        return self._order
+
+    def since(self, mark: int) -> list[Hop]:
+        """The connections that were made since a mark and are still there."""
+        found = []
+        for order in reversed(self._hops):
+            if order < mark:
+                break
+            found.append(self._hops[order])
+        return found[::-1]
+
+    def remove(self, path: str) -> None:
+        """Take out an actor, or a composite and all within, with their connections."""
+
+        def is_within(each: str) -> bool:
+            return each == path or each.startswith(f"{path}.")
+
+        for port in [each for each in self.ports if is_within(each)]:
+            for hop in {*self.incoming(port), *self.outgoing(port)}:
+                self.disconnect(hop)
+            self.ports.remove_node(port)
+        for actor in [each for each in self.actors if is_within(each)]:
+            self.actors[actor].home = None
+        by_path: tuple[dict[str, Any], ...] = (
+            self.actors, self.composites, self.positions, self.priorities, self.clocks, self.members, self._borders,
+        )  # fmt: skip
+        for known in by_path:
+            for each in [each for each in known if is_within(each)]:
+                del known[each]
+        for members in self.members.values():
+            members[:] = [each for each in members if not is_within(each)]
 
     def direction(self, path: str) -> str:
         """``input`` or ``output``."""

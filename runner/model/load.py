@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
+from .document import Mapping as MappingNode
 from .document import read
 from .elaborate import Elaborator
 from .model import Model
 from .problems import Problems, did_you_mean
-from .settings import Settings, change_aspect, parse_setting, read_overrides, without
+from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
+from .site import call_site, node_of
 
 MAX_INCLUDES = 200
 
@@ -55,10 +57,16 @@ def find_model(name: str, problems: Problems) -> Path | None:
     return known[name]
 
 
+def find_library(path: Path) -> Path:
+    """The file of a library of composites: as given, or else among the packaged ones."""
+    packaged = [folder / path for folder in model_folders()]
+    return next((each for each in (path, *packaged) if each.is_file()), path)
+
+
 def load_model(
     name: str | Path,
     *,
-    set: Iterable[str] = (),
+    set: Iterable[str] | Mapping[str, object] = (),
     overrides: str | Path | Iterable[str | Path] = (),
     aspects: Iterable[str] = (),
     without_aspects: Iterable[str] = (),
@@ -66,14 +74,15 @@ def load_model(
 ) -> Model:
     """Read, change and check a model; raises ``ModelError`` with all that is wrong.
 
-    ``set`` holds texts like ``"observer[*].sensor.range=5 m"``, ``overrides`` names a YAML file of such settings, or
-    several; of all that fit a parameter the last one wins, and ``set`` wins over files.  ``types`` are actor and aspect
+    ``set`` gives parameters their values, as texts like ``"observer[*].sensor.range=5 m"`` or as a mapping
+    ``{"observer[*].sensor.range": 5}``; ``overrides`` names a YAML file of such settings, or several; of all that fit
+    a parameter the last one wins, and ``set`` wins over files.  ``types`` are actor and aspect
     classes of your own that the model may name beside the installed ones.  What is odd but not wrong is in
     ``Model.warnings``.
     """
     problems = Problems()
     settings = [each for file in _files(overrides) for each in read_overrides(file, problems)]
-    settings += [found for text in set if (found := parse_setting(text, problems)) is not None]
+    settings += _settings(set, problems)
     path = find_model(str(name), problems)
     if path is None:
         problems.raise_if_any()
@@ -87,13 +96,14 @@ def load_model(
     if text is None:
         problems.raise_if_any()
         raise AssertionError("a model that is no mapping is a problem")
-    composites = _composites(text, path, reader, problems)
+    composites = included_composites(text, path, reader, problems)
     for change in without_aspects:
         without(text, change, problems)
     for change in aspects:
         change_aspect(text, change, problems)
     model = Elaborator(text, composites, Settings(settings), problems, installed().with_types(types)).model()
     problems.raise_if_any()
+    model.is_checked = True
     return model
 
 
@@ -101,7 +111,17 @@ def _files(given: str | Path | Iterable[str | Path]) -> list[Path]:
     return [Path(each) for each in ((given,) if isinstance(given, (str, Path)) else given)]
 
 
-def _composites(text: ModelText, path: Path, reader: DeclarationReader, problems: Problems) -> dict[str, CompositeText]:
+def _settings(given: Iterable[str] | Mapping[str, object], problems: Problems) -> list[Setting]:
+    if not isinstance(given, Mapping):
+        return [found for text in given if (found := parse_setting(text, problems)) is not None]
+    node = node_of(given, call_site())
+    assert isinstance(node, MappingNode)
+    return settings_in(node, problems)
+
+
+def included_composites(
+    text: ModelText, path: Path, reader: DeclarationReader, problems: Problems
+) -> dict[str, CompositeText]:
     """The composite classes of a model and of all that it includes."""
     # Included files must lie in or below the model's folder: a model cannot make us read other files.
     root = path.parent.resolve()

@@ -1,49 +1,69 @@
-"""Model: what elaboration makes and a simulation runs."""
+"""Model: what elaboration or a program makes and a simulation runs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 
-from epicycle.actors import Parameter, Tag, to_nanoseconds, to_seconds
+from epicycle.actors import Tag, declared_parameters
 
+from ..tables import Table, as_html, as_text, short
+from .checks import check
+from .declarations import NAME, REDUCTIONS, MetricText, Text, within
 from .graph import ModelGraph
-from .problems import Position, Problem
+from .observation import Metric, Observation, checked_seed, nanoseconds
+from .problems import Position, Problem, Problems, did_you_mean
+from .scope import Composite, Port, Scope, Scopes, is_within
+from .site import call_site
+from .values import Values
 from .weave import WovenAspect
 
 
-@dataclass
-class Metric:
-    """A number taken from what some ports send: ``take`` is a reduction over all their tokens."""
+class Model(Scope):
+    """A model graph that can be run, made by ``load_model`` or built in Python.
 
-    name: str
-    ports: list[str]
-    take: str
-    unit: str
-    doc: str
+    >>> model = Model("two_clocks", stop=10.0, seed=1)
+    >>> clocks = [model.add(Clock(f"clock[{i}]", period=i + 1)) for i in range(2)]
+    >>> channel = model.add(BroadcastChannel("channel"))
+    >>> model.connect("clock[*].output -> channel.input", delay="100 ms")
+    >>> model.metric("heard", of=channel.output, take="count")
+    >>> Simulation(model).run().metrics
+    {'heard': 15}
 
+    ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
+    A model that was loaded can be changed in the same way.  Its ``parameters`` are a record of how it was made:
+    actors took their values from them then, so they are set with ``load_model(..., set=...)``, not here.
+    """
 
-class Model:
-    """A model that can be run; ports are named by their paths, those of composites included."""
-
-    def __init__(self, name: str, *, doc: str = "", stop: float | str | None = None, seed: int = 0) -> None:
+    def __init__(
+        self,
+        name: str,
+        *,
+        doc: str = "",
+        stop: float | str | None = None,
+        seed: int = 0,
+        parameters: Mapping[str, object] | None = None,
+    ) -> None:
+        super().__init__(self, "", name, call_site())
         self.name = name
         self.doc = doc
         self.graph = ModelGraph()
-        self.parameters: dict[str, object] = {}
+        self.scopes = Scopes(self)
+        self.parameters: dict[str, object] = dict(parameters or {})
         self.aspects: list[WovenAspect] = []
         self.stop_time: int | None = None  # ns
         self.stop_ports: list[str] = []
-        self.seed = seed
+        self.seed = checked_seed(seed)
         self.recorded: list[str] = []
         self.metrics: list[Metric] = []
         self.figures: dict[str, tuple[str, dict[str, object], Position]] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
+        self.is_checked = False  # since the last change
         self.stop = stop
 
     @property
     def stop(self) -> float | None:
         """When the run ends, in seconds; None if only an empty agenda or a port ends it.  ``"500 ms"`` may be set."""
-        return None if self.stop_time is None else to_seconds(self.stop_time)
+        return None if self.stop_time is None else self.stop_time / 1e9
 
     @stop.setter
     def stop(self, stop: float | str | None) -> None:
@@ -53,9 +73,113 @@ class Model:
         """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
         return self.graph.clocks[self.graph.director_of(actor)].tag(tag)
 
+    # -- what is watched ------------------------------------------------------------------------------------------
 
-def nanoseconds(duration: float | str) -> int:
-    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
-    seconds = Parameter(float, unit="s", min=0.0).convert(duration)
-    assert seconds is not None
-    return to_nanoseconds(seconds)
+    def record(self, *ports: str | Port) -> None:
+        """Keep what output ports send, given as such or as patterns over the ports that are there now."""
+        self._watch(ports, lambda observation, text: observation.record(text))
+
+    def stop_when(self, *ports: str | Port) -> None:
+        """End the run, after the tag in question, when one of these output ports sends something true."""
+        self._watch(ports, lambda observation, text: observation.stop_when(text))
+
+    def metric(self, name: str, *, of: str | Port, take: str = "last", unit: str = "", doc: str = "") -> None:
+        """A number in the results: ``take`` is last, first, min, max, sum, mean or count."""
+        position = call_site()
+        problems = Problems()
+        if not NAME.match(name):
+            problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+        if any(metric.name == name for metric in self.metrics):
+            problems.add(f"there is a metric {name!r} already", position, "give this another name")
+        if take not in REDUCTIONS:
+            problems.add(
+                f"metric {name!r} cannot take {take!r}{did_you_mean(take, REDUCTIONS)}",
+                position,
+                f"valid reductions: {', '.join(REDUCTIONS)}",
+            )
+        problems.raise_if_any()
+        self._watch(
+            [of],
+            lambda observation, text: observation.metric(MetricText(name, text, take, unit, doc, position)),
+        )
+
+    def _watch(self, ports: Iterable[str | Port], ask: Callable[[Observation, Text], None]) -> None:
+        """Let an ``Observation`` do what it does for a model file; if something is wrong, nothing has changed."""
+        position = call_site()
+        before = list(self.recorded), list(self.stop_ports), list(self.metrics)
+        problems = Problems()
+        observation = Observation(self, Values(problems), problems)
+        for port in ports:
+            path = port if isinstance(port, str) else port.path
+            ask(observation, Text(path, within(position, path)))
+        if problems.found:
+            self.recorded, self.stop_ports, self.metrics = before
+        problems.raise_if_any()
+
+    # -- the whole ------------------------------------------------------------------------------------------------
+
+    def check(self) -> None:
+        """Check the model as a whole; raises ``ModelError`` with all that is wrong.  A ``Simulation`` does so first."""
+        if not self.is_checked:
+            problems = Problems()
+            check(self.graph, problems)
+            problems.raise_if_any()
+            self.warnings = problems.warnings
+            self.is_checked = True
+
+    def scope(self, path: str) -> Composite:
+        """Engine: the composite at a path."""
+        self.scopes.update()
+        return self.scopes.at(path)
+
+    def changed(self) -> None:
+        """Engine: what was checked before may no longer hold."""
+        self.is_checked = False
+
+    def forget(self, path: str) -> None:
+        """Engine: take out an actor or composite, and whatever stands at it or watches it."""
+        self.graph.remove(path)
+        self.scopes.remove(path)
+        for woven in self.aspects:
+            woven.ports = [port for port in woven.ports if not is_within(port, path)]
+        self.aspects = [woven for woven in self.aspects if not is_within(woven.name, path)]
+        self.recorded = [port for port in self.recorded if not is_within(port, path)]
+        self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
+        for metric in self.metrics:
+            metric.ports = [port for port in metric.ports if not is_within(port, path)]
+        self.changed()
+
+    # -- for people -----------------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        return f"<Model {self._caption()}>"
+
+    def __str__(self) -> str:
+        return as_text(self._caption(), self._tables())
+
+    def _repr_html_(self) -> str:
+        return as_html(self._caption(), self._tables())
+
+    def _caption(self) -> str:
+        hops = self.graph.since(0)
+        parts = [(len(self.graph.actors), "actor"), (len(hops), "connection"), (len(self.aspects), "aspect")]
+        counts = ", ".join(f"{number} {word}{'' if number == 1 else 's'}" for number, word in parts)
+        return f"{self.name}: {counts}" + ("" if self.stop is None else f", stops at {self.stop:g} s")
+
+    def _tables(self) -> list[Table]:
+        actors = []
+        for path, actor in self.graph.actors.items():
+            values = (f"{name}={short(getattr(actor, name))}" for name in declared_parameters(type(actor)))
+            actors.append((path, type(actor).__name__, ", ".join(values)))
+        connections = [
+            (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")
+            for hop in self.graph.since(0)
+        ]
+        aspects = [(woven.name, repr(woven.aspect), ", ".join(woven.ports)) for woven in self.aspects]
+        parameters = [(name, short(value)) for name, value in self.parameters.items()]
+        return [
+            Table(("parameter", "value"), parameters),
+            Table(("actor", "type", "parameters"), actors),
+            Table(("from", "to", "delay"), connections),
+            Table(("aspect", "", "at"), aspects),
+        ]

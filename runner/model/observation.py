@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import Parameter, ParameterError, accepts, type_name
+from epicycle.actors import Parameter, ParameterError, accepts, to_nanoseconds, type_name
 
 from .declarations import DeclarationReader, MetricText, ModelText
-from .model import Metric, Model, nanoseconds
 from .patterns import PathIndex, PatternError
 from .problems import Problems, nearest
 from .reading import Text
 from .values import Values
 
+if TYPE_CHECKING:
+    from .model import Model
+
 # Larger seeds could not be told apart in the int64 columns of result files.
 MAX_SEED = 2**63 - 1
 
 
+@dataclass
+class Metric:
+    """A number taken from what some ports send: ``take`` is a reduction over all their tokens."""
+
+    name: str
+    ports: list[str]
+    take: str
+    unit: str
+    doc: str
+
+
 class Observation:
-    """Reads ``run`` and ``metrics`` into a model."""
+    """Lets a model be watched: ``read`` does what its file says, the others what a program asks for."""
 
     def __init__(self, model: Model, values: Values, problems: Problems) -> None:
         self.model = model
@@ -33,11 +47,11 @@ class Observation:
         reader = DeclarationReader(self.problems)
         for key, entry in text.run.items():
             if key == "record":
-                found = [path for each in reader.texts(entry.value, key) for path in self._select(each, key)]
-                self.model.recorded = list(dict.fromkeys(found))
+                for each in reader.texts(entry.value, key):
+                    self.record(each)
             elif key == "stop_when":
                 for each in reader.texts(entry.value, key):
-                    self._stop_when(each)
+                    self.stop_when(each)
             else:
                 value = self.values.of(entry.value, names, key)
                 if value is self.values.missing:
@@ -46,14 +60,18 @@ class Observation:
                     if key == "stop":
                         self.model.stop_time = nanoseconds(value)
                     else:
-                        seed: Any = Parameter(int, min=0, max=MAX_SEED).convert(value)
-                        self.model.seed = seed
+                        self.model.seed = checked_seed(value)
                 except (ParameterError, ValueError) as error:
                     self.problems.add(f"{key}: {error}", entry.value.position)
         for metric in text.metrics:
-            self._metric(metric)
+            self.metric(metric)
 
-    def _stop_when(self, text: Text) -> None:
+    def record(self, text: Text) -> None:
+        """Keep what the ports behind a pattern send."""
+        self.model.recorded = list(dict.fromkeys([*self.model.recorded, *self._select(text, "record")]))
+
+    def stop_when(self, text: Text) -> None:
+        """End the run when a port behind the pattern sends something true."""
         for path in self._select(text, "stop_when"):
             self.model.stop_ports.append(path)
             for port in self.graph.source_of(path):
@@ -65,7 +83,8 @@ class Observation:
                     )
                     return
 
-    def _metric(self, metric: MetricText) -> None:
+    def metric(self, metric: MetricText) -> None:
+        """Reduce what the ports behind a pattern send to one number."""
         what = f"metric {metric.name}"
         paths = self._select(metric.port, what)
         self.model.metrics.append(Metric(metric.name, paths, metric.take, metric.unit, metric.doc))
@@ -110,3 +129,15 @@ class Observation:
         owner = pattern.rpartition(".")[0]
         ports = [path for path in self._outputs if path.rpartition(".")[0] == owner]
         return (f"output ports of {owner}: {', '.join(p.rpartition('.')[2] for p in ports)}",) if ports else ()
+
+
+def nanoseconds(duration: object) -> int:
+    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
+    seconds: Any = Parameter(float, unit="s", min=0.0).convert(duration)
+    return to_nanoseconds(seconds)
+
+
+def checked_seed(value: object) -> int:
+    """A seed as a whole number; raises ``ParameterError``."""
+    seed: Any = Parameter(int, min=0, max=MAX_SEED).convert(value)
+    return int(seed)

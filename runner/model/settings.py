@@ -68,6 +68,11 @@ def read_overrides(path: Path, problems: Problems) -> list[Setting]:
             "write lines like 'observer[*].sensor.range: 5 m'",
         )
         return []
+    return settings_in(node, problems)
+
+
+def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
+    """The settings that a mapping from paths or patterns to values holds."""
     return [
         Setting(key, entry.value, entry.key.position)
         for key, entry in node.entries.items()

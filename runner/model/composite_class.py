@@ -1,0 +1,88 @@
+"""Composite classes of YAML files, for models that are built in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from .catalogue import Catalogue, installed
+from .declarations import CompositeText, DeclarationReader, ModelText, PartText, Text
+from .document import Mapping, read
+from .elaborate import Elaborator
+from .graph import ModelGraph
+from .load import find_library, included_composites
+from .model import Model
+from .problems import Position, Problems, did_you_mean
+from .settings import Settings
+from .site import call_site, entries_of
+
+
+class CompositeClass:
+    """A composite class; called with a name and values for its parameters, it gives what ``add`` takes."""
+
+    def __init__(self, name: str, composites: dict[str, CompositeText], catalogue: Catalogue) -> None:
+        self.name = name
+        self.composites = composites
+        self.catalogue = catalogue
+
+    def __call__(self, path: str, **parameters: object) -> CompositeInstance:
+        return CompositeInstance(self, path, parameters)
+
+    def __repr__(self) -> str:
+        return f"<composite class {self.name}({', '.join(self.composites[self.name].parameters)})>"
+
+
+class CompositeInstance:
+    """An instance that is yet to be added to a model."""
+
+    def __init__(self, composite: CompositeClass, path: str, parameters: dict[str, object]) -> None:
+        self.composite = composite
+        self.path = path
+        self.parameters = parameters
+
+    def unfold(self, path: str, model: Model, position: Position) -> None:
+        """Make it part of a model; raises ``ModelError`` before anything has changed."""
+        cls = self.composite
+        part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
+        if "priority" in part.values:  # which stands beside the parameters, as in a model file
+            part.priority = part.values.pop("priority").value
+        root = ModelText(CompositeText(model.name, position))
+        for graph in (ModelGraph(), model.graph):  # the first one to see what is wrong
+            problems = Problems()
+            elaborator = Elaborator(root, cls.composites, Settings(), problems, cls.catalogue)
+            elaborator.graph = graph
+            aspects = elaborator.instance(path, part)
+            problems.raise_if_any()
+        model.aspects += aspects
+
+    def __repr__(self) -> str:
+        return f"<{self.composite.name} {self.path}>"
+
+
+def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -> CompositeClass:
+    """Read a composite class from a YAML file (a packaged one such as ``robots/mobile_robot.yaml``, too).
+
+    ``types`` are actor and aspect classes of your own that it may name.  Raises ``ModelError``.
+
+    >>> MobileRobot = load_composite("robots/mobile_robot.yaml", "MobileRobot")
+    >>> main = model.add(MobileRobot("main", start=[30, 0], objective=ReachGoal(goal=[0, 0]), max_speed="8 m/s"))
+    """
+    problems = Problems()
+    path = find_library(Path(file))
+    node = read(path, problems)
+    text = None
+    if node is not None:
+        reader = DeclarationReader(problems)
+        is_model = isinstance(node, Mapping) and "model" in node.entries
+        text = reader.model(node) if is_model else reader.included(node)
+    problems.raise_if_any()
+    assert text is not None, "what cannot be read is a problem"
+    composites = included_composites(text, path, DeclarationReader(problems), problems)
+    if name not in composites:
+        problems.add(
+            f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}",
+            call_site(),
+            f"its composites: {', '.join(composites) or 'none'}",
+        )
+    problems.raise_if_any()
+    return CompositeClass(name, composites, installed().with_types(types))

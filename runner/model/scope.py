@@ -1,0 +1,542 @@
+"""Building a model in Python: what can be done inside of a model or a composite.
+
+A program makes and changes the same graph as a model file does, through the same rules: names, connections, pointcuts
+and metrics go to the classes that read them from YAML, and a mistake raises ``ModelError`` that points at the line of
+the program.  A call that fails changes nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar, overload
+
+from epicycle.actors import (
+    Actor,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    accepts,
+    to_nanoseconds,
+    type_name,
+)
+from epicycle.aspects import Aspect
+
+from .declarations import NAME, CompositeText, ConnectionText, DeclarationReader, PartText, Text, within
+from .document import Scalar
+from .graph import Hop
+from .patterns import PathIndex
+from .problems import ModelError, Position, Problem, Problems, did_you_mean
+from .site import call_site, node_of
+from .values import Values
+from .weave import WovenAspect, select_ports
+from .wiring import Child, Wiring
+
+if TYPE_CHECKING:
+    from .model import Model
+
+_INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
+
+A = TypeVar("A", bound=Actor)
+
+
+@dataclass(frozen=True)
+class CompositePort:
+    """A port of a composite, through which tokens pass."""
+
+    path: str
+    direction: str
+
+    def __repr__(self) -> str:
+        return f"<{self.direction} port {self.path} of a composite>"
+
+
+Port: TypeAlias = "InputPort[Any] | OutputPort[Any] | CompositePort"
+Ends: TypeAlias = "str | Port | Iterable[str | Port]"
+
+
+class Instance(Protocol):
+    """An instance of a composite class that can be added to a model; see ``load_composite``."""
+
+    path: str
+
+    def unfold(self, path: str, model: Model, position: Position) -> None:
+        """Make it part of a model, at its full path."""
+
+
+class Scope:
+    """The inside of a model or of a composite: where actors are added and connected."""
+
+    def __init__(self, model: Model, path: str, label: str, position: Position) -> None:
+        self.path = path
+        self._model = model
+        # What wiring reads: the same declarations that it reads of a model file.
+        self._text = CompositeText(label, position)
+        self._parts: dict[str, Child] = {}
+
+    @property
+    def _children(self) -> dict[str, Child]:
+        self._model.scopes.update()
+        return self._parts
+
+    # -- parts ----------------------------------------------------------------------------------------------------
+
+    @overload
+    def add(self, part: A, *, priority: int | None = None) -> A: ...
+    @overload
+    def add(self, part: Instance) -> Composite: ...
+    def add(self, part: Actor | Instance, *, priority: int | None = None) -> Actor | Composite:
+        """Add an actor, or an instance of a composite class, and return it.
+
+        Elements of an array are called ``robot[0]``, ``robot[1]`` and so on, in this order.  Of actors of one depth,
+        those of lower ``priority`` fire first, then those that were added first.  Raises ``ModelError``.
+        """
+        position = call_site()
+        if isinstance(part, Actor) and part.home is not None:
+            raise _mistake(
+                f"{part.path} is part of a model already, and an actor belongs to one model",
+                position,
+                f"make another one: {type(part).__name__}(...)",
+            )
+        with _raising() as problems:
+            full = self._free(part.path, position, problems)
+        if isinstance(part, Actor):
+            part.move(full)
+            self._model.graph.add_actor(part, position)
+        else:
+            part.unfold(full, self._model, position)
+        if priority:
+            self._model.graph.priorities[full] = priority
+        self._model.changed()
+        return part if isinstance(part, Actor) else self._model.scope(full)
+
+    def composite(
+        self,
+        name: str,
+        *,
+        inputs: Iterable[str] = (),
+        outputs: Iterable[str] = (),
+        director: bool = False,
+        start: float | str | None = None,
+        drift: float = 1.0,
+    ) -> Composite:
+        """Add an empty composite, a scope for actors of its own, with ports through which it is connected.
+
+        With ``director`` it has a director of its own and fires as one actor; local time then begins at ``start`` s
+        (default: as around it) and goes ``drift`` times as fast.  Raises ``ModelError``.
+        """
+        position = call_site()
+        with _raising() as problems:
+            full = self._free(name, position, problems)
+            begin, speed = _clock(full, start, drift, position, problems)
+        self._model.graph.composites[full] = ""  # it is of no class
+        if director:
+            self._model.graph.add_director(full, begin, speed)
+        self._model.graph.positions.setdefault(full, position)
+        made = self._model.scope(full)
+        try:
+            for port in inputs:
+                made.input(port)
+            for port in outputs:
+                made.output(port)
+        except Exception:
+            self.remove(name)
+            raise
+        self._model.changed()
+        return made
+
+    def remove(self, name: str) -> None:
+        """Take out an actor or a composite with all that is connected to it, stands at it and watches it."""
+        position = call_site()
+        child = self._children.get(name.partition("[")[0])
+        full = self._full(name)
+        with _raising() as problems:
+            if child is None or full not in child.paths:
+                known = [path[len(self._full("")) :] for each in self._children.values() for path in each.paths]
+                problems.add(
+                    f"{self._text.name} has no actor {name!r}{did_you_mean(name, known)}",
+                    position,
+                    f"valid actors: {', '.join(known) or 'none'}",
+                )
+            elif full != child.paths[-1]:
+                problems.add(f"{full} is not the last of its array", position, f"only {child.paths[-1]} can be removed")
+        assert child is not None
+        child.paths.pop()
+        child.count = len(child.paths)
+        if not child.paths:
+            del self._children[name.partition("[")[0]]
+            self._text.actors.pop(name.partition("[")[0], None)
+        self._model.forget(full)
+
+    def __getitem__(self, name: str) -> Any:
+        """The actor, composite or port at a dotted path within."""
+        full = self._full(name)
+        graph = self._model.graph
+        if full in graph.actors:
+            return graph.actors[full]
+        if full in graph.composites:
+            return self._model.scope(full)
+        if full in graph.ports:
+            port = graph.ports.nodes[full]["port"]
+            return CompositePort(full, graph.direction(full)) if port is None else port
+        known = [*graph.actors, *graph.composites, *graph.ports]
+        raise _mistake(f"there is no {full!r}{did_you_mean(full, known)}", call_site())
+
+    def _free(self, name: str, position: Position, problems: Problems) -> str:
+        """The full path of a new part, if its name can be taken."""
+        match = _INSTANCE.match(name)
+        full = self._full(name)
+        if match is None:
+            problems.add(
+                f"{name!r} is not a name",
+                position,
+                "use letters, digits and _, no digit first; an element of an array is called 'name[0]'",
+                *(("what is inside of a composite is added to the composite",) if "." in name else ()),
+            )
+            return full
+        base, index = match.groups()
+        child = self._children.get(base)
+        if base in self._text.inputs or base in self._text.outputs:
+            problems.add(f"{self.path}.{base} is a port already", position, "give the actor another name")
+        elif child is None:
+            if index is not None and int(index) != 0:
+                problems.add(f"{full} cannot be the first of its array", position, f"begin with {base}[0]")
+        elif full in child.paths:
+            at = self._model.graph.positions.get(full)
+            where = (f"the first was added at {at.file}:{at.line}",) if at is not None else ()
+            problems.add(f"there is a {full} already", position, *where, "give it another name")
+        elif child.array != (index is not None):
+            kind = "an array" if child.array else "a single actor"
+            problems.add(f"{self._full(base)} is {kind} already", position, "give it another name")
+        elif index is not None and int(index) != len(child.paths):
+            problems.add(
+                f"{full} is not the next of its array", position, f"the next is {self._full(base)}[{len(child.paths)}]"
+            )
+        return full
+
+    def _full(self, name: str) -> str:
+        return f"{self.path}.{name}" if self.path else name
+
+    def enrol(self, name: str, child: Child, position: Position) -> None:
+        """Engine: there is a new part, of which connections may speak."""
+        base = name.partition("[")[0]
+        known = self._parts.setdefault(base, child)
+        if known is not child:
+            known.paths += child.paths
+            known.count = len(known.paths)
+        self._text.actors.setdefault(base, PartText(base, position, Text(child.kind, position)))
+
+    # -- connections ----------------------------------------------------------------------------------------------
+
+    def connect(self, source: Ends, destination: Ends | None = None, *, delay: float | str | None = None) -> None:
+        """Connect ports, given as such or as text: ``connect(a.output, b.input)``, ``connect("a.output -> b.input")``.
+
+        Every source is connected to every destination; in texts, ``[*]`` stands for all of an array, and on both
+        sides connects equal indices.  ``delay`` is in seconds or a text with a unit; without it, tokens arrive
+        within the tag in which they are sent.  Raises ``ModelError``.
+        """
+        position = call_site()
+        graph = self._model.graph
+        before, was_wired = graph.mark(), graph.is_wired
+        try:
+            with _raising() as problems:
+                connection = self._connection(source, destination, delay, position, problems)
+                if connection is not None:
+                    wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
+                    wiring.connect(connection, {})
+                for hop in graph.since(before):
+                    self._judge(hop, problems)
+        except Exception:
+            for hop in graph.since(before):
+                graph.disconnect(hop)
+            graph.is_wired = was_wired
+            raise
+        self._model.changed()
+
+    def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
+        """Take out the connections between ports, which are given as to ``connect``; there must be some."""
+        position = call_site()
+        graph = self._model.graph
+        before, was_wired = graph.mark(), graph.is_wired
+        try:
+            with _raising() as problems:
+                connection = self._connection(source, destination, None, position, problems)
+                if connection is not None:
+                    wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
+                    wiring.connect(connection, {})
+            pairs = dict.fromkeys((hop.source, hop.destination) for hop in graph.since(before))
+        finally:
+            # Connected only to find out which ports are meant.
+            for hop in graph.since(before):
+                graph.disconnect(hop)
+            graph.is_wired = was_wired
+        found = [hop for one, other in pairs for hop in graph.outgoing(one) if hop.destination == other]
+        if not found:
+            with _raising() as problems:
+                for one, other in pairs:
+                    here = ", ".join(hop.destination for hop in graph.outgoing(one))
+                    problems.add(
+                        f"{one} is not connected to {other}", position, f"{one} is connected to: {here or 'nothing'}"
+                    )
+        for hop in found:
+            graph.disconnect(hop)
+        self._model.changed()
+
+    def _connection(
+        self,
+        source: Ends,
+        destination: Ends | None,
+        delay: float | str | None,
+        position: Position,
+        problems: Problems,
+    ) -> ConnectionText | None:
+        """A connection as a model file would declare it."""
+        if destination is None:
+            if not isinstance(source, str):
+                problems.add("the connection has no destination", position, "write connect(a.output, b.input)")
+                return None
+            connection = DeclarationReader(problems).connection(Scalar(source, source, False, position))
+        else:
+            sources = self._ends(source, position, problems)
+            destinations = self._ends(destination, position, problems)
+            connection = ConnectionText(sources, destinations, position)
+        if connection is not None and delay is not None:
+            connection.delay = node_of(delay, position)
+        # A list that is empty connects nothing: there may be no robots.
+        return connection if connection is not None and connection.sources and connection.destinations else None
+
+    def _ends(self, ends: Ends, position: Position, problems: Problems) -> list[Text]:
+        found = []
+        for end in _each(ends):
+            name = end if isinstance(end, str) else self._name_of(end, position, problems)
+            if name is not None:
+                found.append(Text(name, within(position, name)))
+        return found
+
+    def _known(self, port: Any, position: Position, problems: Problems) -> str | None:
+        """The path of a port of this model."""
+        graph = self._model.graph
+        if not isinstance(port, (InputPort, OutputPort, CompositePort)):
+            ports = ""
+            if isinstance(port, Actor):
+                ports = ", ".join(each.path for each in (*port.inputs.values(), *port.outputs.values()))
+            problems.add(
+                f"{port!r} is not a port",
+                position,
+                f"name one of its ports: {ports}" if ports else "give a port such as clock.output, or its path as text",
+            )
+            return None
+        path: str = port.path
+        if not path:
+            problems.add(
+                f"{port!r} is declared in a class",
+                position,
+                "give the port of an actor that was added to the model",
+            )
+            return None
+        if path not in graph.ports or graph.ports.nodes[path]["port"] not in (port, None):
+            problems.add(f"the actor of {path} is not part of this model", position, "add it to the model first")
+            return None
+        return path
+
+    def _name_of(self, port: object, position: Position, problems: Problems) -> str | None:
+        """The name of a port as seen from inside this scope."""
+        path = self._known(port, position, problems)
+        if path is None:
+            return None
+        owner = path.rpartition(".")[0]
+        if owner == self.path:
+            return path.rpartition(".")[2]
+        scope = owner.rpartition(".")[0]
+        if scope != self.path:
+            there = f"in {scope}" if scope else "at the top of the model"
+            problems.add(
+                f"{path} cannot be connected in {self._text.name}",
+                position,
+                f"connect it {there}, where {owner} is; ports of composites lead in and out",
+            )
+            return None
+        return path[len(self._full("")) :]
+
+    def _judge(self, hop: Hop, problems: Problems) -> None:
+        """What can be said of a new connection at once; the rest is said when the model is whole."""
+        graph = self._model.graph
+        source, target = (graph.ports.nodes[path]["port"] for path in (hop.source, hop.destination))
+        if source is not None and target is not None and not accepts(target.type, source.type):
+            problems.add(
+                f"{source.path} sends {type_name(source.type)}, but {target.path} takes {type_name(target.type)}",
+                hop.position,
+            )
+        incoming = graph.incoming(hop.destination)
+        if target is not None and not target.multi and incoming[0] is not hop:
+            at = incoming[0].position
+            where = f", at {at.file}:{at.line}" if at is not None else ""
+            problems.add(
+                f"{target.path} takes one connection, and {incoming[0].source} is connected to it already{where}",
+                hop.position,
+                "disconnect that one, or send through an actor that merges them",
+            )
+
+    # -- aspects --------------------------------------------------------------------------------------------------
+
+    def weave(self, name: str, aspect: Aspect, *, at: Ends) -> WovenAspect:
+        """Let an aspect stand at ports, given as such or as patterns over the ports that are there now.
+
+        Aspects at one port apply in the order in which they are woven.  Raises ``ModelError``.
+        """
+        position = call_site()
+        full = self._full(name)
+        with _raising() as problems:
+            if not NAME.match(name):
+                problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+            if any(woven.name == full for woven in self._model.aspects):
+                problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
+            texts = []
+            for end in _each(at):
+                path = end if isinstance(end, str) else self._known(end, position, problems)
+                if path is not None:
+                    name_here = path if path is end else path.removeprefix(self._full(""))
+                    texts.append(Text(name_here, within(position, name_here)))
+            index = PathIndex(self._model.graph.ports.nodes)
+            ports = select_ports(self._model.graph, index, full, type(aspect), self.path, texts, problems)
+        woven = WovenAspect(full, aspect, ports)
+        self._model.aspects.append(woven)
+        return woven
+
+    def unweave(self, name: str) -> None:
+        """Take an aspect out."""
+        full = self._full(name)
+        known = [woven.name for woven in self._model.aspects]
+        if full not in known:
+            raise _mistake(
+                f"the model has no aspect {full!r}{did_you_mean(full, known)}",
+                call_site(),
+                f"its aspects: {', '.join(known) or 'none'}",
+            )
+        del self._model.aspects[known.index(full)]
+
+
+class Composite(Scope):
+    """A composite of a model: a scope for actors of its own, and ports through which it is connected.
+
+    Inside, ``connect`` takes its own ports by their names alone: ``connect("trigger -> sensor.trigger")``.
+    """
+
+    def input(self, name: str) -> CompositePort:
+        """Add an input port."""
+        return self._port(name, "input")
+
+    def output(self, name: str) -> CompositePort:
+        """Add an output port."""
+        return self._port(name, "output")
+
+    def _port(self, name: str, direction: str) -> CompositePort:
+        position = call_site()
+        full = self._full(name)
+        with _raising() as problems:
+            if not NAME.match(name):
+                problems.add(f"{name!r} is not a port name", position)
+            elif name in self._text.inputs or name in self._text.outputs:
+                problems.add(f"port {full!r} is declared twice", position)
+            elif name in self._children:
+                problems.add(f"{full!r} is the name of an actor and of a port", position, "rename one")
+        self._model.graph.add_composite_port(full, direction, position)
+        self.enrol_port(name, direction, position)
+        return CompositePort(full, direction)
+
+    def enrol_port(self, name: str, direction: str, position: Position) -> None:
+        """Engine: the composite has this port."""
+        (self._text.inputs if direction == "input" else self._text.outputs)[name] = position
+
+    @property
+    def declaration(self) -> CompositeText:
+        """Engine: the composite as its surroundings see it."""
+        return self._text
+
+    def __repr__(self) -> str:
+        inputs, outputs = ", ".join(self._text.inputs) or "none", ", ".join(self._text.outputs) or "none"
+        return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
+
+
+class Scopes:
+    """The composites of a model as scopes, kept up to date with its graph."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._known: dict[str, Composite] = {}
+        self._seen = (0, 0, 0)
+
+    def update(self) -> None:
+        """Take in what the graph has got since the last time."""
+        graph = self._model.graph
+        sizes = (len(graph.composites), len(graph.ports), len(graph.actors))
+        if sizes == self._seen:
+            return
+        composites, ports, actors = self._seen
+        here = call_site()  # for what has no position
+        for path in islice(graph.composites, composites, None):
+            position = graph.positions.get(path, here)
+            scope = self._known[path] = Composite(self._model, path, graph.composites[path] or path, position)
+            self._enrol(path, Child([path], path.endswith("]"), scope.declaration, None, 1), position)
+        for port, node in islice(graph.ports.nodes(data=True), ports, None):
+            owner, _, name = port.rpartition(".")
+            if owner in self._known:
+                self._known[owner].enrol_port(name, node["direction"], graph.positions.get(port, here))
+        for path in islice(graph.actors, actors, None):
+            child = Child([path], path.endswith("]"), None, type(graph.actors[path]), 1)
+            self._enrol(path, child, graph.positions.get(path, here))
+        self._seen = sizes
+
+    def _enrol(self, path: str, child: Child, position: Position) -> None:
+        above, _, name = path.rpartition(".")
+        (self._known[above] if above else self._model).enrol(name, child, position)
+
+    def at(self, path: str) -> Composite:
+        """The scope of a composite."""
+        return self._known[path]
+
+    def remove(self, path: str) -> None:
+        """Forget a composite and all within."""
+        self._known = {each: scope for each, scope in self._known.items() if not is_within(each, path)}
+        graph = self._model.graph
+        self._seen = (len(graph.composites), len(graph.ports), len(graph.actors))
+
+
+def is_within(path: str, outer: str) -> bool:
+    """Whether a path is that of a part, or of something in it."""
+    return path == outer or path.startswith(f"{outer}.")
+
+
+@contextmanager
+def _raising() -> Iterator[Problems]:
+    """Collects problems and raises them at the end, if there are any."""
+    problems = Problems()
+    yield problems
+    problems.raise_if_any()
+
+
+def _clock(path: str, start: object, drift: object, position: Position, problems: Problems) -> tuple[int | None, float]:
+    """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""
+    begin, speed = None, 1.0
+    try:
+        begin = None if start is None else to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
+    except (ParameterError, ValueError) as error:
+        problems.add(f"{path}: director.start: {error}", position)
+    try:
+        speed = Parameter(float, unit="1", min=1e-6, max=1e6).convert(drift) or 1.0
+    except ParameterError as error:
+        problems.add(f"{path}: director.drift: {error}", position)
+    return begin, speed
+
+
+def _each(ends: Ends) -> list[Any]:
+    """One or several ends as a list; what is no end is found out later."""
+    return list(ends) if isinstance(ends, Iterable) and not isinstance(ends, str) else [ends]
+
+
+def _mistake(message: str, position: Position, *hints: str) -> ModelError:
+    return ModelError([Problem(message, position, hints)])
