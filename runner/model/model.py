@@ -12,7 +12,8 @@ from .declarations import NAME, REDUCTIONS, MetricText, Text, within
 from .graph import ModelGraph
 from .observation import Metric, Observation, checked_seed, nanoseconds
 from .problems import Position, Problem, Problems, did_you_mean
-from .scope import Composite, Port, Scope, Scopes, is_within
+from .scope import Composite, Port, Scope
+from .scopes import Scopes, is_within
 from .site import call_site
 from .values import Values
 from .weave import WovenAspect
@@ -23,11 +24,11 @@ class Model(Scope):
 
     >>> model = Model("two_clocks", stop=10.0, seed=1)
     >>> clocks = [model.add(Clock(f"clock[{i}]", period=i + 1)) for i in range(2)]
-    >>> channel = model.add(BroadcastChannel("channel"))
-    >>> model.connect("clock[*].output -> channel.input", delay="100 ms")
-    >>> model.metric("heard", of=channel.output, take="count")
+    >>> merge = model.add(Merge("merge"))
+    >>> model.connect("clock[*].output -> merge.input", delay="100 ms")
+    >>> model.metric("ticks", of=merge.output, take="count")
     >>> Simulation(model).run().metrics
-    {'heard': 15}
+    {'ticks': 15}
 
     ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
     A model that was loaded can be changed in the same way.  Its ``parameters`` are a record of how it was made:

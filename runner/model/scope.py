@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar, overload
 
 from epicycle.actors import (
@@ -320,15 +319,15 @@ class Scope:
     def _known(self, port: Any, position: Position, problems: Problems) -> str | None:
         """The path of a port of this model."""
         graph = self._model.graph
-        if not isinstance(port, (InputPort, OutputPort, CompositePort)):
-            ports = ""
-            if isinstance(port, Actor):
-                ports = ", ".join(each.path for each in (*port.inputs.values(), *port.outputs.values()))
+        if isinstance(port, (Actor, Composite)):
+            kind = "an actor" if isinstance(port, Actor) else "a composite"
+            ports = [each for each in graph.ports if graph.owner(each) == port.path]
             problems.add(
-                f"{port!r} is not a port",
-                position,
-                f"name one of its ports: {ports}" if ports else "give a port such as clock.output, or its path as text",
+                f"{port.path} is {kind}, not a port", position, f"name one of its ports: {', '.join(ports) or 'none'}"
             )
+            return None
+        if not isinstance(port, (InputPort, OutputPort, CompositePort)):
+            problems.add(f"{port!r} is not a port", position, "give a port such as clock.output, or its path as text")
             return None
         path: str = port.path
         if not path:
@@ -460,55 +459,6 @@ class Composite(Scope):
     def __repr__(self) -> str:
         inputs, outputs = ", ".join(self._text.inputs) or "none", ", ".join(self._text.outputs) or "none"
         return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
-
-
-class Scopes:
-    """The composites of a model as scopes, kept up to date with its graph."""
-
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        self._known: dict[str, Composite] = {}
-        self._seen = (0, 0, 0)
-
-    def update(self) -> None:
-        """Take in what the graph has got since the last time."""
-        graph = self._model.graph
-        sizes = (len(graph.composites), len(graph.ports), len(graph.actors))
-        if sizes == self._seen:
-            return
-        composites, ports, actors = self._seen
-        here = call_site()  # for what has no position
-        for path in islice(graph.composites, composites, None):
-            position = graph.positions.get(path, here)
-            scope = self._known[path] = Composite(self._model, path, graph.composites[path] or path, position)
-            self._enrol(path, Child([path], path.endswith("]"), scope.declaration, None, 1), position)
-        for port, node in islice(graph.ports.nodes(data=True), ports, None):
-            owner, _, name = port.rpartition(".")
-            if owner in self._known:
-                self._known[owner].enrol_port(name, node["direction"], graph.positions.get(port, here))
-        for path in islice(graph.actors, actors, None):
-            child = Child([path], path.endswith("]"), None, type(graph.actors[path]), 1)
-            self._enrol(path, child, graph.positions.get(path, here))
-        self._seen = sizes
-
-    def _enrol(self, path: str, child: Child, position: Position) -> None:
-        above, _, name = path.rpartition(".")
-        (self._known[above] if above else self._model).enrol(name, child, position)
-
-    def at(self, path: str) -> Composite:
-        """The scope of a composite."""
-        return self._known[path]
-
-    def remove(self, path: str) -> None:
-        """Forget a composite and all within."""
-        self._known = {each: scope for each, scope in self._known.items() if not is_within(each, path)}
-        graph = self._model.graph
-        self._seen = (len(graph.composites), len(graph.ports), len(graph.actors))
-
-
-def is_within(path: str, outer: str) -> bool:
-    """Whether a path is that of a part, or of something in it."""
-    return path == outer or path.startswith(f"{outer}.")
 
 
 @contextmanager
