@@ -65,7 +65,7 @@ class ModelGraph:
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}
-        self._hops: dict[int, Hop] = {}  # by their order
+        self._hops: dict[int, Hop] = {}  # in their order
         self._order = 0
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:

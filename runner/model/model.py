@@ -112,7 +112,7 @@ class Model(Scope):
         observation = Observation(self, Values(problems), problems)
         for port in ports:
             path = port if isinstance(port, str) else port.path
-            ask(observation, Text(path, within(position, path)))
+            ask(observation, Text(path, within(Text(path, position), path)))
         if problems.found:
             self.recorded, self.stop_ports, self.metrics = before
         problems.raise_if_any()

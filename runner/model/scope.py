@@ -165,6 +165,7 @@ class Scope:
                 problems.add(f"{full} is not the last of its array", position, f"only {child.paths[-1]} can be removed")
         assert child is not None
         child.paths.pop()
+        del child.actors[len(child.paths) :]
         child.count = len(child.paths)
         if not child.paths:
             del self._children[name.partition("[")[0]]
@@ -226,6 +227,7 @@ class Scope:
         known = self._parts.setdefault(base, child)
         if known is not child:
             known.paths += child.paths
+            known.actors += child.actors
             known.count = len(known.paths)
         self._text.actors.setdefault(base, PartText(base, position, Text(child.kind, position)))
 
@@ -313,7 +315,7 @@ class Scope:
         for end in _each(ends):
             name = end if isinstance(end, str) else self._name_of(end, position, problems)
             if name is not None:
-                found.append(Text(name, within(position, name)))
+                found.append(Text(name, within(Text(name, position), name)))
         return found
 
     def _known(self, port: Any, position: Position, problems: Problems) -> str | None:
@@ -399,7 +401,7 @@ class Scope:
                 path = end if isinstance(end, str) else self._known(end, position, problems)
                 if path is not None:
                     name_here = path if path is end else path.removeprefix(self._full(""))
-                    texts.append(Text(name_here, within(position, name_here)))
+                    texts.append(Text(name_here, within(Text(name_here, position), name_here)))
             index = PathIndex(self._model.graph.ports.nodes)
             ports = select_ports(self._model.graph, index, full, type(aspect), self.path, texts, problems)
         woven = WovenAspect(full, aspect, ports)

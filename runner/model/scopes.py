@@ -39,7 +39,8 @@ class Scopes:
             if owner in self._known:
                 self._known[owner].enrol_port(name, node["direction"], graph.positions.get(port, here))
         for path in islice(graph.actors, actors, None):
-            child = Child([path], path.endswith("]"), None, type(graph.actors[path]), 1)
+            actor = graph.actors[path]
+            child = Child([path], path.endswith("]"), None, type(actor), 1, [actor])
             self._enrol(path, child, graph.positions.get(path, here))
         self._seen = sizes
 
