@@ -8,10 +8,11 @@ from epicycle.actors import Tag, declared_parameters
 
 from ..tables import Table, as_html, as_text, short
 from .checks import check
-from .declarations import NAME, REDUCTIONS, MetricText, Text, within
+from .declarations import REDUCTIONS, MetricText
 from .graph import ModelGraph
 from .observation import Metric, Observation, checked_seed, nanoseconds
 from .problems import Position, Problem, Problems, did_you_mean
+from .reading import NAME, Text, within
 from .scope import Composite, Port, Scope
 from .scopes import Scopes, is_within
 from .site import call_site

@@ -25,11 +25,12 @@ from epicycle.actors import (
 )
 from epicycle.aspects import Aspect
 
-from .declarations import NAME, CompositeText, ConnectionText, DeclarationReader, PartText, Text, within
+from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText
 from .document import Scalar
 from .graph import Hop
 from .patterns import PathIndex
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
+from .reading import NAME, Text, within
 from .site import call_site, node_of
 from .values import Values
 from .weave import WovenAspect, select_ports
