@@ -1,56 +1,10 @@
-"""Actors that stand in for Ptolemy's own test actors, and for library actors where a name is enough."""
+"""Actors that stand in for Ptolemy's own test actors."""
 
 from __future__ import annotations
 
 from typing import Any, ClassVar
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Tag
-
-
-class Scale(Actor):
-    """Multiplies every token."""
-
-    input = InputPort(float)
-    output = OutputPort(float)
-    factor: Parameter[float] = Parameter(int | float, 1)
-
-    def fire(self) -> None:
-        for token in self.input.tokens:
-            self.output.send(self.factor * token)
-
-
-class AddSubtract(Actor):
-    """Sends the sum of what comes at ``plus`` less what comes at ``minus``."""
-
-    plus = InputPort(float, multi=True, required=False)
-    minus = InputPort(float, multi=True, required=False)
-    output = OutputPort(float)
-
-    def fire(self) -> None:
-        self.output.send(sum(self.plus.tokens) - sum(self.minus.tokens))
-
-
-class Comparator(Actor):
-    """Sends whether left >= right."""
-
-    left = InputPort(float)
-    right = InputPort(float)
-    output = OutputPort(bool)
-    comparison = Parameter(str, ">=", choices=(">=",))
-
-    def fire(self) -> None:
-        self.output.send(self.left.value >= self.right.value)
-
-
-class GreaterThan(Actor):
-    """Sends whether a token is above a bound."""
-
-    input = InputPort(float)
-    output = OutputPort(bool)
-    bound = Parameter(float)
-
-    def fire(self) -> None:
-        self.output.send(self.input.value > self.bound)
 
 
 class Sink(Actor):
@@ -136,12 +90,8 @@ class ConstOfVariable(_OfVariable):
 
 
 TYPES = (
-    AddSubtract,
     CancelFireAtTest,
-    Comparator,
     ConstOfVariable,
-    GreaterThan,
-    Scale,
     SetVariable,
     Sink,
     TestActorPortDepth,

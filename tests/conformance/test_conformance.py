@@ -19,6 +19,7 @@ import pytest
 
 from epicycle.runner.engine import Simulation
 from epicycle.runner.model import Model, ModelError, load_model
+from epicycle.runner.model.catalogue import built_in
 from epicycle.runner.model.schedule import dependencies, depths
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -95,14 +96,14 @@ CASES = [
 @pytest.mark.parametrize("case", CASES)
 def test_sends_as_ptolemy(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     model = load(case)
-    monkeypatch.setattr(
-        TestActorPortDepth, "depths", depths(model.graph, "", dependencies(model.graph)[""]), raising=True
-    )
+    monkeypatch.setattr(TestActorPortDepth, "depths", depths(model.graph, "", dependencies(model.graph)[""]))
     found, expected = sends(model), recorded(case)
     assert [send[1:4] for send in found] == [send[1:4] for send in expected]
     for (time, _, port, _, value), (recorded_time, _, _, _, text) in zip(found, expected, strict=True):
         assert abs(time - recorded_time) <= RESOLUTION, (port, recorded_time)
         token = own_token(text)
+        if isinstance(token, dict):  # depths: Scale has ports here that it does not have there
+            value = {name: value.get(name) for name in token}
         assert (value, type(value)) == (token, type(token)), (port, recorded_time)
 
 
@@ -118,3 +119,16 @@ def test_every_case_is_here() -> None:
     assert {path.stem for path in (HERE / "models").glob("*.yaml")} == {*CASES, REFUSED}
     assert {path.stem for path in (HERE / "sends").glob("*.csv")} == {*CASES, REFUSED}
     assert len({*CASES, REFUSED, *LATER}) == 24
+
+
+def test_the_document_tells_the_same() -> None:
+    text = (HERE.parents[1] / "docs" / "ptolemy.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in text.splitlines() if line[:2] == "| "]
+    results = {case: row[2] for row in rows if len(row) == 3 for case in row[0].split(", ")}
+    assert all("match" in results[case] for case in CASES)
+    assert "refused" in results[REFUSED]
+    assert all("waits" in results[case] for case in LATER)
+    actors = [line.strip("| ").split(" | ") for line in text[text.index("## Actors") :].splitlines() if "` | " in line]
+    named = {name for row in actors for name in re.findall(r"`([A-Z]\w+)`", row[0 if row[1] == "the same" else 1])}
+    assert len(named) > 40
+    assert named - {"PortParameter"} <= set(built_in().actors)

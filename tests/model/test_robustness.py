@@ -189,7 +189,6 @@ ERRORS = [
     ReplayError("no"),
     ChannelError("no"),
     FilterError("no"),
-    ReplayError("no"),
     LogError("no"),
     TokenError("no"),
     ExpressionError("no", 3, 4),
