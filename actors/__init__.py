@@ -2,6 +2,7 @@
 
 from .accumulation import Accumulator, Counter, Difference, Integrator
 from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
+from .continuous import ODE
 from .core import (
     NANOSECONDS_PER_SECOND,
     REQUIRED,
@@ -10,6 +11,7 @@ from .core import (
     Context,
     EpicycleError,
     InputPort,
+    MappingParameter,
     OutputPort,
     Parameter,
     ParameterError,
@@ -78,6 +80,7 @@ from .triggered import Const, CurrentMicrostep, CurrentTime, Ramp, Sequence
 
 __all__ = [
     "NANOSECONDS_PER_SECOND",
+    "ODE",
     "REQUIRED",
     "Accumulator",
     "Actor",
@@ -114,6 +117,7 @@ __all__ = [
     "Integrator",
     "LogicGate",
     "LookupTable",
+    "MappingParameter",
     "MathFunction",
     "Measurement",
     "Merge",

@@ -2,6 +2,7 @@
 
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .errors import EpicycleError
+from .mapping import MappingParameter
 from .nearest import did_you_mean, nearest
 from .parameter import (
     REQUIRED,
@@ -30,6 +31,7 @@ __all__ = [
     "Context",
     "EpicycleError",
     "InputPort",
+    "MappingParameter",
     "OutputPort",
     "Parameter",
     "ParameterError",

@@ -1,0 +1,35 @@
+"""MappingParameter: a parameter whose value gives several values by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .parameter import REQUIRED, Parameter, ParameterError
+
+
+class MappingParameter(Parameter[Any]):
+    """A parameter such as ``initial: {height: 10, speed: 0}``: names of the model's own, each with a value of ``item``.
+
+    Reads as a dict in the order in which the names are written.
+    """
+
+    def __init__(self, item: Parameter[Any], default: Any = REQUIRED, *, doc: str = "") -> None:
+        super().__init__(object, default, doc=doc)
+        self.item = item
+
+    def describe_type(self) -> str:
+        return f"mapping of names to {self.item.describe_type()}"
+
+    def convert(self, value: object) -> dict[str, Any] | None:
+        if value is None and self.optional:
+            return None
+        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+            raise ParameterError(f"{value!r} is not a {self.describe_type()}")
+        converted = {}
+        for name, each in value.items():
+            try:
+                converted[name] = self.item.convert(each)
+            except ParameterError as error:
+                raise ParameterError(f"{name}: {error}") from None
+        return converted
