@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from .options import DONE, add_changes
+from .options import DONE, add_changes, load
 from .reference import add_json, print_reference, show
 
 DESCRIPTION = (
@@ -17,7 +17,7 @@ DESCRIPTION = (
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle aspects``."""
     command.add_argument(
-        "name",
+        "model",
         metavar="NAME or MODEL",
         nargs="?",
         help="an aspect type, a packaged model, or a path to a YAML file",
@@ -31,17 +31,17 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from epicycle.actors import EpicycleError
 
     from ..model.catalogue import installed
-    from ..model.load import is_path, load_model, packaged_models
+    from ..model.load import is_path, packaged_models
 
-    name, types, models = options.name, installed().aspects, packaged_models()
+    name, types, models = options.model, installed().aspects, packaged_models()
     if name is None or name in types or not (name in models or is_path(name)):
-        if options.set or options.aspect or options.without:
-            raise EpicycleError("--set, --aspect and --without change a model: name one")
+        if options.set or options.overrides or options.aspect or options.without:
+            raise EpicycleError("--set, --overrides, --aspect and --without change a model: name one")
         print_reference(types, "aspect", name, options.json, also=models)
         return DONE
     from ..show import aspects_at, weaving
 
-    model = load_model(name, set=options.set, aspects=options.aspect, without_aspects=options.without)
+    model, _ = load(options)
     if options.json:
         print(json.dumps(aspects_at(model), indent=2, ensure_ascii=False, allow_nan=False))
     else:

@@ -40,10 +40,14 @@ class PortReference:
 
 @dataclass(frozen=True)
 class ParameterReference:
-    """A parameter of a type; ``type`` is in words, ``default`` as it would stand in a model file."""
+    """A parameter of a type; ``type`` is in words, ``default`` as it would stand in a model file.
+
+    ``part`` is the base of the types that its value may have, if it is a mapping with a type.
+    """
 
     name: str
     type: str
+    part: str
     unit: str
     required: bool
     optional: bool
@@ -110,6 +114,7 @@ def _parameter(parameter: Parameter[object]) -> ParameterReference:
     return ParameterReference(
         parameter.name,
         parameter.describe_type(),
+        parameter.type.__name__ if is_part(parameter) else "",
         parameter.unit if parameter.unit != "1" else "",
         parameter.required,
         parameter.optional,

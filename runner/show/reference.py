@@ -141,7 +141,9 @@ def markdown(catalogue: Catalogue, figures: Mapping[str, type[Figure]]) -> str:
             lines.append(f"**{group}** ({about}): {names}\n")
         lines += [block for each in references for block in _markdown(each)]
     for base, known in parts_described(every).items():
-        lines.append(f"## {base}\n\nA value of a parameter: `{{type: {known[0].name}, ...}}`.\n" if known else "")
+        lines.append(
+            f"## {base}\n\nThe value of a parameter, such as `{{type: {known[0].name}, ...}}`.\n" if known else ""
+        )
         lines += [block for each in known for block in _markdown(each)]
     lines.append("## Figures\n")
     lines += [block for each in described(figures) for block in _markdown(each)]
@@ -197,7 +199,7 @@ def _port_row(port: PortReference) -> list[str]:
 
 
 def _parameter_row(parameter: ParameterReference) -> list[str]:
-    kind = parameter.type
+    kind = parameter.part or parameter.type
     if parameter.choices:
         kind = " or ".join(parameter.choices)
     elif parameter.min is not None and parameter.max is not None:
