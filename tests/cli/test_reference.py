@@ -26,6 +26,8 @@ class Gate(Actor):
     as good as any.
     """
 
+    __module__ = "acme.gates"
+
     input = InputPort(float | str, multi=True, doc="what comes")
     control = InputPort(Any, required=False, doc="opens it")
     output = OutputPort(float, depends_on=("input",), doc="what goes")
@@ -35,7 +37,7 @@ class Gate(Actor):
 
 
 GATE = """\
-Gate  actor, test_reference
+Gate  actor, acme
 
 Lets tokens through. All of them.
 
