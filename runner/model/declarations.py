@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from keyword import iskeyword
 
 from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
@@ -28,9 +28,10 @@ MODEL_KEYS = (
     "figures",
 )
 LIBRARY_KEYS = ("doc", "include", "composites")
-COMPOSITE_KEYS = ("doc", "parameters", "inputs", "outputs", "director", "actors", "connections", "aspects")
+COMPOSITE_KEYS = ("doc", "extends", "parameters", "inputs", "outputs", "director", "actors", "connections", "aspects")
 DIRECTOR_KEYS = ("start", "drift")
 PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
+PORT_KEYS = ("type", "doc")
 CONNECTION_KEYS = ("from", "to", "all", "delay")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
 METRIC_KEYS = ("of", "take", "unit", "doc")
@@ -49,11 +50,25 @@ class ParameterText:
     choices: tuple[str, ...] = ()
     doc: str = ""
     spoilt: bool = False  # the declaration is wrong and has been told so: values are not checked against it
+    given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
+
+
+@dataclass
+class PortText:
+    """A port that a composite declares; without a type it is as the ports that are connected to it."""
+
+    name: str
+    position: Position
+    type: Text | None = None
+    doc: str = ""
 
 
 @dataclass
 class PartText:
-    """An actor, aspect or figure: a type and values for its parameters."""
+    """An actor, aspect or figure: a type and values for its parameters.
+
+    In a class that extends another, the type may be empty, which leaves the inherited one.
+    """
 
     name: str
     position: Position
@@ -63,6 +78,7 @@ class PartText:
     at: list[Text] = field(default_factory=list)
     enabled: Node | None = None
     priority: Node | None = None
+    removes: bool = False  # it takes the inherited part of that name away
 
 
 @dataclass
@@ -74,6 +90,7 @@ class ConnectionText:
     position: Position
     delay: Node | None = None
     to_all: bool = False
+    removes: bool = False  # it takes these connections away from the inherited ones
 
 
 @dataclass
@@ -95,14 +112,21 @@ class CompositeText:
     name: str
     position: Position
     doc: str = ""
+    extends: Text | None = None
     parameters: dict[str, ParameterText] = field(default_factory=dict)
-    inputs: dict[str, Position] = field(default_factory=dict)
-    outputs: dict[str, Position] = field(default_factory=dict)
+    inputs: dict[str, PortText] = field(default_factory=dict)
+    outputs: dict[str, PortText] = field(default_factory=dict)
     director: dict[str, Entry] | None = None  # what is said of its own one
     actors: dict[str, PartText] = field(default_factory=dict)
     connections: list[ConnectionText] = field(default_factory=list)
     is_wired: bool = True  # whether all its connections could be read
     aspects: dict[str, PartText] = field(default_factory=dict)
+    removed: dict[str, Position] = field(default_factory=dict)  # inherited actors that it does without
+    spoilt: bool = False  # it could not be read as a whole, or made from its base: what is missing is no news
+
+    def ports(self, direction: str) -> dict[str, PortText]:
+        """Its ``input`` or ``output`` ports."""
+        return self.inputs if direction == "input" else self.outputs
 
 
 @dataclass
@@ -164,26 +188,27 @@ class DeclarationReader(NodeReader):
 
     def composite(self, name: str, entries: dict[str, Entry], position: Position) -> CompositeText:
         """The keys that a model and a composite class share."""
+        before = len(self.problems)
         result = CompositeText(name, position)
         if "doc" in entries:
             result.doc = self.text(entries["doc"].value, "doc") or ""
+        if "extends" in entries:
+            base = self.name(entries["extends"].value, "the class to extend")
+            result.spoilt = base is None
+            result.extends = Text(base or "", entries["extends"].value.position)
         for key, entry in self.named(entries, "parameters"):
             result.parameters[key] = self.parameter(key, entry)
-        for direction in ("inputs", "outputs"):
-            if direction in entries:
-                for port in self.texts(entries[direction].value, direction):
-                    if not NAME.match(port.text):
-                        self.problems.add(f"{port.text!r} is not a port name", port.position)
-                        continue
-                    ports = result.inputs if direction == "inputs" else result.outputs
-                    if port.text in result.inputs or port.text in result.outputs:
-                        self.problems.add(f"port {port.text!r} is declared twice", port.position)
-                    ports[port.text] = port.position
+        for direction in ("input", "output"):
+            if f"{direction}s" in entries:
+                for port in self.ports(entries[f"{direction}s"].value, f"{direction}s"):
+                    if port.name in result.inputs or port.name in result.outputs:
+                        self.problems.add(f"port {port.name!r} is declared twice", port.position)
+                    result.ports(direction)[port.name] = port
         if "director" in entries:
             director = self.entries(entries["director"].value, f"the director of {name!r}", DIRECTOR_KEYS)
             result.director = {} if director is None else director
         for key, entry in self.named(entries, "actors"):
-            if (part := self.part(key, entry, "actor")) is not None:
+            if (part := self.part(key, entry, "actor", derived=result.extends is not None)) is not None:
                 result.actors[key] = part
                 if key in result.inputs or key in result.outputs:
                     self.problems.add(
@@ -193,14 +218,42 @@ class DeclarationReader(NodeReader):
             items = self.items(entries["connections"].value, "connections")
             result.is_wired = items is not None
             for item in items or ():
-                if (connection := self.connection(item)) is not None:
-                    result.connections.append(connection)
-                else:
+                connection = self.connection(item)
+                if connection is None:
                     result.is_wired = False
+                elif connection.removes and result.extends is None:
+                    self.problems.add(f"{name} extends no class whose connections it could remove", item.position)
+                else:
+                    result.connections.append(connection)
         for key, entry in self.named(entries, "aspects"):
-            if (part := self.part(key, entry, "aspect")) is not None:
+            if (part := self.part(key, entry, "aspect", derived=result.extends is not None)) is not None:
                 result.aspects[key] = part
+        result.spoilt = result.spoilt or len(self.problems) > before
         return result
+
+    def ports(self, node: Node, what: str) -> list[PortText]:
+        """``[a, b]`` or ``{a: type, b: {type: ..., doc: ...}, c: }``."""
+        if not isinstance(node, Mapping):
+            found = [PortText(text.text, text.position) for text in self.texts(node, what)]
+        else:
+            found = [self.port(name, entry) for name, entry in node.entries.items()]
+        for port in found:
+            if not NAME.match(port.name):
+                self.problems.add(f"{port.name!r} is not a port name", port.position)
+        return [port for port in found if NAME.match(port.name)]
+
+    def port(self, name: str, entry: Entry) -> PortText:
+        """One port with what is said of it."""
+        port = PortText(name, entry.key.position)
+        if isinstance(entry.value, Mapping):
+            inner = self.entries(entry.value, f"port {name!r}", PORT_KEYS) or {}
+            port.doc = (self.text(inner["doc"].value, "doc") or "") if "doc" in inner else ""
+            node = inner["type"].value if "type" in inner else None
+        else:
+            node = None if _is_empty(entry.value) else entry.value
+        if node is not None and (text := self.text(node, f"the type of port {name!r}")) is not None:
+            port.type = Text(text, node.position)
+        return port
 
     def parameter(self, name: str, entry: Entry) -> ParameterText:
         """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
@@ -215,6 +268,7 @@ class DeclarationReader(NodeReader):
             result.value = entry.value
             return result
         inner = self.entries(entry.value, f"parameter {name!r}", PARAMETER_KEYS) or {}
+        result.given = tuple(inner)
         result.value = inner["value"].value if "value" in inner else None
         for key in ("unit", "doc"):
             if key in inner:
@@ -240,8 +294,10 @@ class DeclarationReader(NodeReader):
             result.spoilt = True
         return result
 
-    def part(self, name: str, entry: Entry, kind: str) -> PartText | None:
-        """``name: {type: ..., ...}``."""
+    def part(self, name: str, entry: Entry, kind: str, *, derived: bool = False) -> PartText | None:
+        """``name: {type: ..., ...}``; in a class that extends another also without type, and ``name: null``."""
+        if derived and _is_empty(entry.value):
+            return PartText(name, entry.key.position, Text("", entry.key.position), removes=True)
         if not isinstance(entry.value, Mapping):
             self.problems.add(
                 f"{kind} {name!r} is not a mapping",
@@ -251,13 +307,14 @@ class DeclarationReader(NodeReader):
             return None
         values = dict(entry.value.entries)
         kind_entry = values.pop("type", None)
-        if kind_entry is None:
+        if kind_entry is None and not derived:
             self.problems.add(f"{kind} {name!r} has no type", entry.key.position, "add 'type: ...'")
             return None
-        type_name = self.text(kind_entry.value, f"the type of {name!r}")
+        named = entry.key if kind_entry is None else kind_entry.value
+        type_name = "" if kind_entry is None else self.text(kind_entry.value, f"the type of {name!r}")
         if type_name is None:
             return None
-        part = PartText(name, entry.key.position, Text(type_name, kind_entry.value.position), values)
+        part = PartText(name, entry.key.position, Text(type_name, named.position), values)
         if kind == "actor":
             for key in ("count", "priority"):
                 if key in values:
@@ -270,7 +327,10 @@ class DeclarationReader(NodeReader):
         return part
 
     def connection(self, node: Node) -> ConnectionText | None:
-        """``a.out -> b.in, c.in``, ``a[*].out => b[*].in`` or ``{from: ..., to: ..., all: ..., delay: ...}``."""
+        """``a.out -> b.in``, ``a[*].out => b[*].in``, ``{from: ..., to: ..., delay: ...}`` or ``{remove: ...}``."""
+        if isinstance(node, Mapping) and list(node.entries) == ["remove"]:
+            removed = self.connection(node.entries["remove"].value)
+            return None if removed is None else replace(removed, removes=True)
         if isinstance(node, Scalar):
             text = node.value if isinstance(node.value, str) else node.text
             places = [(start, end) for arrow in ("->", "=>") for start, end in split(text, arrow)[1:]]

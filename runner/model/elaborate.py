@@ -54,12 +54,14 @@ class Elaborator:
         self,
         text: ModelText,
         composites: dict[str, CompositeText],
+        broken: Collection[str],
         settings: Settings,
         problems: Problems,
         catalogue: Catalogue,
     ) -> None:
         self.text = text
         self.composites = composites
+        self.broken = broken  # composites that are there, but lack what they extend
         self.settings = settings
         self.problems = problems
         self.catalogue = catalogue
@@ -265,6 +267,8 @@ class Elaborator:
             actor_type = self.catalogue.actors.get(part.type.text) if inner is None else None
         except CatalogueError as error:
             self.problems.add(f"{path}: {error.message}", part.type.position, *error.help, scope=composite)
+            return None
+        if part.type.text in self.broken:
             return None
         if inner is None and actor_type is None:
             known = [*self.composites, *self.catalogue.actors]

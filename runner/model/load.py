@@ -11,6 +11,7 @@ from .declarations import CompositeText, DeclarationReader, ModelText
 from .document import Mapping as MappingNode
 from .document import read
 from .elaborate import Elaborator
+from .inheritance import inherit
 from .model import Model
 from .problems import Problems, did_you_mean
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
@@ -101,7 +102,9 @@ def load_model(
         without(text, change, problems)
     for change in aspects:
         change_aspect(text, change, problems)
-    model = Elaborator(text, composites, Settings(settings), problems, installed().with_types(types)).model()
+    catalogue = installed().with_types(types)
+    composites, broken = inherit(composites, catalogue.actors, problems)
+    model = Elaborator(text, composites, broken, Settings(settings), problems, catalogue).model()
     problems.raise_if_any()
     model.is_checked = True
     return model

@@ -159,10 +159,12 @@ class Wiring:
         child = self.children.get(name)
         if child is None:
             if name not in self.composite.actors:  # otherwise its own problem is told already
+                gone = self.composite.removed.get(name)
                 self._problem(
                     f"{self.composite.name} has no actor {name!r}{did_you_mean(name, list(self.composite.actors))}",
                     text,
                     f"valid actors: {', '.join(self.composite.actors) or 'none'}",
+                    *((f"it is removed at {gone.file}:{gone.line}:{gone.column}",) if gone is not None else ()),
                 )
             return None
         has_port = self._has_port(name, child, port, wanted, text)
@@ -252,7 +254,11 @@ class Wiring:
             message = f"{path}.{port} is {direction} of {child.kind}, nothing can {ends}"
         else:
             message = f"{path}: {child.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
-        self._problem(message, text, f"valid {wanted} ports: {', '.join(valid) or 'none'}")
+        hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
+        if self.composite.extends is not None:  # its type may be said far from the connection
+            at = self.composite.actors[name].type.position
+            hints.append(f"{path} is a {child.kind} since {at.file}:{at.line}:{at.column}")
+        self._problem(message, text, *hints)
         return False
 
 
