@@ -63,7 +63,10 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "metric": _metric(),
         "run": _mapping(language.RUN_KEYS, _RUN, "How long a run takes, and what it records."),
         "director": _mapping(language.DIRECTOR_KEYS, _DIRECTOR, "A director of its own, with a local clock."),
-        "composite": _mapping(language.COMPOSITE_KEYS, _BODY, "A composite class: a graph with ports of its own."),
+        "composite": _composite(),
+        "port_declaration": _port_declaration(),
+        "changed_actor": _changed("actor", Actor.reserved),
+        "changed_aspect": _changed("aspect", Aspect.reserved),
         "actor": _typed(actors, "actor", Actor.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
         "aspect": _typed(aspects, "aspect", Aspect.reserved, ("type", "at")),
         "figure": _typed(figures, "figure", frozenset({"type"})),
@@ -150,8 +153,15 @@ _BODY: dict[str, tuple[Schema, str]] = {
         "Parameters: 'name: value' or 'name: {value, unit, min, max, choices, doc}'.",
     ),
     "composites": (_named("composite"), "Composite classes, for the types of actors."),
-    "inputs": (_one_or_more(_ref("name")), "Names of the input ports."),
-    "outputs": (_one_or_more(_ref("name")), "Names of the output ports."),
+    "extends": (_ref("name"), "The composite class that this one takes over and changes."),
+    "inputs": (
+        {"anyOf": [_one_or_more(_ref("name")), _named("port_declaration")]},
+        "The input ports: a list of names, or 'name: type' or 'name: {type, doc}'.",
+    ),
+    "outputs": (
+        {"anyOf": [_one_or_more(_ref("name")), _named("port_declaration")]},
+        "The output ports: a list of names, or 'name: type' or 'name: {type, doc}'.",
+    ),
     "director": (_ref("director"), "A director of its own: the composite fires as one actor, in local time."),
     "actors": (_named("actor"), "The actors of the graph: 'name: {type, count, <parameter>: <value>, ...}'."),
     "connections": (
@@ -187,6 +197,10 @@ _CONNECTION: dict[str, tuple[Schema, str]] = {
     "all": ({"type": "boolean"}, "Each to all, as with '=>'; otherwise several and several are connected in pairs."),
     "delay": (_number("number", 0.0, unit="s"), "How long a token takes, such as 100 ms; 0 is the next microstep."),
 }
+_PORT: dict[str, tuple[Schema, str]] = {
+    "type": (_ref("text"), "What travels through it, such as float, 'float | int', array[2] or a token class."),
+    "doc": (_ref("text"), "What it is."),
+}
 _METRIC: dict[str, tuple[Schema, str]] = {
     "of": (_PATTERN, "The output port (or a pattern for several)."),
     "take": ({"enum": list(language.REDUCTIONS)}, "What is taken from the numbers that it sends (default: last)."),
@@ -212,6 +226,7 @@ RULES = {
     "DIRECTOR_KEYS": _DIRECTOR,
     "PARAMETER_KEYS": _PARAMETER,
     "CONNECTION_KEYS": _CONNECTION,
+    "PORT_KEYS": _PORT,
     "METRIC_KEYS": _METRIC,
 }
 
@@ -231,13 +246,45 @@ def _parameter_declaration() -> Schema:
     return {**declared, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
+def _port_declaration() -> Schema:
+    declared = _mapping(language.PORT_KEYS, _PORT, "A port of a composite: its type, or {type, doc}.")
+    return {**declared, "type": ["object", "string", "null"]}
+
+
+def _composite() -> Schema:
+    """Where a class extends another, its actors and aspects may be changes to inherited ones."""
+    found = _mapping(language.COMPOSITE_KEYS, _BODY, "A composite class: a graph with ports of its own.")
+    for key in ("actors", "aspects"):
+        found["properties"][key] = {"description": _BODY[key][1]}
+    return {
+        **found,
+        "if": {"required": ["extends"]},
+        "then": {"properties": {"actors": _named("changed_actor"), "aspects": _named("changed_aspect")}},
+        "else": {"properties": {"actors": _named("actor"), "aspects": _named("aspect")}},
+    }
+
+
+def _changed(kind: str, reserved: frozenset[str]) -> Schema:
+    beside = {key: _beside(key) for key in sorted(reserved - {"type"})}
+    return {
+        "type": ["object", "null"],
+        "description": f"A new {kind}, what is to change of an inherited one, or null to do without it.",
+        "properties": {"type": {"type": "string"}, **beside},
+    }
+
+
 def _connection() -> Schema:
     declared = _mapping(language.CONNECTION_KEYS, _CONNECTION, "From ports, to ports.")
+    text = _text(CONNECTION, "expected 'actor.port -> actor.port', with => for all to all")
+    removal = {"description": "A connection of the extended class to do without.", "$ref": "#/$defs/connection"}
     return {
         **declared,
+        "properties": {**declared["properties"], "remove": removal},
         "type": ["object", "string"],
-        "required": ["from", "to"],
-        **_text(CONNECTION, "expected 'actor.port -> actor.port', with => for all to all"),
+        "if": {"type": "object", "required": ["remove"]},
+        "then": {"maxProperties": 1},
+        "else": {"required": ["from", "to"]},
+        **text,
     }
 
 
