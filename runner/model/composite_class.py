@@ -10,6 +10,7 @@ from .declarations import CompositeText, DeclarationReader, ModelText, PartText
 from .document import Mapping, read
 from .elaborate import Elaborator
 from .graph import ModelGraph
+from .inheritance import inherit
 from .load import find_library, included_composites
 from .model import Model
 from .problems import Position, Problems, did_you_mean
@@ -78,12 +79,14 @@ def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -
         text = reader.model(node) if is_model else reader.included(node)
     problems.raise_if_any()
     assert text is not None, "what cannot be read is a problem"
-    composites = included_composites(text, path, DeclarationReader(problems), problems)
-    if name not in composites:
+    catalogue = installed().with_types(types)
+    found = included_composites(text, path, DeclarationReader(problems), problems)
+    composites, broken = inherit(found, catalogue.actors, problems)
+    if name not in composites and name not in broken:
         problems.add(
             f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}",
             call_site(),
             f"its composites: {', '.join(composites) or 'none'}",
         )
     problems.raise_if_any()
-    return CompositeClass(name, composites, installed().with_types(types))
+    return CompositeClass(name, composites, catalogue)

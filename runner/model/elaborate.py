@@ -54,10 +54,10 @@ class Elaborator:
         self,
         text: ModelText,
         composites: dict[str, CompositeText],
-        broken: Collection[str],
         settings: Settings,
         problems: Problems,
         catalogue: Catalogue,
+        broken: Collection[str] = (),
     ) -> None:
         self.text = text
         self.composites = composites

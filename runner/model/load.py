@@ -104,7 +104,7 @@ def load_model(
         change_aspect(text, change, problems)
     catalogue = installed().with_types(types)
     composites, broken = inherit(composites, catalogue.actors, problems)
-    model = Elaborator(text, composites, broken, Settings(settings), problems, catalogue).model()
+    model = Elaborator(text, composites, Settings(settings), problems, catalogue, broken).model()
     problems.raise_if_any()
     model.is_checked = True
     return model

@@ -25,7 +25,7 @@ from epicycle.actors import (
 )
 from epicycle.aspects import Aspect
 
-from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText
+from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PortText
 from .document import Scalar
 from .graph import Hop
 from .patterns import PathIndex
@@ -452,7 +452,7 @@ class Composite(Scope):
 
     def enrol_port(self, name: str, direction: str, position: Position) -> None:
         """Engine: the composite has this port."""
-        (self._text.inputs if direction == "input" else self._text.outputs)[name] = position
+        self._text.ports(direction)[name] = PortText(name, position)
 
     @property
     def declaration(self) -> CompositeText:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.model import Model, load_model
+from epicycle.runner.model import Model, load_composite, load_model
 
 sys.path.insert(0, str(Path(__file__).parent))
 from model_parts import TYPES
@@ -149,3 +149,15 @@ def test_a_long_chain_ends(tmp_path: Path) -> None:
     chain = "".join(f"\n  C{i}: {{extends: C{i + 1}}}" for i in range(2000))
     with pytest.raises(Exception, match="C0 has more than 50 bases, one upon the other"):
         load(f"{chain}\n  C2000: {{}}", "C0", tmp_path)
+
+
+def test_a_derived_class_in_python(tmp_path: Path) -> None:
+    path = tmp_path / "library.yaml"
+    path.write_text(
+        "composites:\n"
+        "  Twice: {outputs: [out], actors: {r: {type: Ramp, start: 2}}, connections: [r.output -> out]}\n"
+        "  Thrice: {extends: Twice, actors: {r: {start: 3}}}\n"
+    )
+    model = Model("m")
+    model.add(load_composite(path, "Thrice", types=TYPES)("t"))
+    assert vars(model.graph.actors["t.r"])["start"] == 3.0
