@@ -6,8 +6,8 @@ returns the exit code.  Nothing heavy is imported before ``run``, so that ``--he
 
 from __future__ import annotations
 
-from . import actors, aspects, models, run, schema, validate
+from . import actors, aspects, models, run, schema, trace, validate
 
-COMMANDS = (run, validate, models, actors, aspects, schema)
+COMMANDS = (run, trace, validate, models, actors, aspects, schema)
 
 __all__ = ["COMMANDS"]

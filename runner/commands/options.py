@@ -55,6 +55,16 @@ def seed(text: str) -> int:
     return number
 
 
+def seconds(option: str, text: str) -> float:
+    """A model time that an option gives, in seconds or with a unit."""
+    from epicycle.actors import EpicycleError, convert
+
+    time = convert(text, "s")
+    if not 0.0 <= time < 1e9:
+        raise EpicycleError(f"{option} {text}: expected a time from 0 s to 1e9 s")
+    return time
+
+
 def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, dict[str, Any]]:
     """The model that the options describe, and its figures; warnings are printed, or with ``strict`` raised."""
     from ..model import ModelError, Problems, load_model

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import math
 import sys
 from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import DONE, add_model, complain, load, seed
+from .options import DONE, add_model, complain, load, seconds, seed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,11 +22,22 @@ if TYPE_CHECKING:
 DESCRIPTION = "Run a model once and report what came of it."
 
 
+NOTICEABLE = 0.05  # s by which a run may be late without our saying so: the operating system alone takes as much
+
+
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle run``."""
     add_model(command)
     command.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
     command.add_argument("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)")
+    command.add_argument(
+        "--realtime",
+        metavar="FACTOR",
+        type=factor,
+        nargs="?",
+        const=1.0,
+        help="let FACTOR seconds of model time pass in a second of the wall clock (default: 1), and no more",
+    )
     command.add_argument(
         "--out",
         metavar="DIR",
@@ -38,36 +50,51 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
 
 
+def factor(text: str) -> float:
+    """How many seconds of model time pass in a second."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        # The model, perhaps, which stands behind the option.
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number greater than 0 (write MODEL before --realtime)")
+    return number
+
+
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Run the model, report and write what was asked for."""
-    from epicycle.actors import EpicycleError, convert
+    from epicycle.actors import EpicycleError
 
-    from ..engine import ActorError, LoopError, Simulation, check_log_path, write_log
+    from ..engine import ActorError, LoopError, Pace, Simulation, check_log_path, write_log
     from ..show import summary_object, summary_table, write_folder
 
     if options.log is not None:
         check_log_path(options.log)
-    until = None
-    if options.until is not None:
-        until = float(convert(options.until, "s"))
-        if not 0.0 <= until < 1e9:
-            raise EpicycleError(f"--until {options.until}: expected a time from 0 s to 1e9 s")
+    until = seconds("--until", options.until) if options.until is not None else None
     model, figures = load(options)
     folder = options.out or (None if options.json else Path("results") / model.name)
     if folder is not None and folder.exists() and not folder.is_dir():
         raise EpicycleError(f"--out {folder} is a file, not a folder")
     simulation = Simulation(model, seed=options.seed, keep_log=options.log is not None)
+    pace = Pace(options.realtime) if options.realtime is not None else None
     with progress(model, until) as report:
         try:
-            results = simulation.run(until=until, progress=report)
-        except (ActorError, LoopError) as error:
-            results = simulation.results("failed")
+            results = simulation.run(until=until, progress=report, pace=pace)
+        except (ActorError, LoopError, KeyboardInterrupt) as error:
+            interrupted = isinstance(error, KeyboardInterrupt)
+            results = simulation.results("interrupted" if interrupted else "failed")
             if options.log is not None:
                 write_log(simulation.log.records, options.log)
             if folder is not None:
-                write_folder(folder, results, {}, ["epicycle", *given], str(error))
+                write_folder(folder, results, {}, ["epicycle", *given], "interrupted" if interrupted else str(error))
                 complain(f"what was recorded until then is in {folder}")
             raise
+    if pace is not None and pace.worst > NOTICEABLE:
+        complain(
+            f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
+            f"{pace.behind:.3g} s at the end"
+        )
     if options.log is not None:
         write_log(simulation.log.records, options.log)
     written = [] if folder is None else write_folder(folder, results, figures, ["epicycle", *given])

@@ -3,21 +3,27 @@
 from .director import ActorError, Director, LoopError
 from .encoding import canonical, plain, scalars
 from .log import EventLog, LogError, Record, check_log_path, write_log
+from .pace import Pace
 from .results import Results
 from .signal import Signal, SignalError
 from .simulation import Simulation
+from .trace import Arrival, Firing, Tracer
 
 __all__ = [
     "ActorError",
+    "Arrival",
     "Director",
     "EventLog",
+    "Firing",
     "LogError",
     "LoopError",
+    "Pace",
     "Record",
     "Results",
     "Signal",
     "SignalError",
     "Simulation",
+    "Tracer",
     "canonical",
     "check_log_path",
     "plain",

@@ -26,6 +26,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import count
 from typing import Any, cast
 
@@ -33,6 +34,8 @@ import simpy
 from simpy.events import EventPriority
 
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake
+
+from .pace import Pace
 
 MAX_MICROSTEPS = 100_000
 MAX_STEPS = 1_000_000  # of SimPy at one instant
@@ -129,7 +132,11 @@ class Director:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
         now = self.tag
         tag = Tag(now.time + delay, 1) if delay > 0 else Tag(now.time, now.microstep + 1)
-        self._enter(tag, -1, lambda: deliver(token))
+        self._enter(tag, -1, self.hold(deliver, token))
+
+    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
+        """``deliver(token)``, to be called later."""
+        return partial(deliver, token)
 
     def stop(self, reason: str) -> None:
         """End the run when the present tag has been handled; the first who asks gives the reason."""
@@ -223,7 +230,13 @@ class Director:
             for port in later:
                 port.release()
 
-    def run(self, stop: int | None, actors: list[Actor], progress: Callable[[float], None] | None = None) -> str:
+    def run(
+        self,
+        stop: int | None,
+        actors: list[Actor],
+        progress: Callable[[float], None] | None = None,
+        pace: Pace | None = None,
+    ) -> str:
         """Handle events up to and including ``stop`` (ns), until none is left, or until a stop was asked for.
 
         Returns why it ended.
@@ -232,11 +245,17 @@ class Director:
         environment = self.environment
         steps = here = 0
         now: float = _START
+        if pace is not None:
+            pace.wait_for(now)
         while (upcoming := environment.peek()) != math.inf:
             if self._stop_after is not None and max(upcoming, self.last.time) > self._stop_after.time:
                 break
             if stop is not None and upcoming > stop:
+                if pace is not None:
+                    pace.wait_for(stop)
                 return "stop time"
+            if pace is not None and upcoming > now:
+                pace.wait_for(upcoming)
             try:
                 environment.step()
             except (ActorError, LoopError):
@@ -264,6 +283,8 @@ class Director:
         """The error of a process that SimPy resumed: from there, no firing says whose it was."""
         for actor in actors:
             failure = actor.failure if isinstance(actor, Process) else None
+            if isinstance(failure, ActorError):  # of an aspect or a metric, to which the process has sent
+                return failure
             if failure is not None:
                 return ActorError(actor.path, self.tag, "run()", describe(failure))
         return ActorError("a SimPy process", self.tag, "its generator", describe(error.__cause__ or error))

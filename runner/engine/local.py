@@ -93,7 +93,7 @@ class Passage(Actor):
         lane = self._lanes.setdefault(channel, _Lane())
 
         def arrive(token: Any) -> None:
-            lane.waiting.append((onward, token))
+            lane.waiting.append(self._director.hold(onward, token))
             self._director.trigger(self)
 
         return arrive
@@ -103,8 +103,7 @@ class Passage(Actor):
         for lane in self._lanes.values():
             if lane.waiting and lane.passed != now:
                 lane.passed = now
-                onward, token = lane.waiting.popleft()
-                onward(token)
+                lane.waiting.popleft()()
         if any(lane.waiting for lane in self._lanes.values()):
             self.wake_in(0)
 
@@ -115,5 +114,5 @@ class _Lane:
     __slots__ = ("passed", "waiting")
 
     def __init__(self) -> None:
-        self.waiting: deque[tuple[Deliver, Any]] = deque()
+        self.waiting: deque[Callable[[], None]] = deque()
         self.passed: Tag | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     import pandas
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
+_TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 FORMATS = (".parquet", ".csv", ".jsonl")
 
 
@@ -58,17 +60,17 @@ class EventLog:
         self.count = 0
         self._keep = keep
         self._hash = hashlib.sha256()
-        self._heads: dict[tuple[str, str, str, str], bytes] = {}
+        self._heads: dict[tuple[str, str, str, str, int | None], bytes] = {}
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
         self.count += 1
-        names = (event, actor, port, aspect)
+        names = (event, actor, port, aspect, channel)
         head = self._heads.get(names)
         if head is None:
-            head = self._heads[names] = b"".join(canonical(name) for name in names)
-        self._hash.update(canonical(tag.time) + canonical(tag.microstep) + head + canonical(channel))
-        self._hash.update(canonical(value))
+            head = self._heads[names] = b"".join(map(canonical, names))
+        time, microstep = tag
+        self._hash.update(_TAG(b"i", time, b"i", microstep) + head + canonical(value))
         if self._keep:
             self.records.append(Record(tag, event, actor, port, channel, aspect, value))
 

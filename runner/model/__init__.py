@@ -6,6 +6,7 @@ from .graph import Hop, ModelGraph, Wire
 from .load import load_model, packaged_models
 from .model import Model
 from .observation import Metric
+from .patterns import PatternError, select
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
 from .scope import Composite, CompositePort, Instance
@@ -22,6 +23,7 @@ __all__ = [
     "Model",
     "ModelError",
     "ModelGraph",
+    "PatternError",
     "Position",
     "Problem",
     "Problems",
@@ -32,4 +34,5 @@ __all__ = [
     "load_composite",
     "load_model",
     "packaged_models",
+    "select",
 ]

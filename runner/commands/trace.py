@@ -1,0 +1,174 @@
+"""say who fired when, and why"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from .options import DONE, add_model, load, seconds, seed
+
+if TYPE_CHECKING:
+    from epicycle.actors import Actor, Tag
+
+    from ..engine import Firing
+    from ..model import ModelGraph
+
+DESCRIPTION = "Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."
+WIDEST = 80  # characters of a token
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle trace``."""
+    add_model(command)
+    command.add_argument(
+        "--actor",
+        metavar="PATTERN",
+        action="append",
+        default=[],
+        help="actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)",
+    )
+    command.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
+    command.add_argument("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'")
+    command.add_argument("--to", metavar="TIME", help="end there (default: the end of the run)")
+    command.add_argument("--json", action="store_true", help="print one JSON object a line")
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Run the model as far as it is asked for, and print as it goes."""
+    from epicycle.actors import to_nanoseconds
+
+    from ..engine import Simulation, Tracer
+
+    start = to_nanoseconds(seconds("--from", options.start)) if options.start is not None else 0
+    end = seconds("--to", options.to) if options.to is not None else None
+    model, _ = load(options)
+    actors = _actors(options.actor, model.graph)
+    show = _as_json if options.json else _as_text(actors, model.graph)
+
+    def report(firing: Firing) -> None:
+        if firing.tag.time >= start:
+            print(show(firing))
+
+    if end is not None and model.stop is not None:
+        end = min(end, model.stop)
+    Simulation(model, seed=options.seed, tracer=Tracer(actors, report)).run(until=end)
+    return DONE
+
+
+def _actors(patterns: list[str], graph: ModelGraph) -> dict[str, Actor]:
+    """The actors that some patterns select, or that stand in composites that they select."""
+    from epicycle.actors import EpicycleError
+
+    from ..model import PatternError, did_you_mean, select
+
+    known = [*graph.actors, *graph.composites]
+    chosen: set[str] = set()
+    for pattern in patterns or ["**"]:
+        try:
+            found = select(pattern, known)
+        except PatternError as error:
+            raise EpicycleError(f"--actor {pattern}: {error}") from None
+        if not found and not graph.is_excused(pattern):
+            raise EpicycleError(f"--actor {pattern} matches no actor{did_you_mean(pattern, known)}")
+        chosen.update(found)
+
+    def is_chosen(path: str) -> bool:
+        return path in chosen or ("." in path and is_chosen(path.rpartition(".")[0]))
+
+    return {path: actor for path, actor in graph.actors.items() if is_chosen(path)}
+
+
+# -- how it looks -----------------------------------------------------------------------------------------------------
+
+
+def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], str]:
+    """A way to write firings as a few lines each, in columns that fit these actors."""
+    wide = max(map(len, actors), default=0)
+    ports = [name for actor in actors.values() for name in (*actor.inputs, *actor.outputs)]
+    narrow = max(map(len, (*ports, "wake-up"))) + 3  # and the channel
+    sources = max((len(wire.source.path) for wire in graph.wires() if wire.destination.actor.path in actors), default=0)
+
+    def show(firing: Firing) -> str:
+        lines = []
+        if firing.outside == "resumed":
+            lines.append(("<-", "SimPy", "", "resumed the process"))
+        for asked in firing.wakes:
+            lines.append(("<-", "wake-up", "", "asked for in initialize" if asked is None else f"asked for at {asked}"))
+        for arrival in firing.arrivals:
+            port = (
+                f"{arrival.port}[{arrival.channel}]"
+                if actors[firing.actor].inputs[arrival.port].multi
+                else arrival.port
+            )
+            late = f"  sent at {arrival.sent}" if arrival.sent != firing.tag else ""
+            lines.append(("<-", port, arrival.source, _token(arrival.token) + late))
+        for record in firing.records:
+            port = record.port if record.channel is None else f"{record.port}[{record.channel}]"
+            note = f"  {record.event} by aspect {record.aspect}" if record.aspect else ""
+            note = "  let go by an aspect" if firing.outside == "released" and not note else note
+            lines.append(("->", port, "", _token(record.value) + note))
+        head = f"{firing.tag!s:<18} {firing.actor:<{wide}}"
+        text = []
+        for arrow, port, source, rest in lines or [("", "", "", "")]:
+            text.append(f"{head} {arrow} {port:<{narrow}} {source:<{sources}}  {rest}".rstrip())
+            head = " " * len(head)
+        return "\n".join(text)
+
+    return show
+
+
+def _token(token: Any) -> str:
+    """A token on one line, its numbers to six digits, and not too much of it."""
+    from ..engine import plain
+
+    text = json.dumps(_rounded(plain(token)), ensure_ascii=False)
+    return text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}..."
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    if isinstance(value, list):
+        return [_rounded(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    return value
+
+
+def _as_json(firing: Firing) -> str:
+    from ..engine import plain
+
+    def tag(at: Tag | None) -> dict[str, float | int] | None:
+        return None if at is None else {"time": at.seconds, "microstep": at.microstep}
+
+    return json.dumps(
+        {
+            "time": firing.tag.seconds,
+            "microstep": firing.tag.microstep,
+            "actor": firing.actor,
+            "outside": firing.outside or None,
+            "wakes": [{"asked": tag(asked)} for asked in firing.wakes],
+            "tokens": [
+                {
+                    "port": arrival.port,
+                    "channel": arrival.channel,
+                    "token": plain(arrival.token),
+                    "from": arrival.source,
+                    "sent": tag(arrival.sent),
+                }
+                for arrival in firing.arrivals
+            ],
+            "sends": [
+                {
+                    "event": record.event,
+                    "port": record.port,
+                    "channel": record.channel,
+                    "aspect": record.aspect or None,
+                    "token": plain(record.value),
+                }
+                for record in firing.records
+            ],
+        }
+    )

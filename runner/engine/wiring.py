@@ -1,0 +1,208 @@
+"""Wiring: the ways that tokens take, from every output port to the ports behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag
+from epicycle.aspects import JoinPoint
+
+from ..model import Hop, Model, WovenAspect
+from .director import ActorError, Director, describe
+from .local import Deliver, LocalDirector, Passage
+from .log import EventLog
+
+Emit = Callable[[Any, int | None], None]
+
+
+class Wiring:
+    """What ``send`` does at each port of a model: through delays, borders and join points to where a token is heard.
+
+    ``listeners`` are told of every token that leaves the port of their path, be it an actor's or a composite's.
+    """
+
+    def __init__(self, model: Model, director: Director, log: EventLog, listeners: dict[str, list[Deliver]]) -> None:
+        self.graph = model.graph
+        self.director = director
+        self.log = log
+        self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
+        self._listeners = listeners
+        self._points_at: dict[tuple[str, str], JoinPoint] = {}
+        self._woven_at: dict[str, list[WovenAspect]] = {}
+        for woven in model.aspects:
+            for path in woven.ports:
+                self._woven_at.setdefault(path, []).append(woven)
+        self._directors: dict[str, Director | LocalDirector] = {}
+        self._passages: dict[str, Passage] = {}
+        for composite, clock in self.graph.clocks.items():
+            self._directors[composite] = director if clock.is_global else LocalDirector(director, clock)
+            for paths in self.graph.borders(composite):
+                self._passages.update({path: Passage(path, director) for path in paths})
+        self._emits = self._find()
+
+    def director_of(self, path: str) -> Director | LocalDirector:
+        """The director that an actor or composite stands under, with its time."""
+        return self._directors[self.graph.director_of(path)]
+
+    def open(self) -> None:
+        """From now on tokens can be sent."""
+        for output, emit in self._emits:
+            output.connect(emit)
+
+    def close(self) -> None:
+        """From now on none can."""
+        for output, _ in self._emits:
+            output.disconnect()
+
+    def _find(self) -> list[tuple[OutputPort[Any], Emit]]:
+        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
+        channels: dict[tuple[Hop, ...], int] = {}
+        for actor in self.graph.actors.values():
+            for port in actor.inputs.values():
+                wires = self.graph.wires_to(port)
+                port.width = len(wires)
+                channels.update({wire.hops: channel for channel, wire in enumerate(wires)})
+        return [
+            (output, self._emit(output, channels))
+            for actor in self.graph.actors.values()
+            for output in actor.outputs.values()
+        ]
+
+    def _emit(self, port: OutputPort[Any], channels: dict[tuple[Hop, ...], int]) -> Emit:
+        """What ``port.send`` does."""
+        everywhere = _all(self._listeners.get(port.path, []) + self._branches(port.path, (), channels))
+        heard = _all(self._listeners.get(port.path, []))
+        ways = [self._way(wire.hops, channels[wire.hops]) for wire in self.graph.wires_from(port)]
+        port.width = len(ways)
+        log, director, path, name = self.log.add, self.director, port.actor.path, port.name
+
+        def emit_one(token: Any, channel: int | None) -> None:
+            if channel is None:
+                log(director.tag, "send", path, name, None, "", token)
+                everywhere(token)
+                return
+            if not 0 <= channel < len(ways):
+                raise PortError(f"{port.path} has {len(ways)} channels from 0 on, there is no channel {channel}")
+            log(director.tag, "send", path, name, channel, "", token)
+            heard(token)
+            ways[channel](token)
+
+        # An aspect at an output stands before the send itself: what it drops has not been sent.
+        if port.path not in self._woven_at:
+            return emit_one
+        entries: dict[int | None, Deliver] = {}
+
+        def emit_woven(token: Any, channel: int | None) -> None:
+            entry = entries.get(channel)
+            if entry is None:
+                # The channel of a send travels past the aspects in this closure, for they may forward it later.
+                entry = entries[channel] = self._woven(port.path, lambda passed: emit_one(passed, channel))
+            entry(token)
+
+        return emit_woven
+
+    def _branches(self, path: str, hops: tuple[Hop, ...], channels: dict[tuple[Hop, ...], int]) -> list[Deliver]:
+        """The ways onward from a port, one for each connection that leaves it."""
+        ways = []
+        for hop in self.graph.outgoing(path):
+            far, taken = hop.destination, (*hops, hop)
+            port = self.graph.ports.nodes[far]["port"]
+            if isinstance(port, InputPort):
+                onward = self._put(port, channels[taken])
+            else:
+                onward = _all(self._listeners.get(far, []) + self._branches(far, taken, channels))
+            ways.append(self._over(hop, onward, taken))
+        return ways
+
+    def _way(self, hops: tuple[Hop, ...], channel: int) -> Deliver:
+        """The way along one wire alone, for tokens that are sent to one channel."""
+        onward = self._put(self.graph.ports.nodes[hops[-1].destination]["port"], channel)
+        for hop in reversed(hops):
+            onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]), hops)
+        return onward
+
+    def _over(self, hop: Hop, onward: Deliver, channel: tuple[Hop, ...]) -> Deliver:
+        """One connection: its delay, and the aspects and the passage at its far end."""
+        far = hop.destination
+        passage = self._passages.get(far)
+        # Aspects at a port of a composite stand outside of it.
+        if passage is not None and self.graph.direction(far) == "input":
+            onward = self._woven(far, passage.lane(channel, onward))
+        elif passage is not None:
+            onward = passage.lane(channel, self._woven(far, onward))
+        else:
+            onward = self._woven(far, onward)
+        return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
+
+    def _put(self, port: InputPort[Any], channel: int) -> Deliver:
+        put = self.director.put
+        return lambda token: put(port, channel, token)
+
+    def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:
+        later = self._directors[self.graph.director_over(hop)].later
+        return lambda token: later(delay, onward, token)
+
+    def _woven(self, path: str, onward: Deliver) -> Deliver:
+        """``onward`` with the aspects that stand at a port before it, the first declared outermost."""
+        for woven in reversed(self._woven_at.get(path, [])):
+            onward = self._through(woven, path, onward)
+        return onward
+
+    def _through(self, woven: WovenAspect, path: str, onward: Deliver) -> Deliver:
+        point, pass_token = self._point(woven.name, path, onward), woven.aspect.pass_token
+
+        def through(token: Any) -> None:
+            try:
+                pass_token(token, point)
+            except EpicycleError:
+                raise
+            except Exception as error:
+                raise ActorError(
+                    f"aspect {woven.name}", self.director.tag, f"pass_token() at {path}", describe(error)
+                ) from error
+
+        return through
+
+    def _point(self, name: str, path: str, onward: Deliver) -> JoinPoint:
+        loom = Loom(self.director_of(self.graph.owner(path)), self.director, self.log)
+        point = JoinPoint(name, path, loom, onward)
+        first = self._points_at.setdefault((name, path), point)
+        if first is point:
+            self.points[name].append(point)
+        else:  # another connection of the same port: one stream, one memory
+            point.random, point.memory, point.counts = first.random, first.memory, first.counts
+        return point
+
+
+class Loom:
+    """What the engine offers to a join point: the time of the director that it stands under, and the log."""
+
+    def __init__(self, local: Director | LocalDirector, director: Director, log: EventLog) -> None:
+        self.seed = director.seed
+        self.later = local.later
+        self._local = local
+        self._director = director
+        self._log = log
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag."""
+        return self._local.tag
+
+    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
+        """Write an act of an aspect into the log."""
+        actor, _, name = port.rpartition(".")
+        self._log.add(self._director.tag, event, actor, name, None, aspect, token)
+
+
+def _all(ways: list[Deliver]) -> Deliver:
+    """One way that takes all of them."""
+    if len(ways) == 1:
+        return ways[0]
+
+    def onward(token: Any) -> None:
+        for way in ways:
+            way(token)
+
+    return onward
