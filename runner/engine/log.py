@@ -64,13 +64,13 @@ class EventLog:
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
-        self.count += 1
         names = (event, actor, port, aspect, channel)
         head = self._heads.get(names)
         if head is None:
             head = self._heads[names] = b"".join(map(canonical, names))
         time, microstep = tag
-        self._hash.update(_TAG(b"i", time, b"i", microstep) + head + canonical(value))
+        self._hash.update(_TAG(b"i", time, b"i", microstep) + head + canonical(value))  # raises what cannot be logged
+        self.count += 1
         if self._keep:
             self.records.append(Record(tag, event, actor, port, channel, aspect, value))
 

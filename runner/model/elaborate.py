@@ -429,6 +429,7 @@ class Elaborator:
                 "add 'at:' with ports or patterns",
                 scope=scope,
             )
+        self.graph.positions[f"aspect {name}"] = part.position
         ports = select_ports(self.graph, all_ports, name, cls, scope, part.at, self.problems)
         if self._is_enabled(name, scope, part, names) and values is not None:
             try:

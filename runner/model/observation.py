@@ -72,6 +72,7 @@ class Observation:
 
     def stop_when(self, text: Text) -> None:
         """End the run when a port behind the pattern sends something true."""
+        self.graph.positions["stop_when"] = text.position
         for path in self._select(text, "stop_when"):
             self.model.stop_ports.append(path)
             for port in self.graph.source_of(path):
@@ -86,6 +87,7 @@ class Observation:
     def metric(self, metric: MetricText) -> None:
         """Reduce what the ports behind a pattern send to one number."""
         what = f"metric {metric.name}"
+        self.graph.positions[what] = metric.position
         paths = self._select(metric.port, what)
         self.model.metrics.append(Metric(metric.name, paths, metric.take, metric.unit, metric.doc))
         if metric.take == "count":

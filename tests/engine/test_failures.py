@@ -1,0 +1,186 @@
+"""What goes wrong in a run says where: who, at which tag, and the place in the model file."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
+from epicycle.aspects import Aspect, JoinPoint
+from epicycle.runner.engine import ActorError, Simulation
+
+sys.path.insert(0, str(Path(__file__).parent))
+from engine_parts import load
+
+
+class Broken(Actor):
+    """Fails where it is told to, or sends what it is told to."""
+
+    input = InputPort(float, required=False)
+    output: OutputPort[Any] = OutputPort(float)
+    where = Parameter(str, "fire")
+
+    def initialize(self) -> None:
+        if self.where == "initialize":
+            raise RuntimeError("no start")
+
+    def fire(self) -> None:
+        if self.where == "fire" and self.now >= 1:
+            raise RuntimeError("no more")
+        things = {"text": "1.5", "array": np.zeros(2), "nameless": object(), "number": 1.0}
+        if self.where in things:
+            self.output.send(things[self.where])
+        if self.where == "channel":
+            self.output.send(1.0, 4)
+
+    def wrapup(self) -> None:
+        if self.where == "wrapup":
+            raise RuntimeError("no end")
+
+
+class Worker(Process):
+    """A process that sends in a firing, or when SimPy resumes it."""
+
+    input = InputPort(float, required=False)
+    output: OutputPort[Any] = OutputPort(float)
+    how = Parameter(str, "wait")
+
+    def run(self) -> Generator[Any, Any, None]:
+        yield self.wait(1) if self.how == "wait" else self.environment.timeout(10**9)
+        self.output.send(1.0)
+        if self.how == "fail":
+            raise RuntimeError("no more")
+        yield self.wait(1)
+
+
+class Trap(Aspect):
+    """Fails at every token."""
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        raise RuntimeError("trapped")
+
+
+MODEL = """
+composites:
+  Inner:
+    inputs: [in]
+    director: {{start: 7}}
+    actors:
+      b: {part}
+    connections: [in -> b.input]
+actors:
+  t: {{type: Ticker}}
+  a: {part}
+  c: {{type: Inner}}
+connections: [{wires}]
+{more}
+"""
+IN, OUT = "t.output -> a.input", "t.output -> c.in"
+
+
+@pytest.mark.parametrize(
+    ("part", "wires", "more", "message"),
+    [
+        ("{type: Broken}", IN, "", "a failed in fire() at (1 s, 1): RuntimeError: no more\n   declared at m.yaml:12:3"),
+        (
+            "{type: Broken}",
+            OUT,
+            "",
+            "c.b failed in fire() at (0 s, 1): RuntimeError: no more\n   declared at m.yaml:8:7",
+        ),
+        (
+            "{type: Broken, where: initialize}",
+            OUT,
+            "",
+            "a failed in initialize() at (0 s, 1): RuntimeError: no start\n   declared at m.yaml:12:3",
+        ),
+        (
+            "{type: Broken, where: wrapup}",
+            OUT,
+            "",
+            "a failed in wrapup() at (5 s, 2): RuntimeError: no end\n   declared at m.yaml:12:3",
+        ),
+        (
+            "{type: Broken, where: channel}",
+            IN,
+            "",
+            (
+                "a failed in fire() at (0 s, 1): a.output has 0 channels from 0 on, there is no channel 4\n"
+                "   declared at m.yaml:12:3"
+            ),
+        ),
+        (
+            "{type: Broken, where: nameless}",
+            IN,
+            "",
+            (
+                "a failed in fire() at (0 s, 1): a token of type object has no value that could be logged: make it a "
+                "dataclass, or give it a __repr__ that shows what is in it\n   declared at m.yaml:12:3"
+            ),
+        ),
+        (
+            "{type: Broken, where: text}",
+            IN,
+            "metrics:\n  total: {of: a.output, take: sum}",
+            (
+                "metric total failed in taking the sum of a.output at (0 s, 1): TypeError: unsupported operand type(s) "
+                "for +=: 'int' and 'str'\n   declared at m.yaml:16:3"
+            ),
+        ),
+        (
+            "{type: Broken, where: array}",
+            IN,
+            "run:\n  stop_when: a.output",
+            (
+                "stop_when failed in asking a.output at (0 s, 1): ValueError: The truth value of an array with more "
+                "than one element is ambiguous. Use a.any() or a.all()\n   declared at m.yaml:16:14"
+            ),
+        ),
+        (
+            "{type: Broken, where: number}",
+            OUT,
+            "aspects:\n  trap: {type: Trap, at: c.b.input}",
+            (
+                "aspect trap failed in pass_token() at c.b.input at (0 s, 1): RuntimeError: trapped\n"
+                "   declared at m.yaml:16:3"
+            ),
+        ),
+        *(
+            (
+                f"{{type: Worker, how: {how}}}",
+                "t.output -> a.input",
+                f"aspects:\n  trap: {{type: Trap, at: {path}.output}}",
+                (
+                    f"aspect trap failed in pass_token() at {path}.output at (1 s, 1): RuntimeError: trapped\n"
+                    "   declared at m.yaml:16:3"
+                ),
+            )
+            for how in ("wait", "timeout")
+            for path in ("a", "c.b")
+        ),
+        (
+            "{type: Worker, how: fail}",
+            OUT,
+            "",
+            "a failed in run() at (1 s, 1): RuntimeError: no more\n   declared at m.yaml:12:3",
+        ),
+    ],
+)
+def test_who_when_and_where(part: str, wires: str, more: str, message: str) -> None:
+    model = load(MODEL.format(part=part, wires=wires, more=more), types=[Broken, Worker, Trap])
+    simulation = Simulation(model, keep_log=True)
+    with pytest.raises(ActorError) as caught:
+        simulation.run(until=5)
+    text = str(caught.value)
+    folder = text.partition("declared at ")[2].partition("m.yaml")[0]
+    assert text.replace(folder, "") == message
+    assert str(pickle.loads(pickle.dumps(caught.value))) == text
+    results = simulation.results("failed")  # what was recorded is kept
+    assert (results.events, results.stopped) == (len(simulation.log.records), "failed")
+    assert all(record.tag <= caught.value.tag for record in simulation.log.records)

@@ -1,0 +1,78 @@
+"""Runs held to the wall clock, which is an imagined one here."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from epicycle.runner.engine import Pace, Simulation
+
+sys.path.insert(0, str(Path(__file__).parent))
+from engine_parts import Plan, load
+
+START = 128.0
+
+
+class Wall:
+    """A clock that only sleeping and work move on."""
+
+    def __init__(self) -> None:
+        self.now = START
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.mark.parametrize(
+    ("factor", "work", "starts", "end", "behind"),
+    [
+        (1.0, [0.0] * 4, [0.0, 1.0, 2.0, 3.0], 3.5, (0.0, 0.0)),
+        (4.0, [0.0] * 4, [0.0, 0.25, 0.5, 0.75], 0.875, (0.0, 0.0)),
+        (0.5, [1.5] * 4, [0.0, 2.0, 4.0, 6.0], 7.5, (0.5, 0.5)),
+        (2.0, [0.75] * 4, [0.0, 0.75, 1.5, 2.25], 3.0, (1.25, 1.25)),
+        (1.0, [2.5, 0.0, 0.0, 0.0], [0.0, 2.5, 2.5, 3.0], 3.5, (0.0, 1.5)),  # catches up
+    ],
+)
+def test_model_time_waits_for_the_wall_clock(
+    factor: float,
+    work: list[float],
+    starts: list[float],
+    end: float,
+    behind: tuple[float, float],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wall = Wall()
+    seen: list[float] = []
+
+    def act(actor: Plan) -> None:
+        seen.append(wall.now - START)
+        actor.output.send(actor.now)
+        wall.now += work[len(seen) - 1]
+        actor.wake_in(1)
+
+    monkeypatch.setattr(Plan, "begin", lambda actor: actor.wake_in(0))
+    monkeypatch.setattr(Plan, "act", act)
+    model = load("actors: {a: {type: Plan}}\nrun: {stop: 3.5}")
+    pace = Pace(factor, clock=lambda: wall.now, sleep=wall.sleep)
+    paced = Simulation(model).run(pace=pace)
+    assert seen == starts
+    assert wall.now - START == end  # the run waits for its stop time, too
+    assert (pace.behind, pace.worst) == behind
+    seen.clear()
+    assert Simulation(model).run().digest == paced.digest
+
+
+def test_the_real_clock() -> None:
+    model = load("actors: {a: {type: Ticker, period: 50 ms}}")
+    began = time.perf_counter()
+    Simulation(model).run(until=0.4, pace=Pace(2.0))
+    assert time.perf_counter() - began >= 0.2
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, float("inf"), float("nan")])
+def test_a_pace_that_is_none(factor: float) -> None:
+    with pytest.raises(ValueError, match="a pace is a number of model seconds in a second, greater than 0, not"):
+        Pace(factor)
