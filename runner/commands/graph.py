@@ -1,0 +1,57 @@
+"""draw the model graph"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .options import DONE, add_model, complain, load
+
+DESCRIPTION = "Draw the model graph: actors, composites, ports, connections with their delays, and aspects."
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle graph``."""
+    add_model(command)
+    command.add_argument(
+        "-o",
+        dest="out",
+        metavar="FILE",
+        type=Path,
+        help="write to FILE (.svg, .png or .pdf; .mmd or .md for Mermaid); without it, Mermaid text is printed",
+    )
+    command.add_argument(
+        "--depth",
+        metavar="N",
+        type=levels,
+        help="open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)",
+    )
+    command.add_argument(
+        "--expand", action="store_true", help="draw every instance of an array, also where they are alike"
+    )
+
+
+def levels(text: str) -> int:
+    """How many levels of composites are opened."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+    return int(text)
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Draw the graph, and say what is not shown of it."""
+    from ..show.graph import check_graph_path, mermaid, outline, write_graph
+
+    if options.out is not None:
+        check_graph_path(options.out)
+    model, _ = load(options)
+    drawn = outline(model, depth=options.depth, expand=options.expand)
+    if options.out is None:
+        sys.stdout.write(mermaid(drawn))
+    else:
+        write_graph(drawn, options.out)
+        print(f"wrote {options.out}")
+    if drawn.note and options.depth is None:
+        complain(f"note: {drawn.note}")
+    return DONE

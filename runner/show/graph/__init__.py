@@ -1,0 +1,55 @@
+"""The model graph as a picture (SVG, PNG, PDF) or as Mermaid text, without any system package.
+
+Four steps: what is drawn (``outline``), which layer it stands in (``layers``), where exactly (``places``, ``layout``),
+and how it looks (``picture``, ``mermaid``).
+
+Why the layout is our own.  It needs nested boxes, ports at fixed sides, lines at right angles, trees for fan-out and
+room for badges.  Graphviz has no ports on clusters, and its right-angled lines ignore ports altogether; its builds for
+WebAssembly inherit that.  The Eclipse Layout Kernel can do all of it, but in Java and JavaScript; the Python port we
+tried (pyelk 0.3) leaves out connections of composite ports and lets boxes overlap.  graph-layout has ports only in a
+layout without layers and nesting, grandalf, graphlay and fast-sugiyama have none.  So only the graph algorithms
+(networkx), the linear programme (SciPy) and the drawing (matplotlib) come from libraries.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from epicycle.actors import EpicycleError
+
+from .layout import draw
+from .mermaid import mermaid
+from .outline import Outline, outline
+
+PICTURES, TEXTS = (".svg", ".png", ".pdf"), (".mmd", ".md")
+
+__all__ = ["GraphError", "Outline", "check_graph_path", "mermaid", "outline", "write_graph"]
+
+
+class GraphError(EpicycleError):
+    """A picture of the model graph that cannot be made."""
+
+
+def check_graph_path(path: Path) -> None:
+    """Raise ``GraphError`` if a graph cannot be written there."""
+    if path.suffix.lower() not in (*PICTURES, *TEXTS):
+        raise GraphError(f"{path} is no picture: its name must end in {', '.join((*PICTURES, *TEXTS))}")
+    if path.is_dir():
+        raise GraphError(f"{path} cannot be written: it is a folder")
+    if not path.parent.is_dir():
+        raise GraphError(f"{path} cannot be written: there is no folder {path.parent}")
+
+
+def write_graph(outline: Outline, path: Path) -> None:
+    """Write an outline into a file, whose ending decides the format; raises ``GraphError``."""
+    check_graph_path(path)
+    try:
+        if path.suffix.lower() in TEXTS:
+            text = mermaid(outline)
+            path.write_text(f"```mermaid\n{text}```\n" if path.suffix.lower() == ".md" else text, encoding="utf-8")
+        else:
+            from .picture import write_picture
+
+            write_picture(draw(outline), path)
+    except OSError as error:
+        raise GraphError(f"{path} cannot be written: {error.strerror or error}") from error

@@ -1,0 +1,302 @@
+"""Layers: which column each box stands in, and in which order the boxes of a column stand.
+
+The first steps of Sugiyama's method (Sugiyama, Tagawa, Toda 1981) for boxes with ports: break cycles, layer by longest
+path, let long nets pass through the layers between, reduce crossings by barycentres.  A net is a tree from one port to
+many; it has one place in each layer that it passes, however many branches it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import networkx as nx
+
+T = TypeVar("T")
+SWEEPS = 12
+
+
+@dataclass(eq=False)
+class Pin:
+    """Where a net meets a cell, on its left or right side, ``offset`` below its top."""
+
+    cell: Cell
+    offset: float = 0.0
+
+
+@dataclass(eq=False)
+class Cell:
+    """What stands in a layer.
+
+    A ``box``; an ``entry`` or ``exit``, which is a port of the frame around; a ``pass``, the place that a net takes in
+    a layer; a ``turn``, which only holds a place in the order where a net turns round.
+    """
+
+    kind: str
+    left: list[Pin] = field(default_factory=list)
+    right: list[Pin] = field(default_factory=list)
+    layer: int = 0
+    width: float = 0.0
+    height: float = 0.0
+    y: float = 0.0
+
+    def pin(self, side: str) -> Pin:
+        """A new pin below the others of that side."""
+        made = Pin(self)
+        (self.left if side == "left" else self.right).append(made)
+        return made
+
+
+@dataclass(eq=False)
+class Net:
+    """A tree from a right pin to left pins; a ``label`` takes room in the layer next to the source."""
+
+    source: Pin
+    targets: list[Pin]
+    label: tuple[float, float] | None = None  # width and height
+    labelled: Cell | None = None  # the pass that carries the label
+
+
+@dataclass(eq=False)
+class Run:
+    """The part of a net between two layers: the pins on the left and on the right that it joins."""
+
+    net: Net
+    left: list[Pin]
+    right: list[Pin]
+
+
+@dataclass
+class Layering:
+    """The cells of each layer from top to bottom, and the runs to the right of each layer."""
+
+    layers: list[list[Cell]]
+    runs: list[list[Run]]
+
+
+def layer(cells: Sequence[Cell], nets: Sequence[Net]) -> Layering:
+    """Assign every cell to a layer, and make the passes of long nets.
+
+    Entries stand in the first layer, exits in the last.  Nets that would close a cycle run backwards: those with a
+    label (a delay) first, then those declared last.
+    """
+    graph = _forward(cells, nets)
+    for cell in nx.topological_sort(graph):
+        least = 0 if cell.kind == "entry" else 1
+        cell.layer = max([least, *(before.layer + graph[before][cell]["span"] for before in graph.predecessors(cell))])
+    for cell in reversed(list(nx.topological_sort(graph))):  # sources go to where they are needed
+        after = [other.layer - graph[cell][other]["span"] for other in graph.successors(cell)]
+        if cell.kind == "box" and after and graph.in_degree(cell) < len(after):
+            cell.layer = min(after)
+    last = max([1, *(cell.layer - (cell.kind == "exit") for cell in cells)])
+    for cell in cells:
+        if cell.kind == "exit":
+            cell.layer = last + 1
+    layers: list[list[Cell]] = [[] for _ in range(last + 2)]
+    for cell in cells:
+        layers[cell.layer].append(cell)
+    runs: list[list[Run]] = [[] for _ in range(last + 1)]
+    for net in nets:
+        _spread(net, layers, runs)
+    return Layering(layers, runs)
+
+
+def _forward(cells: Sequence[Cell], nets: Sequence[Net]) -> Any:
+    """The graph of the cells without what would close a cycle; ``span`` is the least distance of two layers."""
+    every: Any = nx.DiGraph()
+    every.add_nodes_from(cells)
+    edges = [(net, target.cell) for net in nets for target in net.targets]
+    every.add_edges_from((net.source.cell, target) for net, target in edges)
+    knot = {cell: number for number, knot in enumerate(nx.strongly_connected_components(every)) for cell in knot}
+    graph: Any = nx.DiGraph()
+    graph.add_nodes_from(cells)
+    for net, target in sorted(edges, key=lambda edge: edge[0].label is not None):
+        source, span = net.source.cell, 1 if net.label is None else 2
+        if source is target or (knot[source] == knot[target] and nx.has_path(graph, target, source)):
+            continue
+        known = graph[source][target]["span"] if graph.has_edge(source, target) else 0
+        graph.add_edge(source, target, span=max(span, known))
+    return graph
+
+
+def _spread(net: Net, layers: list[list[Cell]], runs: list[list[Run]]) -> None:
+    """Divide a net into runs, with a pass in every layer between its ends."""
+    start = net.source.cell.layer
+    parts: dict[int, Run] = {}
+
+    def run(channel: int) -> Run:
+        """The run to the right of a layer."""
+        if channel not in parts:
+            parts[channel] = Run(net, [], [])
+            runs[channel].append(parts[channel])
+        return parts[channel]
+
+    def pass_through(number: int) -> None:
+        """A pass in a layer, joined to the runs on both sides."""
+        cell = Cell("pass", layer=number)
+        layers[number].append(cell)
+        if net.label is not None and net.labelled is None:
+            net.labelled = cell
+            cell.width, cell.height = net.label
+        run(number - 1).right.append(cell.pin("left"))
+        run(number).left.append(cell.pin("right"))
+        cell.left[0].offset = cell.right[0].offset = cell.height / 2
+
+    run(start).left.append(net.source)
+    forward = [pin for pin in net.targets if pin.cell.layer > start]
+    for number in range(start + 1, max([start, *(pin.cell.layer for pin in forward)])):
+        pass_through(number)
+    for pin in forward:
+        run(pin.cell.layer - 1).right.append(pin)
+    backward = [pin for pin in net.targets if pin.cell.layer <= start]
+    for number in range(start, min([start + 1, *(pin.cell.layer for pin in backward)]) - 1, -1):
+        pass_through(number)
+    for pin in backward:
+        run(pin.cell.layer - 1).right.append(pin)
+
+
+# -- order --------------------------------------------------------------------------------------------------------
+
+
+def order(layering: Layering, fixed: Iterable[Cell] = ()) -> None:
+    """Put the cells of each layer, and the pins of each box, into an order with few crossings.
+
+    ``fixed`` are entries and exits whose order is given: they keep it among themselves.
+    """
+    joints = [_joints(layering, number) for number in range(len(layering.runs))]
+    given = {cell: place for place, cell in enumerate(fixed)}
+    best, least = _state(layering), _all_crossings(layering.layers, joints)
+    start = best
+    for upside_down in (False, True):
+        _restore(layering, start)
+        if upside_down:
+            for cells in layering.layers:
+                cells.reverse()
+                _keep(cells, given)
+        for _ in range(SWEEPS):
+            if least == (0, 0):
+                break
+            for rightwards in (True, False):
+                _sweep(layering.layers, joints, given, rightwards)
+                found = _all_crossings(layering.layers, joints)
+                if found < least:
+                    best, least = _state(layering), found
+    _restore(layering, best)
+    for cells in layering.layers:
+        cells[:] = [cell for cell in cells if cell.kind != "turn"]
+
+
+def _joints(layering: Layering, number: int) -> list[tuple[Pin, Pin]]:
+    """The pairs of pins that the runs to the right of a layer join; where one turns round, a cell holds its place."""
+    pairs = []
+    for run in layering.runs[number]:
+        left, right = run.left, run.right
+        if not right:
+            turn = Cell("turn", layer=number + 1)
+            layering.layers[number + 1].append(turn)
+            right = [turn.pin("left")]
+        if not left:
+            turn = Cell("turn", layer=number)
+            layering.layers[number].append(turn)
+            left = [turn.pin("right")]
+        pairs += [(one, other) for one in left for other in right]
+    return pairs
+
+
+def _state(layering: Layering) -> list[list[tuple[Cell, list[Pin], list[Pin]]]]:
+    return [[(cell, list(cell.left), list(cell.right)) for cell in cells] for cells in layering.layers]
+
+
+def _restore(layering: Layering, state: list[list[tuple[Cell, list[Pin], list[Pin]]]]) -> None:
+    for cells, kept in zip(layering.layers, state, strict=True):
+        cells[:] = [cell for cell, _, _ in kept]
+        for cell, left, right in kept:
+            cell.left[:], cell.right[:] = left, right
+
+
+def _sweep(
+    layers: list[list[Cell]], joints: list[list[tuple[Pin, Pin]]], given: dict[Cell, int], rightwards: bool
+) -> None:
+    """Order each layer by where its pins are connected to in the layer before it, in one direction or the other."""
+    numbers = range(1, len(layers)) if rightwards else range(len(layers) - 2, -1, -1)
+    for number in numbers:
+        if rightwards:
+            ranks = _ranks(layers[number - 1], "right")
+            pairs = [(right, left) for left, right in joints[number - 1]]
+        else:
+            ranks = _ranks(layers[number + 1], "left")
+            pairs = joints[number]
+        there: dict[Pin, list[int]] = {}
+        for here, far in pairs:
+            there.setdefault(here, []).append(ranks[far])
+        _arrange(layers[number], there, given)
+
+
+def _arrange(cells: list[Cell], there: dict[Pin, list[int]], given: dict[Cell, int]) -> None:
+    """Order one layer by the ranks of what its pins are connected to."""
+    for cell in cells:
+        for pins in (cell.left, cell.right):
+            _sort(pins, lambda pin: there.get(pin, []))
+    _sort(cells, lambda cell: [rank for pin in (*cell.left, *cell.right) for rank in there.get(pin, ())])
+    _keep(cells, given)
+
+
+def _sort(items: list[T], ranks: Callable[[T], list[int]]) -> None:
+    """Sort by mean rank; what has no rank stays in its place."""
+    means = {index: sum(found) / len(found) for index, item in enumerate(items) if (found := ranks(item))}
+    in_order = [items[index] for index in sorted(means, key=means.__getitem__)]
+    for index, item in zip(sorted(means), in_order, strict=True):
+        items[index] = item
+
+
+def _keep(cells: list[Cell], given: dict[Cell, int]) -> None:
+    """Bring the cells whose order is given back into it, in the places that they have among them."""
+    places = [index for index, cell in enumerate(cells) if cell in given]
+    for index, cell in zip(places, sorted((cells[index] for index in places), key=given.__getitem__), strict=True):
+        cells[index] = cell
+
+
+def _ranks(cells: list[Cell], side: str) -> dict[Pin, int]:
+    pins = (pin for cell in cells for pin in (cell.left if side == "left" else cell.right))
+    return {pin: rank for rank, pin in enumerate(pins)}
+
+
+def _all_crossings(layers: list[list[Cell]], joints: list[list[tuple[Pin, Pin]]]) -> tuple[int, int]:
+    """How many lines cross, and how many of these pairs are both on their way between passes.
+
+    Near an end a line changes its height anyway, so there a crossing costs no bends.
+    """
+    every = between = 0
+    for number, pairs in enumerate(joints):
+        long = [(one, other) for one, other in pairs if one.cell.kind == other.cell.kind == "pass"]
+        every += _crossings(layers[number], layers[number + 1], pairs)
+        between += _crossings(layers[number], layers[number + 1], long)
+    return every, between
+
+
+def _crossings(left: list[Cell], right: list[Cell], pairs: list[tuple[Pin, Pin]]) -> int:
+    """How many pairs of straight lines between two layers would cross: inversions, counted with a Fenwick tree."""
+    ranks, others = _ranks(left, "right"), _ranks(right, "left")
+    lines = sorted((ranks[one], others[other]) for one, other in pairs)
+    size = len(others) + 1
+    tree = [0] * (size + 1)
+    crossings = done = index = 0
+    while index < len(lines):
+        upto = index
+        while upto < len(lines) and lines[upto][0] == lines[index][0]:
+            upto += 1
+        for _, rank in lines[index:upto]:  # lines of one pin do not cross each other
+            below, at = 0, rank + 1
+            while at > 0:
+                below += tree[at]
+                at -= at & -at
+            crossings += done - below
+        for _, rank in lines[index:upto]:
+            at = rank + 1
+            while at <= size:
+                tree[at] += 1
+                at += at & -at
+        done += upto - index
+        index = upto
+    return crossings

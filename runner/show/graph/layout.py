@@ -1,0 +1,402 @@
+"""Layout: where every box, port, wire and badge of an outline stands; all lengths in points.
+
+Composites are laid out from the outside in as to order (a composite's ports are sorted by what is outside of it, its
+inside follows) and from the inside out as to size.  Tokens enter and leave a composite only through its ports, so each
+composite is one flat drawing with a frame around.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from . import text
+from .layers import Cell, Layering, Net, Pin, Run, layer, order
+from .outline import Box, Link, Outline, Port, label
+from .places import Trunk, place, tracks
+
+ROW = 14.0  # from port to port of an actor
+HEADER, TITLE = 28.0, 20.0  # heights of an actor's and of a composite's name
+PILL_HEIGHT, PILL_GAP = 12.0, 3.0
+HEAD = 9.0  # room for an arrowhead
+PADDING, TRACK = 10.0, 9.0  # beside and between the tracks of a channel
+MARGIN = 12.0
+
+Point = tuple[float, float]
+Piece = tuple[Point, Point]
+Line = tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class PlacedPort:
+    """A port on the edge of a box."""
+
+    port: Port
+    side: str
+    x: float
+    y: float
+    is_joined: bool
+
+
+@dataclass(frozen=True)
+class PlacedBox:
+    """A box; ``level`` is how many composites it is in."""
+
+    box: Box
+    x: float
+    y: float
+    width: float
+    height: float
+    level: int
+    ports: tuple[PlacedPort, ...]
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A tree of lines from one port to others; ``level`` is how many composites it is in."""
+
+    source: str
+    targets: tuple[str, ...]
+    lines: tuple[Line, ...]
+    heads: tuple[Point, ...]
+    dots: tuple[Point, ...]
+    level: int
+
+
+@dataclass(frozen=True)
+class Pill:
+    """A badge on a line: an aspect where it stands, or the ``label`` of a connection (aspect is empty)."""
+
+    text: str
+    aspect: str
+    x: float
+    y: float  # of its middle
+    width: float
+
+
+@dataclass(frozen=True)
+class Words:
+    """A line of text; ``y`` is where it stands, ``x`` is its beginning, middle or end as ``align`` says."""
+
+    text: str
+    x: float
+    y: float
+    size: float
+    bold: bool = False
+    is_soft: bool = False
+    align: str = "left"
+
+    @property
+    def left(self) -> float:
+        """Where it begins."""
+        share = {"left": 0.0, "center": 0.5, "right": 1.0}[self.align]
+        return self.x - share * self.width
+
+    @property
+    def width(self) -> float:
+        """How wide it is."""
+        return text.width(self.text, self.size, self.bold)
+
+
+@dataclass
+class Drawing:
+    """Everything in its place, the origin at the top left."""
+
+    outline: Outline
+    width: float = 0.0
+    height: float = 0.0
+    boxes: list[PlacedBox] = field(default_factory=list)
+    wires: list[Wire] = field(default_factory=list)
+    pills: list[Pill] = field(default_factory=list)
+    words: list[Words] = field(default_factory=list)
+
+
+def draw(outline: Outline) -> Drawing:
+    """Lay out an outline."""
+    scope = _Scope(outline.root, [], [])
+    drawing = Drawing(outline, scope.width + 2 * MARGIN, scope.height + 2 * MARGIN)
+    scope.put(drawing, MARGIN, MARGIN, 0)
+    return drawing
+
+
+def pill_width(words: str) -> float:
+    """The width of a badge."""
+    return text.width(words, text.PILL) + 8.0
+
+
+def _pills_width(port: Port) -> float:
+    return sum(pill_width(aspect) + PILL_GAP for aspect in port.aspects)
+
+
+class _Scope:
+    """The inside of one open composite, or of the model."""
+
+    def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port]) -> None:
+        self.box = box
+        self.inner: dict[Box, _Scope] = {}
+        self.cells: dict[Box, Cell] = {}
+        self.ends: dict[Pin, Port] = {}
+        self.sources: dict[str, Pin] = {}
+        self.targets: dict[str, Pin] = {}
+        frame = [self._frame_port(port, "entry") for port in inputs]
+        frame += [self._frame_port(port, "exit") for port in outputs]
+        for child in box.children:
+            self._add(child)
+        self.nets = self._nets()
+        self.layering: Layering = layer([*frame, *self.cells.values()], list(self.nets))
+        order(self.layering, frame)
+        for child, cell in self.cells.items():
+            self._measure(child, cell)
+        self.height = place(self.layering)
+        self.width = 0.0
+        self._columns()
+        if box.path:
+            self.height += TITLE + 2 * MARGIN
+            self.width = max(self.width, text.width(self.title, text.NAME, bold=True) + 2 * MARGIN)
+
+    @property
+    def title(self) -> str:
+        """What is written above the inside."""
+        return f"{self.box.name}: {self.box.kind}"
+
+    @property
+    def top(self) -> float:
+        """Where the inside begins."""
+        return TITLE + MARGIN if self.box.path else 0.0
+
+    def _frame_port(self, port: Port, kind: str) -> Cell:
+        cell = Cell(kind, width=text.width(port.name, text.PORT) + 8.0, height=ROW)
+        pin = cell.pin("right" if kind == "entry" else "left")
+        pin.offset = ROW - 3.0
+        (self.sources if kind == "entry" else self.targets)[port.path] = pin
+        self.ends[pin] = port
+        return cell
+
+    def _add(self, child: Box) -> None:
+        cell = self.cells[child] = Cell("box")
+        for port in child.inputs:
+            self.targets[port.path] = pin = cell.pin("left")
+            self.ends[pin] = port
+        for port in child.outputs:
+            self.sources[port.path] = pin = cell.pin("right")
+            self.ends[pin] = port
+
+    def _nets(self) -> dict[Net, list[Link]]:
+        """The links that leave one port with one label are a net."""
+        groups: dict[tuple[str, str], list[Link]] = {}
+        for link in self.box.links:
+            groups.setdefault((link.source, label(link)), []).append(link)
+        nets = {}
+        for (source, words), links in groups.items():
+            size = (pill_width(words) + 8.0, PILL_HEIGHT) if words else None
+            nets[Net(self.sources[source], [self.targets[link.target] for link in links], size)] = links
+        return nets
+
+    def _measure(self, child: Box, cell: Cell) -> None:
+        """Set the size of a box, and where its ports are; an open composite is laid out for that."""
+        if child.is_open:
+            scope = self.inner[child] = _Scope(
+                child, [self.ends[pin] for pin in cell.left], [self.ends[pin] for pin in cell.right]
+            )
+            cell.width, cell.height = scope.width, scope.height
+            for pin in (*cell.left, *cell.right):
+                path = self.ends[pin].path
+                inside = scope.sources[path] if path in scope.sources else scope.targets[path]
+                pin.offset = scope.top + inside.cell.y + inside.offset
+            return
+        for pins in (cell.left, cell.right):
+            for row, pin in enumerate(pins):
+                pin.offset = HEADER + ROW * row + ROW / 2
+        rows = max(len(cell.left), len(cell.right))
+        widths = [
+            max((text.width(self.ends[pin].name, text.PORT) for pin in pins), default=0.0)
+            for pins in (cell.left, cell.right)
+        ]
+        hidden = max((pill_width(name) for name in child.hidden), default=0.0)
+        names = max(text.width(child.name, text.NAME, bold=True), text.width(child.kind, text.KIND))
+        names += 16.0 if child.is_closed else 0.0  # beside the sign of a closed one
+        cell.width = max(names + 16.0, sum(widths) + 12.0 + (10.0 if all(widths) else 0.0), hidden + 16.0, 44.0)
+        cell.height = HEADER + ROW * rows + 3.0 + (PILL_HEIGHT + PILL_GAP) * len(child.hidden)
+
+    # -- columns --------------------------------------------------------------------------------------------------
+
+    def _columns(self) -> None:
+        """Set where each layer begins and ends, and where the tracks between them are."""
+        self.begins: list[float] = []
+        self.ends_at: list[float] = []
+        self.boxes_at: list[float] = []
+        self.trunks: dict[Run, list[Trunk]] = {}
+        self.track_x: dict[Trunk, float] = {}
+        x = 0.0
+        for number, cells in enumerate(self.layering.layers):
+            before = max((self._margin(cell, cell.left) for cell in cells), default=0.0)
+            after = max((self._margin(cell, cell.right) for cell in cells), default=0.0)
+            self.begins.append(x)
+            self.boxes_at.append(x + before)
+            x += before + max((cell.width for cell in cells), default=0.0) + after
+            self.ends_at.append(x)
+            if number == len(self.layering.runs):
+                break
+            runs = self.layering.runs[number]
+            trunks, count = tracks(runs)
+            self.trunks.update((run, []) for run in runs)
+            for trunk in trunks:
+                for run in trunk.runs:
+                    self.trunks[run].append(trunk)
+                self.track_x[trunk] = x + PADDING + TRACK * trunk.track
+            if runs:
+                x += 2 * PADDING + TRACK * max(count - 1, 0)
+        self.width = x
+
+    def _margin(self, cell: Cell, pins: list[Pin]) -> float:
+        """The room that a box needs on one side for badges and arrowheads."""
+        if cell.kind != "box":
+            return 0.0
+        arrow = HEAD if pins is cell.left else 4.0
+        return max((_pills_width(self.ends[pin]) + arrow for pin in pins), default=0.0)
+
+    def _x(self, cell: Cell) -> float:
+        """Where a box begins: boxes stand in the middle of their layer."""
+        number = cell.layer
+        room = max(other.width for other in self.layering.layers[number])
+        return self.boxes_at[number] + (room - cell.width) // 2
+
+    def _pin_x(self, pin: Pin) -> float:
+        cell = pin.cell
+        is_left = pin in cell.left
+        if cell.kind == "pass":
+            return self.begins[cell.layer] if is_left else self.ends_at[cell.layer]
+        if cell.kind == "entry":
+            return 0.0
+        if cell.kind == "exit":
+            return self.width
+        return self._x(cell) if is_left else self._x(cell) + cell.width
+
+    # -- drawing --------------------------------------------------------------------------------------------------
+
+    def put(self, drawing: Drawing, x: float, y: float, level: int) -> None:
+        """Put everything into a drawing, the top left corner of this scope at (x, y)."""
+        top = y + self.top
+        linked = [*self.box.links, *(link for child in self.inner for link in child.links)]
+        joined = {end for link in linked for end in (link.source, link.target)}
+        for child, cell in self.cells.items():
+            left, upper = x + self._x(cell), top + cell.y
+            ports = []
+            for side, pins in (("left", cell.left), ("right", cell.right)):
+                for pin in pins:
+                    port, at = self.ends[pin], upper + pin.offset
+                    edge = left if side == "left" else left + cell.width
+                    ports.append(PlacedPort(port, side, edge, at, port.path in joined))
+                    start = edge - HEAD - _pills_width(port) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
+                    for aspect in port.aspects:
+                        drawing.pills.append(Pill(aspect, aspect, start, at, pill_width(aspect)))
+                        start += pill_width(aspect) + PILL_GAP
+                    drawing.words.append(_port_name(ports[-1], child.is_open))
+            drawing.words += self._names(child, left, upper, cell.width)
+            hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
+            for name in reversed(child.hidden):
+                wide = pill_width(name)
+                drawing.pills.append(Pill(name, name, left + (cell.width - wide) / 2, hidden, wide))
+                hidden -= PILL_HEIGHT + PILL_GAP
+            drawing.boxes.append(PlacedBox(child, left, upper, cell.width, cell.height, level, tuple(ports)))
+            if child in self.inner:
+                self.inner[child].put(drawing, left, upper, level + 1)
+        for net, links in self.nets.items():
+            drawing.wires.append(self._wire(net, x, top, level))
+            if net.labelled is not None:
+                cell, words = net.labelled, label(links[0])
+                forward = cell.layer > net.source.cell.layer
+                start = self.begins[cell.layer] + 4.0 if forward else self.ends_at[cell.layer] - cell.width + 4.0
+                drawing.pills.append(Pill(words, "", x + start, top + cell.y + cell.height / 2, pill_width(words)))
+
+    def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
+        """The name and type of a box: in one line above the inside of a composite, else one below the other."""
+        if box.is_open:
+            name = Words(box.name, x + MARGIN, y + 14.0, text.NAME, bold=True)
+            return [name, Words(f": {box.kind}", name.x + name.width, name.y, text.NAME, is_soft=True)]
+        middle = x + width / 2
+        return [
+            Words(box.name, middle, y + 12.0, text.NAME, bold=True, align="center"),
+            Words(box.kind, middle, y + 22.5, text.KIND, is_soft=True, align="center"),
+        ]
+
+    def _wire(self, net: Net, x: float, y: float, level: int) -> Wire:
+        """The lines of a net."""
+        pieces: list[Piece] = []
+        for number, runs in enumerate(self.layering.runs):
+            for run in (each for each in runs if each.net is net):
+                pieces += self._pieces(run)
+                # A pass is drawn with the run on its right.
+                pieces += [
+                    ((self.begins[number], height), (self.ends_at[number], height))
+                    for pin in run.left
+                    if pin.cell.kind == "pass"
+                    for height in [self._point(pin)[1]]
+                ]
+        shifted = [((x + a, y + b), (x + c, y + d)) for (a, b), (c, d) in pieces]
+        lines, dots = trace(shifted)
+        heads = tuple((x + a, y + b) for a, b in map(self._point, net.targets))
+        targets = tuple(self.ends[pin].path for pin in net.targets)
+        return Wire(self.ends[net.source].path, targets, lines, heads, dots, level)
+
+    def _pieces(self, run: Run) -> list[Piece]:
+        """The straight pieces of a run: its trunk, and a line from each pin to it."""
+        left, right = [self._point(pin) for pin in run.left], [self._point(pin) for pin in run.right]
+        trunks = self.trunks[run]
+        if not trunks:
+            return [(left[0], right[0])]
+        # A trunk may be longer than what this run needs of it: runs to one port share it.
+        tracks = [self.track_x[trunk] for trunk in trunks]
+        stops = [[height for _, height in left], [height for _, height in right]]
+        stops[1:1] = [trunk.right for trunk in trunks[:-1]]  # where a divided trunk goes over to its second track
+        pieces: list[Piece] = [((x, height), (tracks[0], height)) for x, height in left]
+        for x, (before, after) in zip(tracks, pairwise(stops), strict=True):
+            pieces.append(((x, min(before + after)), (x, max(before + after))))
+        pieces += [
+            ((x, level), (beyond, level)) for (x, beyond), (level, *_) in zip(pairwise(tracks), stops[1:], strict=False)
+        ]
+        pieces += [((tracks[-1], height), (x, height)) for x, height in right]
+        return [piece for piece in pieces if piece[0] != piece[1]]
+
+    def _point(self, pin: Pin) -> tuple[float, float]:
+        return self._pin_x(pin), pin.cell.y + pin.offset
+
+
+def _port_name(port: PlacedPort, is_open: bool) -> Words:
+    """The name of a port inside its box; inside of an open composite it stands above the line that goes on there."""
+    y = port.y - 3.0 if is_open else port.y + 0.35 * text.PORT
+    x, align = (port.x + 6.0, "left") if port.side == "left" else (port.x - 6.0, "right")
+    return Words(port.port.name, x, y, text.PORT, is_soft=not port.is_joined, align=align)
+
+
+def trace(pieces: Sequence[Piece]) -> tuple[tuple[Line, ...], tuple[Point, ...]]:
+    """The lines that horizontal and vertical pieces make up, and the points where three or more meet."""
+    on: dict[tuple[int, float], set[float]] = {}  # the corners on each horizontal (1) and vertical (0) line
+    for piece in pieces:
+        for corner in piece:
+            for axis in (0, 1):
+                on.setdefault((axis, corner[axis]), set()).add(corner[1 - axis])
+    near: dict[Point, dict[Point, None]] = {}
+    for one, other in pieces:
+        axis = 0 if one[0] == other[0] else 1
+        low, high = sorted((one[1 - axis], other[1 - axis]))
+        stops = sorted(stop for stop in on[axis, one[axis]] if low <= stop <= high)
+        corners = [(one[0], stop) if axis == 0 else (stop, one[1]) for stop in stops]
+        for a, b in pairwise(corners):
+            near.setdefault(a, {})[b] = None
+            near.setdefault(b, {})[a] = None
+    lines, done = [], set()
+    for start in (corner for corner, others in near.items() if len(others) != 2):
+        for following in near[start]:
+            if (start, following) in done:
+                continue
+            line, before, here = [start], start, following
+            while len(near[here]) == 2:
+                (after,) = (other for other in near[here] if other != before)
+                if not (before[0] == here[0] == after[0] or before[1] == here[1] == after[1]):
+                    line.append(here)
+                before, here = here, after
+            done.update({(start, following), (here, before)})
+            lines.append((*line, here))
+    return tuple(lines), tuple(corner for corner, others in near.items() if len(others) > 2)

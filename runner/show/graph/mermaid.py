@@ -1,0 +1,104 @@
+"""Mermaid: an outline as text that GitHub, GitLab and many editors draw."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from .outline import Box, Link, Outline, Port, label
+
+RESERVED = {"call", "class", "classDef", "click", "default", "direction", "end"}
+RESERVED |= {"flowchart", "graph", "href", "linkStyle", "style", "subgraph"}
+
+
+def mermaid(outline: Outline) -> str:
+    """A flowchart: composites as subgraphs with their ports, delayed connections dotted, aspects in guillemets."""
+    return "\n".join(_Writer(outline).lines()) + "\n"
+
+
+class _Writer:
+    def __init__(self, outline: Outline) -> None:
+        self.outline = outline
+        self.names: dict[str, str] = {}  # of boxes, and of the ports of open composites, by path
+        self.boxes: dict[str, Box] = {}  # by the paths of their ports
+        self.ports: dict[str, Port] = {}
+        self.marked: list[str] = []
+        for box in outline.root.walk():
+            for port in (*box.inputs, *box.outputs):
+                self.boxes[port.path], self.ports[port.path] = box, port
+
+    def lines(self) -> Iterator[str]:
+        """The lines of the chart."""
+        yield "---"
+        yield f"title: {_quoted(self.outline.model.name)}"
+        yield "---"
+        yield "flowchart LR"
+        yield from self.inside(self.outline.root, "    ")
+        if self.marked:
+            yield "    classDef aspect stroke:#D55E00,stroke-width:3px"
+            yield f"    class {','.join(self.marked)} aspect"
+
+    def inside(self, box: Box, indent: str) -> Iterator[str]:
+        """The boxes in a composite, then their connections."""
+        for port in (*box.inputs, *box.outputs):
+            if box.path:
+                yield f"{indent}{self.name(port.path)}([{_quoted(_with_aspects(port))}])"
+                self.mark(port.path, port.aspects)
+        for child in box.children:
+            own = " (own director)" if child.has_director else ""
+            if child.is_open:
+                title = _quoted(f"{child.name}: {child.kind}{own}")
+                yield f"{indent}subgraph {self.name(child.path)}[{title}]"
+                yield from self.inside(child, indent + "    ")
+                yield f"{indent}end"
+                continue
+            aspects = "".join(f"<br/>«{name}»" for name in child.hidden)
+            title = _quoted(f"{child.name}<br/>{child.kind}{own}{aspects}")
+            yield f"{indent}{self.name(child.path)}" + (f"[[{title}]]" if child.is_closed else f"[{title}]")
+            standing = [name for port in (*child.inputs, *child.outputs) for name in port.aspects]
+            self.mark(child.path, (*standing, *child.hidden))
+        for link in box.links:
+            yield indent + self.link(link)
+
+    def mark(self, path: str, aspects: tuple[str, ...]) -> None:
+        """Remember where an aspect stands."""
+        if aspects:
+            self.marked.append(self.name(path))
+
+    def link(self, link: Link) -> str:
+        """A connection, labelled with what its ends do not say."""
+        source, target = self.end(link.source, "outputs"), self.end(link.target, "inputs")
+        words = ", ".join(part for part in (" to ".join(filter(None, (source, target))), label(link)) if part)
+        arrow = "-->" if link.delay is None else "-.->"
+        between = f"{arrow}|{_quoted(words)}|" if words else arrow
+        return f"{self.node(link.source)} {between} {self.node(link.target)}"
+
+    def end(self, port: str, side: str) -> str:
+        """What must be said of one end: the name of the port if the box has several, and aspects."""
+        box = self.boxes[port]
+        if box.is_open:
+            return ""
+        return _with_aspects(self.ports[port], named=len(getattr(box, side)) > 1)
+
+    def node(self, port: str) -> str:
+        """The node at which a connection ends: a port of an open composite, or else the box."""
+        return self.name(port if self.boxes[port].is_open else self.boxes[port].path)
+
+    def name(self, path: str) -> str:
+        """A name for Mermaid that no other path has."""
+        if path not in self.names:
+            plain = re.sub(r"\W+", "_", path, flags=re.ASCII).strip("_")
+            plain = f"{plain}_" if plain in RESERVED else plain
+            name, number = plain, 2
+            while name in self.names.values():
+                name, number = f"{plain}_{number}", number + 1
+            self.names[path] = name
+        return self.names[path]
+
+
+def _with_aspects(port: Port, *, named: bool = True) -> str:
+    return " ".join([port.name] * named + [f"«{name}»" for name in port.aspects])
+
+
+def _quoted(words: str) -> str:
+    return '"' + words.replace('"', "#quot;") + '"'

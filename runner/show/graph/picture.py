@@ -1,0 +1,259 @@
+"""Pictures: a drawing as SVG, PNG or PDF.
+
+All are made by matplotlib, so they look the same; text is drawn as shapes, so no font has to be there.
+Colours are Okabe and Ito's, which people with any colour vision can tell apart; every badge has its name as well.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import networkx as nx
+
+from . import text
+from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, PlacedPort, Point, Words, pill_width
+from .outline import short_name
+
+INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
+FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")
+ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0072B2", "#999999")
+DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
+DPI, LARGEST = (288, 144, 72), 30000  # of a PNG: whole pixels for a point; pixels that a side may have
+# What matplotlib would write into a file of its own accord: names, versions, times.
+METADATA = {
+    "svg": ("Creator", "Date", "Format", "Type"),
+    "png": ("Software",),
+    "pdf": ("Creator", "Producer", "CreationDate"),
+}
+
+
+def write_picture(drawing: Drawing, path: Path) -> None:
+    """Draw into a file, whose ending decides the format; the same drawing gives the same bytes."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    legend = _legend(drawing)
+    width = max([drawing.width, *(row.width + 2 * MARGIN for row in legend)])
+    height = drawing.height + sum(row.height for row in legend) + (MARGIN if legend else 0.0)
+    dpi = next((dpi for dpi in DPI if max(width, height) * dpi / 72 <= LARGEST), LARGEST * 72 / max(width, height))
+    kind = path.suffix.lower()[1:]
+    with mpl.rc_context(), warnings.catch_warnings():
+        mpl.rcdefaults()  # whatever the user's own style is
+        mpl.rcParams.update({"svg.hashsalt": "epicycle", "svg.fonttype": "path", "path.simplify": False})
+        warnings.filterwarnings("ignore", message="Glyph")  # a box stands for what the font lacks
+        figure = Figure(figsize=(width / 72, height / 72))
+        FigureCanvasAgg(figure)
+        sheet = figure.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
+        sheet.set_axis_off()
+        _Painter(sheet, drawing, legend).paint()
+        figure.savefig(path, format=kind, dpi=dpi, facecolor="white", metadata=dict.fromkeys(METADATA[kind]))
+
+
+@dataclass
+class Row:
+    """A line of the legend: a sample of something in the drawing, and what it means."""
+
+    sample: str  # aspect, label, stack, director or closed
+    words: str
+    explanation: str
+
+    height = 15.0
+
+    @property
+    def indent(self) -> float:
+        """The width of the sample."""
+        return pill_width(self.words) if self.words else 14.0
+
+    @property
+    def width(self) -> float:
+        """The width of the whole line."""
+        return self.indent + 6.0 + text.width(self.explanation, text.PORT)
+
+
+def _legend(drawing: Drawing) -> list[Row]:
+    """What needs to be explained of a drawing."""
+    boxes = [placed.box for placed in drawing.boxes]
+    rows = []
+    for name in _aspects(drawing):
+        woven = [each for each in drawing.outline.model.aspects if short_name(each.name) == name]
+        kinds = ", ".join(dict.fromkeys(type(each.aspect).__name__ for each in woven))
+        count = sum(len(each.ports) for each in woven)
+        rows.append(Row("aspect", name, f"aspect {kinds}, at {count} port{'' if count == 1 else 's'}"))
+    if labels := [pill.text for pill in drawing.pills if not pill.aspect]:
+        delayed = [words for words in labels if words[0].isdigit()]
+        if delayed:
+            rows.append(Row("label", delayed[0].partition(",")[0], "delay of a connection"))
+    if any(box.count > 1 for box in boxes):
+        rows.append(Row("stack", "", "instances that are alike"))
+    if any(box.has_director for box in boxes):
+        rows.append(Row("director", "", "composite with a director of its own"))
+    if any(box.is_closed for box in boxes):
+        rows.append(Row("closed", "", "composite whose inside is not shown"))
+    return rows
+
+
+def _aspects(drawing: Drawing) -> list[str]:
+    """The aspects that are seen, in the order of their declaration."""
+    seen = {pill.aspect for pill in drawing.pills} | {name for placed in drawing.boxes for name in placed.box.hidden}
+    names = dict.fromkeys(short_name(woven.name) for woven in drawing.outline.model.aspects)
+    return [name for name in names if name in seen]
+
+
+class _Painter:
+    """Paints a drawing and its legend on matplotlib axes, what lies below first."""
+
+    def __init__(self, sheet: Any, drawing: Drawing, legend: list[Row]) -> None:
+        self.sheet = sheet
+        self.drawing = drawing
+        self.legend = legend
+        self.colours = {name: ASPECTS[place % len(ASPECTS)] for place, name in enumerate(_aspects(drawing))}
+
+    def paint(self) -> None:
+        """Paint everything."""
+        for placed in self.drawing.boxes:
+            self.box(placed)
+        self.wires()
+        for placed in self.drawing.boxes:
+            for port in placed.ports:
+                self.port(port)
+        for words in self.drawing.words:
+            self.words(words)
+        for pill in self.drawing.pills:
+            self.pill(pill.text, pill.aspect, pill.x, pill.y)
+        y = self.drawing.height + MARGIN / 2
+        for row in self.legend:
+            self.row(row, MARGIN, y)
+            y += row.height
+
+    # -- parts ----------------------------------------------------------------------------------------------------
+
+    def box(self, placed: PlacedBox) -> None:
+        """A box: white for an actor, shaded for a composite, doubled if that has a director."""
+        box, x, y = placed.box, placed.x, placed.y
+        fill = FRAMES[placed.level % len(FRAMES)] if box.is_composite else "white"
+        if box.count > 1:
+            for step in (2, 1):
+                inset = 4.0 * step
+                self.rectangle(x + inset, y + inset, placed.width - 2 * inset, placed.height - inset / 4, fill)
+        self.rectangle(x, y, placed.width, placed.height, fill)
+        if box.has_director:
+            self.rectangle(x + 2.5, y + 2.5, placed.width - 5.0, placed.height - 5.0, fill)
+        if box.is_closed:
+            self.closed(x + placed.width - 10.0, y + 3.0)
+
+    def rectangle(self, x: float, y: float, width: float, height: float, fill: str) -> None:
+        """A box with round corners."""
+        from matplotlib.patches import FancyBboxPatch
+
+        style = "round,pad=0,rounding_size=3"
+        self.sheet.add_patch(FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, linewidth=1.0))
+
+    def closed(self, x: float, y: float) -> None:
+        """The sign of a composite that is drawn closed."""
+        self.path([((x, y), (x + 7, y), (x + 7, y + 7), (x, y + 7), (x, y))], SOFT, 0.7, radius=0.0)
+        self.path([((x + 1.5, y + 3.5), (x + 5.5, y + 3.5)), ((x + 3.5, y + 1.5), (x + 3.5, y + 5.5))], SOFT, 0.7)
+
+    def port(self, port: PlacedPort) -> None:
+        """A mark on the edge, white if any number of connections may meet there."""
+        from matplotlib.patches import Rectangle
+
+        ink = INK if port.is_joined else FAINT
+        fill = "white" if port.port.is_multi else ink
+        corner = (port.x - 2.2, port.y - 2.2)
+        self.sheet.add_patch(Rectangle(corner, 4.4, 4.4, facecolor=fill, edgecolor=ink, linewidth=0.8, zorder=3))
+
+    def wires(self) -> None:
+        """All lines, dots where one branches, and arrowheads where they end; lines that run together bend into it."""
+        from matplotlib.patches import Circle, Polygon
+
+        # Lines that share a port lie on each other in part: painted as one, they are no darker there.
+        graph: Any = nx.Graph()
+        for wire in self.drawing.wires:
+            graph.add_edges_from((wire, end) for end in (wire.source, *wire.targets))
+        for together in nx.connected_components(graph):
+            self.path([line for wire in self.drawing.wires if wire in together for line in wire.lines], INK, 1.0)
+        dots = [dot for wire in self.drawing.wires for dot in wire.dots]
+        for dot in dots:
+            self.sheet.add_patch(Circle(dot, 1.8, facecolor=INK, edgecolor="none", zorder=2.5))
+        for x, y in [head for wire in self.drawing.wires for head in wire.heads]:
+            tip = x - 2.4
+            corners = [(tip, y), (tip - 6.0, y - 2.6), (tip - 6.0, y + 2.6)]
+            self.sheet.add_patch(Polygon(corners, closed=True, facecolor=INK, edgecolor="none", zorder=2.5))
+
+    def path(self, lines: Iterable[Line], colour: str, width: float, radius: float = 4.0) -> None:
+        """Lines with round corners."""
+        from matplotlib.patches import PathPatch
+        from matplotlib.path import Path as Outline
+
+        corners: list[Point] = []
+        codes: list[Any] = []
+        for line in lines:
+            corners.append(line[0])
+            codes.append(Outline.MOVETO)
+            for before, corner, after in zip(line, line[1:], line[2:], strict=False):
+                room = min(radius, math.dist(before, corner) / 2, math.dist(corner, after) / 2)
+                corners += [_towards(corner, before, room), corner, _towards(corner, after, room)]
+                codes += [Outline.LINETO, Outline.CURVE3, Outline.CURVE3]
+            corners.append(line[-1])
+            codes.append(Outline.LINETO)
+        if corners:
+            shape = Outline(corners, codes)
+            self.sheet.add_patch(
+                PathPatch(shape, fill=False, edgecolor=colour, linewidth=width, capstyle="round", zorder=2)
+            )
+
+    def pill(self, words: str, aspect: str, x: float, y: float) -> None:
+        """A badge: coloured for an aspect, white for what belongs to the connection."""
+        from matplotlib.patches import FancyBboxPatch
+
+        fill = self.colours[aspect] if aspect else "white"
+        half = PILL_HEIGHT / 2
+        style = f"round,pad=0,rounding_size={half}"
+        place = (x, y - half)
+        patch = FancyBboxPatch(
+            place, pill_width(words), PILL_HEIGHT, style, facecolor=fill, edgecolor=INK, linewidth=0.6, zorder=4
+        )
+        self.sheet.add_patch(patch)
+        ink = "white" if fill in DARK else INK
+        self.words(Words(words, x + pill_width(words) / 2, y + 0.35 * text.PILL, text.PILL, align="center"), ink)
+
+    def words(self, words: Words, colour: str = "") -> None:
+        """A line of text."""
+        self.sheet.text(
+            words.x,
+            words.y,
+            words.text,
+            color=colour or (SOFT if words.is_soft else INK),
+            fontproperties=text.font(words.size, words.bold),
+            ha=words.align,
+            va="baseline",
+            parse_math=False,
+            zorder=5,
+        )
+
+    def row(self, row: Row, x: float, y: float) -> None:
+        """A line of the legend."""
+        middle = y + row.height / 2
+        if row.sample == "stack":
+            for step in (2, 1, 0):
+                self.rectangle(x + step, middle - 4.0 + 1.7 * step, 13.0 - 2 * step, 6.0, "white")
+        elif row.sample == "director":
+            self.rectangle(x, middle - 5.0, 13.0, 10.0, "white")
+            self.rectangle(x + 2.0, middle - 3.0, 9.0, 6.0, "white")
+        elif row.sample == "closed":
+            self.closed(x + 3.0, middle - 3.5)
+        else:
+            self.pill(row.words, row.words if row.sample == "aspect" else "", x, middle)
+        self.words(Words(row.explanation, x + row.indent + 6.0, middle + 0.35 * text.PORT, text.PORT))
+
+
+def _towards(start: Point, end: Point, way: float) -> Point:
+    """The point a little way from one towards another."""
+    length = math.dist(start, end) or 1.0
+    return start[0] + (end[0] - start[0]) * way / length, start[1] + (end[1] - start[1]) * way / length

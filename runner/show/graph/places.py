@@ -1,0 +1,210 @@
+"""Places: how far down each cell stands, and on which track each net changes its height.
+
+Heights come from a linear programme: the vertical way of all nets is made as short as the order of the cells allows,
+which draws them straight wherever they can be.  Its solutions are whole numbers (every constraint is a difference of
+two variables), so rounding makes them exact.
+
+Between two layers a run has one vertical line, its trunk.  Trunks that meet in height take different tracks, in the
+order that crosses least (Sander, "Layout of directed hypergraphs with orthogonal hyperedges", 2003); where the ends of
+two runs lie at one height on opposite sides, that order also keeps their horizontal lines apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from .layers import Cell, Layering, Pin, Run
+
+Floats = NDArray[np.float64]
+
+BOX_GAP, LINE_GAP, PORT_GAP = 20.0, 12.0, 4.0
+APART = 6.0  # lines nearer than this look like one
+
+
+def place(layering: Layering) -> float:
+    """Set the ``y`` of every cell; the height of all of them."""
+    cells = [cell for layer in layering.layers for cell in layer]
+    if not cells:
+        return 0.0
+    number = {cell: index for index, cell in enumerate(cells)}
+    gaps = [
+        (number[above], number[below], above.height + _gap(above, below))
+        for layer in layering.layers
+        for above, below in pairwise(layer)
+    ]
+    pulls = [
+        (number[one.cell], number[other.cell], other.offset - one.offset, weight)
+        for runs in layering.runs
+        for run in runs
+        for one, other, weight in _pulls(run)
+        if one.cell is not other.cell
+    ]
+    weights = np.array([weight for *_, weight in pulls])
+    heights, bends = _shortest(len(cells), gaps, pulls, weights)
+    for _ in range(2):  # and again, with small bends dear: a reader minds many bends more than a long way
+        heights, bends = _shortest(len(cells), gaps, pulls, weights * (1.0 + 30.0 / (1.0 + bends)))
+    for cell, y in zip(cells, heights, strict=True):
+        cell.y = float(y)
+    return max(cell.y + cell.height for cell in cells)
+
+
+def _shortest(
+    cells: int, gaps: list[tuple[int, int, float]], pulls: list[tuple[int, int, float, float]], weights: Floats
+) -> tuple[Floats, Floats]:
+    """Solve the linear programme: the heights of the cells, and how much each pull is bent."""
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_matrix
+
+    # Variables: the top of each cell, then the bend of each pull; a little weight on the tops keeps all together.
+    rows: list[dict[int, float]] = [{above: 1.0, below: -1.0} for above, below, _ in gaps]
+    bounds = [-gap for *_, gap in gaps]
+    for index, (one, other, offset, _) in enumerate(pulls):
+        rows += [{one: sign, other: -sign, cells + index: -1.0} for sign in (1.0, -1.0)]
+        bounds += [offset, -offset]
+    if not rows:
+        return np.zeros(cells), np.zeros(0)
+    entries = [(row, column, factor) for row, line in enumerate(rows) for column, factor in line.items()]
+    at, columns, factors = zip(*entries, strict=True)
+    matrix = csr_matrix((factors, (at, columns)), shape=(len(rows), cells + len(pulls)))
+    cost = np.concatenate([np.full(cells, 1e-3), weights])
+    solution: Any = linprog(cost, A_ub=matrix, b_ub=bounds, bounds=(0, None), method="highs-ds")
+    heights = np.round(solution.x[:cells])
+    bends = [abs(heights[one] - heights[other] - offset) for one, other, offset, _ in pulls]
+    return heights, np.array(bends)
+
+
+def _gap(above: Cell, below: Cell) -> float:
+    if above.kind == below.kind == "box":
+        return BOX_GAP
+    return PORT_GAP if {above.kind, below.kind} <= {"entry", "exit"} else LINE_GAP
+
+
+def _pulls(run: Run) -> list[tuple[Pin, Pin, float]]:
+    """The pairs of pins that should be at one height, and how much: long nets should be straight before all."""
+    if run.left and run.right:
+        pairs = [(one, other) for one in run.left for other in run.right]
+    else:
+        pairs = list(pairwise(run.left or run.right))
+    weights = {0: 1.0, 1: 2.0, 2: 8.0}
+    return [(one, other, weights[(one.cell.kind == "pass") + (other.cell.kind == "pass")]) for one, other in pairs]
+
+
+# -- tracks -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(eq=False)
+class Trunk:
+    """A vertical line of runs: the heights at which lines come to it from the left and from the right."""
+
+    runs: tuple[Run, ...]
+    left: list[float]
+    right: list[float]
+    track: int = 0
+    low: float = field(init=False)
+    high: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.low, self.high = min(self.left + self.right), max(self.left + self.right)
+
+
+def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
+    """The trunks of the runs between two layers, and how many tracks they need.
+
+    Runs that lead from one pin each to the same pin share one.  A run that is one straight line has none, one that
+    cannot keep clear of the others on a single track has two.
+    """
+    groups: dict[object, list[Run]] = {}
+    for run in runs:
+        groups.setdefault(run.right[0] if len(run.left) == len(run.right) == 1 else run, []).append(run)
+    trunks: list[Trunk] = []
+    taken: set[float] = set()
+    for group in groups.values():
+        left = [_height(pin) for run in group for pin in run.left]
+        right = sorted({_height(pin) for run in group for pin in run.right})
+        taken.update(left, right)
+        if len({*left, *right}) > 1:
+            trunks.append(Trunk(tuple(group), left, right))
+    while knot := _knot(trunks):
+        split = min(knot, key=lambda trunk: len(trunk.left) + len(trunk.right))
+        level = _free_height(sorted(taken), (split.low + split.high) / 2)
+        taken.add(level)
+        at = trunks.index(split)
+        trunks[at : at + 1] = [Trunk(split.runs, split.left, [level]), Trunk(split.runs, [level], split.right)]
+    graph = _precedence(trunks)
+    for index in nx.topological_sort(graph):
+        trunks[index].track = max((trunks[before].track + 1 for before in graph.predecessors(index)), default=0)
+    return trunks, max((trunk.track + 1 for trunk in trunks), default=0)
+
+
+def _height(pin: Pin) -> float:
+    return pin.cell.y + pin.offset
+
+
+def _free_height(taken: list[float], wanted: float) -> float:
+    """The height nearest to a wanted one that is clear of all lines."""
+    between = [(low + high) / 2 for low, high in pairwise(taken) if high - low >= 2 * APART]
+    outside = [taken[0] - 2 * APART, taken[-1] + 2 * APART]
+    return min((*between, *outside), key=lambda height: abs(height - wanted))
+
+
+def _must_precede(one: Trunk, other: Trunk) -> bool:
+    """Whether ``one`` must be left of ``other``, or their horizontal lines would lie on each other."""
+    return any(abs(left - right) < APART for left in one.left for right in other.right)
+
+
+def _meeting(trunks: list[Trunk]) -> Iterator[tuple[int, int]]:
+    """The pairs of trunks that meet in height, and so cannot be on one track."""
+    by_height = sorted(range(len(trunks)), key=lambda index: trunks[index].low)
+    for place, one in enumerate(by_height):
+        for other in by_height[place + 1 :]:
+            if trunks[other].low > trunks[one].high + APART:
+                break
+            yield (one, other) if one < other else (other, one)
+
+
+def _knot(trunks: list[Trunk]) -> list[Trunk]:
+    """Trunks each of which must be left of another of them; empty if there are none."""
+    graph: Any = nx.DiGraph()
+    for one, other in _meeting(trunks):
+        if trunks[one].runs is not trunks[other].runs:
+            graph.add_edges_from((a, b) for a, b in ((one, other), (other, one)) if _must_precede(trunks[a], trunks[b]))
+    knots = [sorted(knot) for knot in nx.strongly_connected_components(graph) if len(knot) > 1]
+    return [trunks[index] for index in min(knots, default=[])]
+
+
+def _precedence(trunks: list[Trunk]) -> Any:
+    """Which trunk is left of which: what must be, then what saves most crossings."""
+    graph: Any = nx.DiGraph()
+    graph.add_nodes_from(range(len(trunks)))
+    wishes: list[tuple[int, int, int]] = []
+    for one, other in _meeting(trunks):
+        a, b = trunks[one], trunks[other]
+        if a.runs is b.runs or _must_precede(a, b):
+            graph.add_edge(one, other)
+        elif _must_precede(b, a):
+            graph.add_edge(other, one)
+        else:
+            saved = _crossings(b, a) - _crossings(a, b)
+            wishes.append((saved, one, other) if saved >= 0 else (-saved, other, one))
+    wishes.sort(key=lambda wish: (-wish[0], *wish[1:]))
+    every = graph.copy()
+    every.add_edges_from((one, other) for _, one, other in wishes)
+    knot = {index: number for number, knot in enumerate(nx.strongly_connected_components(every)) for index in knot}
+    for _, one, other in wishes:
+        closes = knot[one] == knot[other] and nx.has_path(graph, other, one)
+        graph.add_edge(*((other, one) if closes else (one, other)))
+    return graph
+
+
+def _crossings(one: Trunk, other: Trunk) -> int:
+    """How often lines cross if ``one`` is left of ``other``."""
+    return sum(other.low < height < other.high for height in one.right) + sum(
+        one.low < height < one.high for height in other.left
+    )
