@@ -16,7 +16,7 @@ from .parameter import (
     variants,
 )
 from .port_parameter import PortParameter
-from .ports import InputPort, OutputPort, PortError, accepts, type_name
+from .ports import InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
 from .quantity import Quantity, plain
 from .random import random_stream
@@ -53,6 +53,7 @@ __all__ = [
     "parse_unit",
     "plain",
     "random_stream",
+    "shaped",
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",

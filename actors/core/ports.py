@@ -11,6 +11,8 @@ import typing
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar, overload
 
+import numpy as np
+
 from .errors import EpicycleError
 
 T = TypeVar("T")
@@ -25,8 +27,8 @@ class _Port(Generic[T]):
 
     direction = ""
 
-    def __init__(self, type: Any, *, multi: bool, doc: str) -> None:
-        self.type = type
+    def __init__(self, type: Any, *, shape: tuple[int | None, ...] | None, multi: bool, doc: str) -> None:
+        self.type = type if shape is None else shaped(type, shape)
         self.multi = multi
         self.doc = doc
         self.name = ""
@@ -51,6 +53,7 @@ class _Port(Generic[T]):
 class InputPort(_Port[T]):
     """Where tokens arrive.
 
+    ``shape`` is that of a ``numpy`` array, as for parameters: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
     ``required``: the model is wrong when nothing is connected to it.  ``multi``: any number of connections, each a
     channel, in the order in which they are declared.
     """
@@ -58,13 +61,29 @@ class InputPort(_Port[T]):
     direction = "input"
 
     @overload
-    def __init__(self, type: type[T], *, multi: bool = ..., required: bool = ..., doc: str = ...) -> None: ...
+    def __init__(
+        self,
+        type: type[T],
+        *,
+        shape: tuple[int | None, ...] | None = ...,
+        multi: bool = ...,
+        required: bool = ...,
+        doc: str = ...,
+    ) -> None: ...
     @overload  # unions and other types that are no classes
     def __init__(
         self: InputPort[Any], type: object, *, multi: bool = ..., required: bool = ..., doc: str = ...
     ) -> None: ...
-    def __init__(self, type: Any, *, multi: bool = False, required: bool = True, doc: str = "") -> None:
-        super().__init__(type, multi=multi, doc=doc)
+    def __init__(
+        self,
+        type: Any,
+        *,
+        shape: tuple[int | None, ...] | None = None,
+        multi: bool = False,
+        required: bool = True,
+        doc: str = "",
+    ) -> None:
+        super().__init__(type, shape=shape, multi=multi, doc=doc)
         self.required = required
         self.width = 0
         self._arriving: tuple[list[T], list[int]] = [], []
@@ -131,7 +150,13 @@ class OutputPort(_Port[T]):
 
     @overload
     def __init__(
-        self, type: type[T], *, multi: bool = ..., depends_on: tuple[str, ...] | None = ..., doc: str = ...
+        self,
+        type: type[T],
+        *,
+        shape: tuple[int | None, ...] | None = ...,
+        multi: bool = ...,
+        depends_on: tuple[str, ...] | None = ...,
+        doc: str = ...,
     ) -> None: ...
     @overload
     def __init__(
@@ -146,11 +171,12 @@ class OutputPort(_Port[T]):
         self,
         type: Any,
         *,
+        shape: tuple[int | None, ...] | None = None,
         multi: bool = False,
         depends_on: tuple[str, ...] | None = None,
         doc: str = "",
     ) -> None:
-        super().__init__(type, multi=multi, doc=doc)
+        super().__init__(type, shape=shape, multi=multi, doc=doc)
         self.depends_on = depends_on
         self.width = 0
         self._emit: Callable[[T, int | None], None] = self._unbound
@@ -178,10 +204,27 @@ class OutputPort(_Port[T]):
         self._emit = self._unbound
 
 
+def shaped(type: Any, shape: tuple[int | None, ...]) -> Any:
+    """The type of arrays of one shape; ``None`` is any length.  In a union: ``float | shaped(np.ndarray, (2,))``."""
+    return typing.Annotated.__class_getitem__((type, shape))  # type: ignore[attr-defined]
+
+
+def _shape(declared: Any) -> tuple[int | None, ...] | None:
+    """The shape that a type says, if it does."""
+    if typing.get_origin(declared) is not typing.Annotated:
+        return None
+    said = declared.__metadata__[0]
+    return said if isinstance(said, tuple) else None
+
+
 def type_name(declared: Any) -> str:
     """A port type as a person would write it."""
     if declared is object or declared is Any:
         return "any"
+    if declared is np.ndarray:
+        return "array"
+    if (shape := _shape(declared)) is not None:
+        return f"{type_name(declared.__origin__)}[{', '.join('n' if size is None else str(size) for size in shape)}]"
     arguments = typing.get_args(declared)
     if isinstance(declared, types.UnionType) or typing.get_origin(declared) is typing.Union:
         return " | ".join(type_name(argument) for argument in arguments)
@@ -193,7 +236,8 @@ def type_name(declared: Any) -> str:
 def accepts(wanted: Any, given: Any) -> bool:
     """Whether every token of type ``given`` may enter a port of type ``wanted``; an int passes for a float.
 
-    ``Any`` is for actors that hand on what they get: it goes with everything.
+    ``Any`` is for actors that hand on what they get: it goes with everything.  An array of any length does not fit
+    where one length is wanted; one whose shape is not said at all goes with every shape.
     """
     if wanted in (object, Any) or given is Any or wanted == given:
         return True
@@ -201,6 +245,12 @@ def accepts(wanted: Any, given: Any) -> bool:
         return all(accepts(wanted, each) for each in typing.get_args(given))
     if isinstance(wanted, types.UnionType) or typing.get_origin(wanted) is typing.Union:
         return any(accepts(each, given) for each in typing.get_args(wanted))
+    shapes = _shape(wanted), _shape(given)
+    if shapes != (None, None):
+        kinds = [
+            each if shape is None else each.__origin__ for each, shape in zip((wanted, given), shapes, strict=True)
+        ]
+        return _fits(*shapes) and accepts(*kinds)
     if wanted is float and given is int:
         return True
     inner, outer = typing.get_origin(given) or given, typing.get_origin(wanted) or wanted
@@ -208,3 +258,9 @@ def accepts(wanted: Any, given: Any) -> bool:
         wanted_arguments, given_arguments = typing.get_args(wanted), typing.get_args(given)
         return not wanted_arguments or wanted_arguments == given_arguments
     return False
+
+
+def _fits(wanted: tuple[int | None, ...] | None, given: tuple[int | None, ...] | None) -> bool:
+    if wanted is None or given is None:
+        return True
+    return len(wanted) == len(given) and all(w in (None, g) for w, g in zip(wanted, given, strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import networkx as nx
@@ -60,18 +61,45 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
 
 
 def check_types(graph: ModelGraph, problems: Problems) -> None:
-    """Every wire's sender must send what its receiver takes."""
-    for wire in graph.wires():
-        given, wanted = wire.source.type, wire.destination.type
-        if accepts(wanted, given):
+    """What each port sends or hands on must be what the next port with a type takes."""
+    for path in graph.ports.nodes:
+        given = graph.type_of(path)
+        if given is None:
             continue
-        way = " -> ".join([wire.hops[0].source, *(hop.destination for hop in wire.hops)])
-        problems.add(
-            f"{wire.source.path} sends {type_name(given)}, but {wire.destination.path} takes {type_name(wanted)}",
-            wire.hops[0].position,
-            *((f"the way: {way}",) if len(wire.hops) > 1 else ()),
-            *_other_position(wire.hops[0].position, wire.hops[-1].position),
-        )
+        for hops in _stretches(graph, path):
+            far = hops[-1].destination
+            wanted = graph.type_of(far)
+            if accepts(wanted, given):
+                continue
+            way = " -> ".join([path, *(hop.destination for hop in hops)])
+            verb = "sends" if graph.ports.nodes[path]["port"] is not None else "hands on"
+            problems.add(
+                f"{path} {verb} {type_name(given)}, but {far} takes {type_name(wanted)}",
+                hops[0].position,
+                *(who for who in (_who(graph, path), _who(graph, far)) if who),
+                *((f"the way: {way}",) if len(hops) > 1 else ()),
+                *_other_position(hops[0].position, hops[-1].position),
+            )
+
+
+def _stretches(graph: ModelGraph, path: str) -> Iterator[tuple[Hop, ...]]:
+    """The ways from a port to the next ports that have a type."""
+    for hop in graph.outgoing(path):
+        if graph.type_of(hop.destination) is not None:
+            yield (hop,)
+        else:
+            for rest in _stretches(graph, hop.destination):
+                yield (hop, *rest)
+
+
+def _who(graph: ModelGraph, port: str) -> str:
+    """Whose port it is, and where that stands."""
+    owner = graph.owner(port)
+    if owner in graph.actors:
+        what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.positions.get(owner)
+    else:
+        what, at = f"{port} is a port of {graph.composites.get(owner, owner)}", graph.ports.nodes[port].get("declared")
+    return f"{what}, declared at {at.file}:{at.line}:{at.column}" if at is not None else ""
 
 
 def _other_position(first: Position | None, last: Position | None) -> tuple[str, ...]:

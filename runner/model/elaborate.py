@@ -24,13 +24,14 @@ from epicycle.actors import (
 
 from .catalogue import Catalogue, CatalogueError
 from .checks import check
-from .declarations import CompositeText, ModelText, PartText
+from .declarations import CompositeText, ModelText, PartText, PortText
 from .document import Entry
 from .files import data_file
 from .graph import ModelGraph
 from .model import Model
 from .observation import Observation
 from .patterns import PathIndex
+from .port_types import PortTypeError, read_type, token_types
 from .problems import Position, Problems, did_you_mean, nearest
 from .settings import Setting, Settings
 from .values import Values
@@ -72,6 +73,8 @@ class Elaborator:
         # Aspects are woven when all ports exist: (name, scope, declaration, names).
         self._to_weave: list[tuple[str, str, PartText, dict[str, object]]] = []
         self._instances = 0
+        self._port_types: dict[str, Any] = {}
+        self._token_types: dict[str, type] | None = None
 
     def model(self) -> Model:
         """The whole model."""
@@ -345,12 +348,36 @@ class Elaborator:
             inside.setdefault("index", names["index"])
         self.graph.composites[path] = composite.name
         for direction, ports in (("input", composite.inputs), ("output", composite.outputs)):
-            for name in ports:
-                self.graph.add_composite_port(f"{path}.{name}", direction, part.position)
+            for name, port in ports.items():
+                self.graph.add_composite_port(
+                    f"{path}.{name}", direction, part.position, self._port_type(composite, port), port.position
+                )
         if composite.director is not None:
             start, drift = self._clock(path, composite.director, inside)
             self.graph.add_director(path, start, drift)
         self._body(path, composite, inside, (*within, composite.name))
+
+    def _port_type(self, composite: CompositeText, port: PortText) -> Any:
+        """The type that a composite declares for a port; None if it says none, or none that there is."""
+        if port.type is None:
+            return None
+        text = port.type.text
+        if text not in self._port_types:
+            try:
+                self._port_types[text] = read_type(text, self._tokens)
+            except PortTypeError as error:
+                self._port_types[text] = error
+        found = self._port_types[text]
+        if isinstance(found, PortTypeError):
+            hints = (found.help,) if found.help else ()
+            self.problems.add(f"port {port.name!r} of {composite.name}: {found.message}", port.type.position, *hints)
+            return None
+        return found
+
+    def _tokens(self) -> dict[str, type]:
+        if self._token_types is None:
+            self._token_types = token_types(self.catalogue)
+        return self._token_types
 
     def _clock(self, path: str, director: dict[str, Entry], names: dict[str, object]) -> tuple[int | None, float]:
         """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""

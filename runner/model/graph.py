@@ -92,9 +92,11 @@ class ModelGraph:
         if has_own_ports(actor_type):
             self.unknown.add(path)
 
-    def add_composite_port(self, path: str, direction: str, position: Position | None) -> None:
-        """Add a port of a composite; tokens only pass through it."""
-        self.ports.add_node(path, port=None, direction=direction)
+    def add_composite_port(
+        self, path: str, direction: str, position: Position | None, type: Any = None, declared: Position | None = None
+    ) -> None:
+        """Add a port of a composite; tokens only pass through it, which are of the ``type`` if there is one."""
+        self.ports.add_node(path, port=None, direction=direction, type=type, declared=declared)
         self._borders.setdefault(self.owner(path), ([], []))[direction == "output"].append(path)
         if position is not None:
             self.positions[path] = position
@@ -158,6 +160,11 @@ class ModelGraph:
         """``input`` or ``output``."""
         direction: str = self.ports.nodes[path]["direction"]
         return direction
+
+    def type_of(self, path: str) -> Any:
+        """The declared type of a port; None if a composite says nothing of it."""
+        node = self.ports.nodes[path]
+        return node.get("type") if node["port"] is None else node["port"].type
 
     def owner(self, port: str) -> str:
         """The actor or composite that a port belongs to."""
