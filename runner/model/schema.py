@@ -363,7 +363,7 @@ def _type(name: str, cls: type, reserved: frozenset[str]) -> Schema:
         "description": doc_of(cls),
         "properties": {
             "type": {"const": name},
-            **{key: {} for key in sorted(reserved - {"type"})},  # whose rules stand where the type does
+            **{key: True for key in sorted(reserved - {"type"})},  # whose rules stand where the type does
             **{key: {**_value(parameter), "description": _about(parameter)} for key, parameter in declared.items()},
         },
         "required": [key for key, parameter in declared.items() if parameter.required],
