@@ -30,7 +30,7 @@ NAME = "[A-Za-z_][A-Za-z0-9_]*"
 EXPRESSION = r"\$\{"
 NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
 QUANTITY = rf"^\s*{NUMBER}\s*([A-Za-z%°µμ1(].*)?$"
-_BOUND = r"(-?[0-9]{1,9}|\$\{.*\})"
+_BOUND = r"(-?[0-9]{1,9}|\$\{[^}]*\})"
 _INDEX = rf"\s*(\*|{_BOUND}|{_BOUND}?\s*\.\.\s*{_BOUND}?)\s*"
 _ENDPOINT = rf"({NAME}(\[{_INDEX}(,{_INDEX})*\])?\.)?{NAME}"
 _LIST = rf"[\s,]*{_ENDPOINT}(\s*,[\s,]*{_ENDPOINT})*[\s,]*"
@@ -363,7 +363,7 @@ def _type(name: str, cls: type, reserved: frozenset[str]) -> Schema:
         "description": doc_of(cls),
         "properties": {
             "type": {"const": name},
-            **{key: True for key in sorted(reserved - {"type"})},  # whose rules stand where the type does
+            **dict.fromkeys(sorted(reserved - {"type"}), True),  # whose rules stand where the type does
             **{key: {**_value(parameter), "description": _about(parameter)} for key, parameter in declared.items()},
         },
         "required": [key for key, parameter in declared.items() if parameter.required],

@@ -227,7 +227,8 @@ def is_endpoint(text: str) -> bool:
     if found is None or found[2] is None:
         return found is not None
     try:
-        resolve(found[2], "a", 9, lambda _: 2)
+        # Two expressions with something between them come to a text, which is no index.
+        resolve(found[2], "a", 9, lambda expression: 2 if expression.count("${") == 1 else "2].b[2")
     except BadIndexError:
         return False
     return True
