@@ -1,25 +1,56 @@
-"""What the documents show is true: their models run, their Python runs."""
+"""What the documents show is true: their models run, their Python runs, and what is shown of it is what comes out.
+
+``python tests/test_docs.py`` writes into the tutorials what comes out now.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import doctest
+import io
 import re
+import shlex
+import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
 
 from epicycle.runner import ModelError, Simulation, load_model
+from epicycle.runner.cli import main
 
 ROOT = Path(__file__).parent.parent
+TUTORIALS = sorted((ROOT / "docs" / "tutorial").glob("*.md"))
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
+class Block(NamedTuple):
+    """A fenced block of a document."""
+
+    language: str
+    text: str
+    line: int
+
+
+def blocks(path: Path) -> list[Block]:
+    """The fenced blocks of a document, in order."""
+    document = path.read_text(encoding="utf-8")
+    return [
+        Block(found[1], found[2], document[: found.start()].count("\n") + 2)
+        for found in re.finditer(r"^```(\w*)\n(.*?)^```$", document, re.M | re.S)
+    ]
+
+
 def snippets(language: str) -> list[tuple[str, str]]:
-    """The fenced blocks of a language, with names."""
-    found = []
-    for path in DOCUMENTS:
-        blocks = re.findall(rf"^```{language}\n(.*?)^```", path.read_text(encoding="utf-8"), re.M | re.S)
-        found += [(f"{path.name}-{number}", block) for number, block in enumerate(blocks)]
-    return found
+    """The blocks of a language in all documents that are no tutorials, with names."""
+    return [
+        (f"{path.name}-{block.line}", block.text)
+        for path in DOCUMENTS
+        for block in blocks(path)
+        if block.language == language
+    ]
 
 
 @pytest.mark.parametrize(("name", "code"), snippets("python"), ids=[name for name, _ in snippets("python")])
@@ -34,6 +65,59 @@ def test_models_run(name: str, text: str, tmp_path: Path) -> None:
     assert Simulation(load_model(path)).run().events > 0
 
 
+class Reader:
+    """Does what a tutorial says, in a folder of its own, as a reader would."""
+
+    def __init__(self) -> None:
+        self.names: dict[str, Any] = {"__name__": "tutorial"}
+
+    def outputs(self, tutorial: list[Block]) -> Iterator[tuple[Block, str, str]]:
+        """What each block shows of its output, and what really came out.
+
+        A block whose first line is ``# name`` is a file.  Other Python is run, and its output is the ``text`` block
+        that follows; in ``console`` the output of a command stands below it.
+        """
+        for block, after in zip(tutorial, [*tutorial[1:], Block("", "", 0)], strict=True):
+            name = re.match(r"# (\w+\.\w+)\n", block.text)
+            if name is not None:
+                Path(name[1]).write_text(block.text, encoding="utf-8")
+            elif block.language == "python":
+                printed = self._printed(lambda code=block.text: exec(code, self.names))
+                yield block, after.text if after.language == "text" else "", printed
+            elif block.language == "console":
+                for command, shown in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", block.text, re.M):
+                    program, *arguments = shlex.split(command)
+                    assert program == "epicycle", command
+                    yield block, shown, self._printed(lambda given=arguments: main(given))
+            else:
+                assert block.language == "text", f"line {block.line}: what is this?"
+
+    @staticmethod
+    def _printed(act: Any) -> str:
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+            act()
+        return "\n".join(line.rstrip() for line in printed.getvalue().splitlines()) + "\n"
+
+
+@pytest.mark.parametrize("path", TUTORIALS, ids=[path.stem for path in TUTORIALS])
+def test_a_tutorial_shows_what_comes_out(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    modules = set(sys.modules)
+    checker, shown_something = doctest.OutputChecker(), False
+    try:
+        for block, shown, printed in Reader().outputs(blocks(path)):
+            where = f"{path.name}, block at line {block.line}, printed:\n{printed}"
+            assert checker.check_output(shown or "\n", printed, doctest.ELLIPSIS), where
+            shown_something = shown_something or bool(shown)
+    finally:
+        for name in set(sys.modules) - modules:  # the files of this tutorial; the next one may name its own so
+            if getattr(sys.modules[name], "__file__", None) and str(tmp_path) in str(sys.modules[name].__file__):
+                del sys.modules[name]
+    assert shown_something
+
+
 def test_error_of_the_readme_is_what_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (model,) = re.findall(r"^```yaml\n(.*?)^```", readme, re.M | re.S)
@@ -46,7 +130,31 @@ def test_error_of_the_readme_is_what_is_said(tmp_path: Path, monkeypatch: pytest
 
 
 def test_links_lead_somewhere() -> None:
-    for path in DOCUMENTS:
+    for path in [*DOCUMENTS, *TUTORIALS]:
         for target in re.findall(r"\]\(([^)#]+)\)", path.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (path.parent / target).exists(), f"{path.name} links to {target}"
+
+
+def refresh(path: Path) -> None:
+    """Put what comes out now into a tutorial."""
+    document, at = path.read_text(encoding="utf-8"), 0
+    for block, shown, printed in Reader().outputs(blocks(path)):
+        if block.language == "python":
+            at = document.index(block.text, at) + len(block.text)
+        if shown:
+            at = document.index(shown, at)
+            printed = re.sub(r"(wall time +).*", r"\1...", printed)
+            document = document[:at] + printed + document[at + len(shown) :]
+            at += len(printed)
+    path.write_text(document, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    for tutorial in TUTORIALS:
+        for module in [name for name, each in sys.modules.items() if "tutorial-" in str(getattr(each, "__file__", ""))]:
+            del sys.modules[module]
+        with tempfile.TemporaryDirectory(prefix="tutorial-") as folder, contextlib.chdir(folder):
+            sys.path.insert(0, folder)
+            refresh(tutorial)
+            sys.path.remove(folder)

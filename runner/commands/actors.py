@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .options import DONE
+from .options import DONE, add_types, own_types
 from .reference import add_json, print_reference
 
 DESCRIPTION = "List the actors that a model may use, or describe one: its ports and parameters."
@@ -13,6 +13,7 @@ DESCRIPTION = "List the actors that a model may use, or describe one: its ports 
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle actors``."""
     command.add_argument("name", metavar="NAME", nargs="?", help="an actor type")
+    add_types(command)
     add_json(command)
 
 
@@ -20,5 +21,5 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print the reference."""
     from ..model.catalogue import installed
 
-    print_reference(installed().actors, "actor", options.name, options.json)
+    print_reference(installed().with_types(own_types(options)).actors, "actor", options.name, options.json)
     return DONE

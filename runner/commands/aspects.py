@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from .options import DONE, add_changes, load
+from .options import DONE, add_changes, load, own_types
 from .reference import add_json, print_reference, show
 
 DESCRIPTION = (
@@ -33,7 +33,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from ..model.catalogue import installed
     from ..model.load import is_path, packaged_models
 
-    name, types, models = options.model, installed().aspects, packaged_models()
+    name, types, models = options.model, installed().with_types(own_types(options)).aspects, packaged_models()
     if name is None or name in types or not (name in models or is_path(name)):
         if options.set or options.overrides or options.aspect or options.without:
             raise EpicycleError("--set, --overrides, --aspect and --without change a model: name one")

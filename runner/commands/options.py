@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -45,6 +46,25 @@ def add_changes(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--without", metavar="NAME", action="append", default=[], help="remove an aspect; may be repeated"
     )
+    add_types(command)
+
+
+def add_types(command: argparse.ArgumentParser) -> None:
+    """The option that makes types of the user's own known."""
+    command.add_argument(
+        "--types",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="a Python file with actors and aspects of your own, whose code is run; may be repeated",
+    )
+
+
+def own_types(options: argparse.Namespace) -> list[type]:
+    """The types of the files that ``--types`` names."""
+    from ..model.own_types import types_of_file
+
+    return [each for file in options.types for each in types_of_file(Path(file))]
 
 
 def seed(text: str) -> int:
@@ -76,6 +96,7 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, d
         overrides=options.overrides,
         aspects=options.aspect,
         without_aspects=options.without,
+        types=own_types(options),
     )
     if not strict:
         for warning in model.warnings:

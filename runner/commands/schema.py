@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import DONE, complain
+from .options import DONE, add_types, complain, own_types
 
 DESCRIPTION = (
     "Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language "
@@ -16,6 +16,7 @@ DESCRIPTION = (
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle schema``."""
     command.add_argument("-o", "--out", metavar="FILE", type=Path, help="write to FILE (default: standard output)")
+    add_types(command)
 
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
@@ -24,7 +25,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from ..model.schema import json_schema, schema_text
     from ..show import figure_types
 
-    catalogue, errors = installed().loaded()
+    catalogue, errors = installed().with_types(own_types(options)).loaded()
     for error in errors:
         complain(f"warning: {error}")
     text = schema_text(json_schema(catalogue, figure_types()))

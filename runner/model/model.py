@@ -171,8 +171,9 @@ class Model(Scope):
     def _tables(self) -> list[Table]:
         actors = []
         for path, actor in self.graph.actors.items():
-            values = (f"{name}={short(getattr(actor, name))}" for name in declared_parameters(type(actor)))
-            actors.append((path, type(actor).__name__, ", ".join(values)))
+            values = {name: getattr(actor, name) for name in declared_parameters(type(actor))}
+            given = (f"{name}={short(value)}" for name, value in values.items() if value is not None)
+            actors.append((path, type(actor).__name__, ", ".join(given)))
         connections = [
             (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")
             for hop in self.graph.since(0)

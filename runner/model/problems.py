@@ -40,13 +40,11 @@ class Problem:
         head = f"{self.severity}: {visible(self.message)}"
         lines = [head]
         if (at := self.position) is not None:
-            source, carets = _excerpt(at)
-            gutter = max(5, len(str(at.line)))
-            lines = [
-                f"{visible(at.file)}:{at.line}:{at.column}: {head}",
-                f"{at.line:>{gutter}} | {source}".rstrip(),
-                f"{'':>{gutter}} | {carets}",
-            ]
+            lines = [f"{visible(at.file)}:{at.line}:{at.column}: {head}"]
+            if at.length:  # the lines of a Python prompt cannot be had
+                source, carets = _excerpt(at)
+                gutter = max(5, len(str(at.line)))
+                lines += [f"{at.line:>{gutter}} | {source}".rstrip(), f"{'':>{gutter}} | {carets}"]
         lines += [f"   help: {visible(line)}" for line in self.help]
         return "\n".join(lines)
 

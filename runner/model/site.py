@@ -23,7 +23,7 @@ def call_site() -> Position:
     source = linecache.getline(file, line, frame.f_globals).rstrip("\n")
     here = os.getcwd() + os.sep
     text = source.strip()
-    return Position(file.removeprefix(here), line, len(source) - len(source.lstrip()) + 1, max(1, len(text)), source)
+    return Position(file.removeprefix(here), line, len(source) - len(source.lstrip()) + 1, len(text), source)
 
 
 def node_of(value: Any, position: Position) -> Node:
