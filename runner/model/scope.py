@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
 
+OF_NO_CLASS = "Composite"  # what stands for the class of a composite that Python builds
+
 A = TypeVar("A", bound=Actor)
 
 
@@ -133,7 +135,7 @@ class Scope:
         with _raising() as problems:
             full = self._free(name, position, problems)
             begin, speed = _clock(full, start, drift, position, problems)
-        self._model.graph.composites[full] = ""  # it is of no class
+        self._model.graph.composites[full] = OF_NO_CLASS
         if director:
             self._model.graph.add_director(full, begin, speed)
         self._model.graph.positions.setdefault(full, position)

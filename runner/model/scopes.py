@@ -6,7 +6,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 from .problems import Position
-from .scope import Composite
+from .scope import OF_NO_CLASS, Composite
 from .site import call_site
 from .wiring import Child
 
@@ -32,7 +32,9 @@ class Scopes:
         here = call_site()  # for what has no position
         for path in islice(graph.composites, composites, None):
             position = graph.positions.get(path, here)
-            scope = self._known[path] = Composite(self._model, path, graph.composites[path] or path, position)
+            kind = graph.composites[path]
+            label = path if kind == OF_NO_CLASS else kind
+            scope = self._known[path] = Composite(self._model, path, label, position)
             self._enrol(path, Child([path], path.endswith("]"), scope.declaration, None, 1), position)
         for port, node in islice(graph.ports.nodes(data=True), ports, None):
             owner, _, name = port.rpartition(".")
