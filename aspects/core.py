@@ -8,6 +8,10 @@ calling ``point.forward(token)`` never, once or several times, now or (with ``de
 calling ``point.act(...)``.  Doing exactly ``point.forward(token)`` leaves no trace.
 
 Aspects at the same port apply in the order of their declaration, the first one outermost (nearest to the sender).
+An aspect acts while it is *active*: from ``from`` until ``until`` (again every ``every``), and ``when`` a condition
+over ports holds.  At other times tokens pass it untouched, and it does not learn of them.  It may look at what ports
+have sent last (``reads``, ``point.latest``), and changes nothing but what passes where it is woven.
+
 Each join point has a random stream of its own, keyed by the names of aspect and port: adding, removing or re-aiming
 an aspect moves no stream of an actor, of another aspect, or of the same aspect at another port.  An aspect should
 draw the same number of random values whatever its strength, so that runs at different strengths can be paired.
@@ -20,7 +24,8 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from epicycle.actors import Configurable, Tag, random_stream, to_nanoseconds, to_seconds
+from epicycle.actors import Configurable, EpicycleError, Parameter, Tag, random_stream, to_nanoseconds, to_seconds
+from epicycle.actors.expression import PortFormulaParameter
 
 
 class Weaver(Protocol):
@@ -37,6 +42,9 @@ class Weaver(Protocol):
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
 
+    def latest(self, port: str) -> Any:
+        """What an output port has sent last; None if it has sent nothing yet."""
+
     def note(self, aspect: str, port: str, event: str, token: Any) -> None:
         """Write an act of an aspect into the event log."""
 
@@ -44,16 +52,26 @@ class Weaver(Protocol):
 class JoinPoint:
     """One port that an aspect stands at.
 
-    ``counts`` holds how often each event happened here; ``memory`` belongs to the aspect, for what it must remember
-    about this port between tokens.
+    ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for what it must remember
+    about this port between tokens; ``shared`` is one for all its ports.  ``place`` is the connection, for an aspect
+    that stands on one connection to the port alone.
     """
 
-    def __init__(self, aspect: str, port: str, weaver: Weaver, forward: Callable[[Any], None]) -> None:
+    def __init__(
+        self,
+        aspect: str,
+        port: str,
+        weaver: Weaver,
+        forward: Callable[[Any], None],
+        shared: dict[Any, Any] | None = None,
+        place: str = "",
+    ) -> None:
         self.aspect = aspect
         self.port = port
         self.counts: dict[str, int] = {}
         self.memory: dict[Any, Any] = {}
-        self.random: np.random.Generator = random_stream(weaver.seed, port, f"aspect {aspect}")
+        self.shared: dict[Any, Any] = {} if shared is None else shared
+        self.random: np.random.Generator = random_stream(weaver.seed, place or port, f"aspect {aspect}")
         self._weaver = weaver
         self._forward = forward
 
@@ -66,6 +84,15 @@ class JoinPoint:
     def now(self) -> float:
         """The present time in seconds."""
         return to_seconds(self._weaver.tag.time)
+
+    @property
+    def owner(self) -> str:
+        """The path of the actor or composite whose port this is."""
+        return self.port.rpartition(".")[0]
+
+    def latest(self, port: str) -> Any:
+        """What an output port that the aspect ``reads`` has sent last; None if it has sent nothing yet."""
+        return self._weaver.latest(port)
 
     def forward(self, token: Any, delay: float | None = None) -> None:
         """Let a token pass, at once or after ``delay`` seconds (0 is the next microstep)."""
@@ -93,6 +120,40 @@ class Aspect(Configurable):
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled"})
     stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
     events: ClassVar[tuple[str, ...]] = ()
+
+    from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")
+    until: Parameter[float | None] = Parameter(float, None, min=0.0, unit="s", doc="active before this time alone")
+    every: Parameter[float | None] = Parameter(
+        float, None, min=1e-9, unit="s", doc="active again after this time, and again: a period of on and off"
+    )
+    when = PortFormulaParameter(
+        None, doc="active while this expression over ports is true, such as main.state.position[0] < 20"
+    )
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        if self.until is not None and self.until <= self.from_:
+            raise EpicycleError(f"it is never active: until {self.until:g} s is not after from {self.from_:g} s")
+        if self.every is not None and (self.until is None or self.every < self.until - self.from_):
+            wanted = "a time 'until' as well" if self.until is None else "at least the time from 'from' to 'until'"
+            raise EpicycleError(f"every {self.every:g} s needs {wanted}")
+
+    def is_due(self, time: int) -> bool:
+        """Whether ``from``, ``until`` and ``every`` let it act at this time (ns)."""
+        start = to_nanoseconds(self.from_)
+        if time < start or self.until is None:
+            return time >= start
+        length = to_nanoseconds(self.until) - start
+        return (time - start if self.every is None else (time - start) % to_nanoseconds(self.every)) < length
+
+    @property
+    def is_always_active(self) -> bool:
+        """Whether there is no time and no state in which it does not act."""
+        return self.from_ == 0.0 and self.until is None and self.when is None
+
+    def reads(self) -> tuple[str, ...]:
+        """Patterns of the output ports that it looks at."""
+        return ()
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         """Decide what becomes of a token at a join point."""

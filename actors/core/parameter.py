@@ -79,16 +79,20 @@ class Parameter(Generic[T]):
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
+        self.name = name.rstrip("_")  # `from_` is the parameter 'from': keywords of Python are no names in it
 
     @overload
     def __get__(self, instance: None, owner: type) -> Parameter[T]: ...
     @overload
     def __get__(self, instance: object, owner: type) -> T: ...
     def __get__(self, instance: object | None, owner: type) -> Parameter[T] | T:
-        # Values live in the instance's __dict__, which Python looks up before this; only the class gets here.
+        # Values live in the instance's __dict__, which Python looks up before this; only the class gets here, and a
+        # parameter that is named like a keyword.
         if instance is None:
             return self
+        if self.name in instance.__dict__:
+            value: T = instance.__dict__[self.name]
+            return value
         raise AttributeError(f"{owner.__name__}.{self.name} is read before it was set")
 
     @property
@@ -237,7 +241,7 @@ class Configurable:
     """Something with declared parameters: actors, aspects and the parts that they are made of."""
 
     # Names that the YAML uses beside parameters, which no parameter may take.
-    reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority"})
+    reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
 
     def __init__(self, **values: object) -> None:
         declared = declared_parameters(type(self))
@@ -275,9 +279,9 @@ def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
         return known
     found: dict[str, Parameter[Any]] = {}
     for base in reversed(cls.__mro__):
-        for name, value in vars(base).items():
+        for value in vars(base).values():
             if isinstance(value, Parameter):
-                found[name] = value
+                found[value.name] = value
     return _declared.setdefault(cls, types.MappingProxyType(found))
 
 

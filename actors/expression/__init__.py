@@ -2,6 +2,7 @@
 
 from .evaluation import evaluate, interpolate, names_in
 from .formula import Formula, FormulaParameter, operand
+from .port_formula import PortFormula, PortFormulaParameter
 from .syntax import ExpressionError
 from .values import CONSTANTS, FUNCTIONS
 
@@ -11,6 +12,8 @@ __all__ = [
     "ExpressionError",
     "Formula",
     "FormulaParameter",
+    "PortFormula",
+    "PortFormulaParameter",
     "evaluate",
     "interpolate",
     "names_in",

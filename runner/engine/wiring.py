@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag
+from epicycle.actors.expression import operand
 from epicycle.aspects import JoinPoint
 
-from ..model import Hop, Model, WovenAspect
-from .director import ActorError, Director, describe
+from ..model import Hop, Model, WovenAspect, value_at
+from .director import ActorError, Director, LoopError, describe
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog
 
@@ -30,9 +32,16 @@ class Wiring:
         self._listeners = listeners
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
+        self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
+        self._shared: dict[str, dict[Any, Any]] = {woven.name: {} for woven in model.aspects}
+        self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
         for woven in model.aspects:
             for path in woven.ports:
                 self._woven_at.setdefault(path, []).append(woven)
+            for connection in woven.connections:
+                self._woven_on.setdefault(connection, []).append(woven)
+        for path in dict.fromkeys(path for woven in model.aspects for path in woven.looks_at):
+            listeners.setdefault(path, []).append(partial(self._latest.__setitem__, path))
         self._directors: dict[str, Director | LocalDirector] = {}
         self._passages: dict[str, Passage] = {}
         for composite, clock in self.graph.clocks.items():
@@ -133,6 +142,8 @@ class Wiring:
             onward = passage.lane(channel, self._woven(far, onward))
         else:
             onward = self._woven(far, onward)
+        for woven in reversed(self._woven_on.get((hop.source, far), [])):
+            onward = self._through(woven, far, onward, f"{hop.source} -> {far}")
         return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
 
     def _put(self, port: InputPort[Any], channel: int) -> Deliver:
@@ -149,25 +160,48 @@ class Wiring:
             onward = self._through(woven, path, onward)
         return onward
 
-    def _through(self, woven: WovenAspect, path: str, onward: Deliver) -> Deliver:
-        point, pass_token = self._point(woven.name, path, onward), woven.aspect.pass_token
+    def _through(self, woven: WovenAspect, path: str, onward: Deliver, place: str = "") -> Deliver:
+        """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
+        point, pass_token = self._point(woven.name, path, onward, place or path), woven.aspect.pass_token
 
         def through(token: Any) -> None:
             try:
                 pass_token(token, point)
-            except EpicycleError:
+            except (ActorError, LoopError):  # of what comes behind it
                 raise
             except Exception as error:
-                raise ActorError(
-                    f"aspect {woven.name}", self.director.tag, f"pass_token() at {path}", describe(error)
-                ) from error
+                raise self._error(woven, f"pass_token() at {path}", error) from error
 
-        return through
+        if woven.aspect.is_always_active:
+            return through
 
-    def _point(self, name: str, path: str, onward: Deliver) -> JoinPoint:
-        loom = Loom(self.director_of(self.graph.owner(path)), self.director, self.log)
-        point = JoinPoint(name, path, loom, onward)
-        first = self._points_at.setdefault((name, path), point)
+        def through_if_active(token: Any) -> None:
+            if woven.aspect.is_due(point.tag.time) and self._holds(woven):
+                through(token)
+            else:
+                onward(token)
+
+        return through_if_active
+
+    def _holds(self, woven: WovenAspect) -> bool:
+        """Whether the ``when`` of an aspect is true of what the ports have sent last; before they have, it is not."""
+        if woven.aspect.when is None:
+            return True
+        if any(port not in self._latest for port, _ in woven.condition):
+            return False
+        try:
+            values = [operand(value_at(self._latest[port], fields)) for port, fields in woven.condition]
+            return bool(woven.aspect.when(values))
+        except EpicycleError as error:
+            raise self._error(woven, "when", error) from None
+
+    def _error(self, woven: WovenAspect, doing: str, error: Exception) -> ActorError:
+        return ActorError(f"aspect {woven.name}", self.director.tag, doing, describe(error))
+
+    def _point(self, name: str, path: str, onward: Deliver, place: str) -> JoinPoint:
+        loom = Loom(self.director_of(self.graph.owner(path)), self.director, self.log, self._latest)
+        point = JoinPoint(name, path, loom, onward, self._shared[name], place)
+        first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)
         else:  # another connection of the same port: one stream, one memory
@@ -178,8 +212,11 @@ class Wiring:
 class Loom:
     """What the engine offers to a join point: the time of the director that it stands under, and the log."""
 
-    def __init__(self, local: Director | LocalDirector, director: Director, log: EventLog) -> None:
+    def __init__(
+        self, local: Director | LocalDirector, director: Director, log: EventLog, latest: dict[str, Any]
+    ) -> None:
         self.seed = director.seed
+        self.latest = latest.get
         self.later = local.later
         self._local = local
         self._director = director

@@ -8,7 +8,7 @@ from keyword import iskeyword
 from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 
-from .document import Entry, Mapping, Node, Scalar
+from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import Position, did_you_mean
 from .reading import NAME, NodeReader, Text, inside, split
 
@@ -33,6 +33,7 @@ DIRECTOR_KEYS = ("start", "drift")
 PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
 PORT_KEYS = ("type", "doc")
 CONNECTION_KEYS = ("from", "to", "all", "delay")
+POINTCUT_KEYS = ("type", "tag", "port")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
 METRIC_KEYS = ("of", "take", "unit", "doc")
 
@@ -64,6 +65,28 @@ class PortText:
 
 
 @dataclass
+class PointcutText:
+    """Where an aspect stands: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
+
+    One that holds none of these is misshapen, and has been told so.
+    """
+
+    text: str
+    position: Position
+    exclude: bool = False
+    type: Text | None = None
+    tag: Text | None = None
+    port: Text | None = None
+
+    @classmethod
+    def of(cls, text: Text) -> PointcutText:
+        """``pattern``, or ``!pattern`` for where an aspect does not stand."""
+        pattern = text.text.strip()
+        exclude = pattern.startswith("!")
+        return cls(pattern[1:].strip() if exclude else pattern, text.position, exclude)
+
+
+@dataclass
 class PartText:
     """An actor, aspect or figure: a type and values for its parameters.
 
@@ -75,10 +98,11 @@ class PartText:
     type: Text
     values: dict[str, Entry] = field(default_factory=dict)
     count: Node | None = None
-    at: list[Text] = field(default_factory=list)
+    at: list[PointcutText] = field(default_factory=list)
     enabled: Node | None = None
     priority: Node | None = None
     removes: bool = False  # it takes the inherited part of that name away
+    tags: list[Text] = field(default_factory=list)
 
 
 @dataclass
@@ -319,12 +343,34 @@ class DeclarationReader(NodeReader):
             for key in ("count", "priority"):
                 if key in values:
                     setattr(part, key, values.pop(key).value)
+            if "tags" in values:
+                part.tags = self.texts(values.pop("tags").value, "tags")
         if kind == "aspect":
             if "at" in values:
-                part.at = self.texts(values.pop("at").value, "at")
+                part.at = self.pointcuts(values.pop("at").value)
             if "enabled" in values:
                 part.enabled = values.pop("enabled").value
         return part
+
+    def pointcuts(self, node: Node) -> list[PointcutText]:
+        """A pattern, ``!pattern``, ``{type: ..., port: ...}`` or ``{tag: ..., port: ...}``, or a list of these."""
+        found = []
+        for item in node.items if isinstance(node, Sequence) else (node,):
+            if not isinstance(item, Mapping):
+                found += [PointcutText.of(text) for text in self.texts(item, "at")]
+                continue
+            entries = self.entries(item, "a pointcut", POINTCUT_KEYS) or {}
+            chosen = PointcutText("", item.position)
+            found.append(chosen)
+            if ("type" in entries) == ("tag" in entries):
+                self.problems.add(
+                    "a pointcut chooses by type or by tag", item.position, "write {type: ..., port: ...} or {tag: ...}"
+                )
+                continue
+            for key, entry in entries.items():
+                if (text := self.text(entry.value, f"{key} of a pointcut")) is not None:
+                    setattr(chosen, key, Text(text, entry.value.position))
+        return found
 
     def connection(self, node: Node) -> ConnectionText | None:
         """``a.out -> b.in``, ``a[*].out => b[*].in``, ``{from: ..., to: ..., delay: ...}`` or ``{remove: ...}``."""

@@ -35,7 +35,7 @@ from .port_types import PortTypeError, read_type, token_types
 from .problems import Position, Problems, did_you_mean, nearest
 from .settings import Setting, Settings
 from .values import Values
-from .weave import WovenAspect, select_ports
+from .weave import Weaving, WovenAspect
 from .wiring import Child, Wiring
 
 _INDEX = re.compile(r"\[\d+\]")
@@ -312,6 +312,8 @@ class Elaborator:
             scope = {**names, "index": index} if part.count is not None else names
             child.paths.append(instance)
             self._prioritise(instance, composite, inner, part, scope)
+            if part.tags:
+                self.graph.tags[instance] = tuple(tag.text for tag in part.tags)
             if inner is not None:
                 self._composite(instance, inner, part, scope, within)
             elif actor_type is not None:
@@ -457,12 +459,18 @@ class Elaborator:
                 scope=scope,
             )
         self.graph.positions[f"aspect {name}"] = part.position
-        ports = select_ports(self.graph, all_ports, name, cls, scope, part.at, self.problems)
-        if self._is_enabled(name, scope, part, names) and values is not None:
-            try:
-                self.aspects.append(WovenAspect(name, cls(**values), ports))
-            except (EpicycleError, ValueError) as error:
-                self.problems.add(f"aspect {name}: {error}", part.position, scope=scope)
+        weaving = Weaving(self.graph, all_ports, name, cls, scope, self.problems)
+        try:
+            aspect = None if values is None else cls(**values)
+        except (EpicycleError, ValueError) as error:
+            self.problems.add(f"aspect {name}: {error}", part.position, scope=scope)
+            aspect = None
+        if aspect is None:
+            weaving.select(part.at)  # for what is wrong with it
+            return
+        woven = weaving.weave(aspect, part.at, part.values["when"].value.position if "when" in part.values else None)
+        if self._is_enabled(name, scope, part, names):
+            self.aspects.append(woven)
 
     def _is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
         if part.enabled is None:

@@ -59,6 +59,7 @@ class ModelGraph:
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
         self.priorities: dict[str, int] = {}
         self.positions: dict[str, Position] = {}  # also of "aspect NAME", "metric NAME" and "stop_when"
+        self.tags: dict[str, tuple[str, ...]] = {}  # what the model's author put on actors and composites
         self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
         self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
         self.is_wired = True  # whether every connection that the model declares has been made

@@ -81,6 +81,9 @@ class PathIndex:
     def __iter__(self) -> Iterator[str]:
         return iter(self._place)
 
+    def __contains__(self, path: object) -> bool:
+        return path in self._place
+
     def select(self, pattern: str) -> list[str]:
         """The paths that the pattern selects, in their order; raises ``PatternError``."""
         if "*" not in pattern:

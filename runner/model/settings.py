@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .declarations import ModelText, PartText
+from .declarations import ModelText, PartText, PointcutText
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, read
 from .patterns import PatternError, matches
 from .problems import Position, Problems, did_you_mean
@@ -161,7 +161,7 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
         return
     name = name.strip()
     values: dict[str, Entry] = {}
-    at: list[Text] | None = None
+    at: list[PointcutText] | None = None
     for part, (_, end) in zip(parts[1:], places[1:], strict=True):
         key, equals, value = part.partition("=")
         key = key.strip()
@@ -188,7 +188,7 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
     text.root.aspects[name] = PartText(name, position, Text(parts[0], position), values, None, at, enabled)
 
 
-def _pointcuts(value: str, option: str, offset: int) -> list[Text]:
+def _pointcuts(value: str, option: str, offset: int) -> list[PointcutText]:
     """``port`` or ``[port, port]``, read without YAML, to which ``[observer[*].plan]`` would be a broken list."""
     if value.startswith("[") and value.endswith("]"):
         value, offset = value[1:-1], offset + 1
@@ -196,5 +196,5 @@ def _pointcuts(value: str, option: str, offset: int) -> list[Text]:
     for start, end in split(value, ","):
         text = value[start:end].strip(" '\"")
         column = offset + start + value[start:end].find(text) + 1
-        found.append(Text(text, Position("command line", 1, column, max(1, len(text)), option)))
+        found.append(PointcutText.of(Text(text, Position("command line", 1, column, max(1, len(text)), option))))
     return found

@@ -1,66 +1,228 @@
-"""From aspect declarations to aspects that stand at ports."""
+"""From aspect declarations to aspects that stand at ports and connections.
+
+A pointcut is a pattern of ports (``observer[*].plan_in``), of a connection (``a.out -> b.in``), or a choice by the
+type of an actor or composite, or by a tag that the model's author put on it, with the name of a port.  What a pattern
+with a ``!`` before it selects is left out again.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
 
 from epicycle.aspects import Aspect
 
+from .declarations import PointcutText
 from .graph import ModelGraph
-from .patterns import PathIndex, PatternError
-from .problems import Problems, nearest
+from .patterns import PathIndex, PatternError, matches
+from .problems import Position, Problems, did_you_mean, nearest
 from .reading import Text
+
+Reading = tuple[str, tuple[str, ...]]  # an output port, and the fields that lead to a part of its token
 
 
 @dataclass
 class WovenAspect:
-    """An aspect of a model and the ports at which it stands, in the graph's order."""
+    """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
+
+    ``condition`` are the readings of its ``when``, ``reads`` the ports that it looks at otherwise.
+    """
 
     name: str
     aspect: Aspect
     ports: list[str]
+    connections: list[tuple[str, str]] = field(default_factory=list)
+    condition: list[Reading] = field(default_factory=list)
+    reads: list[str] = field(default_factory=list)
+
+    @property
+    def looks_at(self) -> list[str]:
+        """All ports whose latest tokens it needs to know."""
+        return [*self.reads, *(port for port, _ in self.condition)]
 
 
-def select_ports(
-    graph: ModelGraph,
-    ports: PathIndex,
-    name: str,
-    aspect: type[Aspect],
-    scope: str,
-    pointcuts: list[Text],
-    problems: Problems,
-) -> list[str]:
-    """The ports that the pointcuts of an aspect select; a pointcut that selects none is a problem.
+class Weaving:
+    """Finds the places of one aspect; ``scope`` is the composite that declares it, to which its names are relative."""
 
-    ``ports`` is the index of all ports; ``scope`` is the composite in which the aspect is declared, whose inside its
-    pointcuts are relative to.
-    """
-    chosen: dict[str, None] = {}
-    for pointcut in pointcuts:
-        full = f"{scope}.{pointcut.text}" if scope else pointcut.text
+    def __init__(
+        self, graph: ModelGraph, ports: PathIndex, name: str, cls: type[Aspect], scope: str, problems: Problems
+    ) -> None:
+        self.graph = graph
+        self.ports = ports
+        self.name = name
+        self.cls = cls
+        self.scope = scope
+        self.problems = problems
+
+    def weave(self, aspect: Aspect, pointcuts: list[PointcutText], when: Position | None) -> WovenAspect:
+        """The aspect with its places and all that it looks at; a pointcut that selects nothing is a problem.
+
+        ``when`` is where its condition stands in the model file.
+        """
+        woven = WovenAspect(self.name, aspect, self.select(pointcuts))
+        woven.connections = self._select_connections(pointcuts)
+        if aspect.when is not None:
+            woven.condition = [self._reading(reference, when) for reference in aspect.when.references]
+        chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
+        woven.reads = self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
+        return woven
+
+    def select(self, pointcuts: list[PointcutText]) -> list[str]:
+        """The ports that the pointcuts select."""
+        of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
+        chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
+        chosen -= {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
+        return self.ports.in_order(chosen)
+
+    def _of(self, pointcut: PointcutText) -> list[str]:
+        """The ports at which the aspect can stand, of those that one pointcut selects."""
+        found: list[str] | None = None
+        if pointcut.text:
+            found = self._matching(pointcut)
+        elif pointcut.type is not None or pointcut.tag is not None:
+            found = self._chosen(pointcut)
+        if found is None:
+            return []
+        fitting = [port for port in found if self.graph.direction(port) in self.cls.stands_at]
+        if found and not fitting:
+            self._problem(
+                f"{self.cls.__name__} stands at {' or '.join(sorted(self.cls.stands_at))} ports, "
+                f"but {found[0]} is an {self.graph.direction(found[0])} port",
+                pointcut,
+            )
+        return fitting
+
+    def _matching(self, pointcut: PointcutText) -> list[str] | None:
+        """What a pattern selects."""
+        full = self._full(pointcut.text)
         try:
-            found = ports.select(full)
+            found = self.ports.select(full)
         except PatternError as error:
-            problems.add(f"aspect {name}: {pointcut.text!r} is no pointcut: {error}", pointcut.position, scope=scope)
-            continue
-        fitting = [port for port in found if graph.direction(port) in aspect.stands_at]
-        if not found and not graph.is_excused(full):
-            close = nearest(full, [path for path in ports if graph.direction(path) in aspect.stands_at])
-            problems.add(
-                f"aspect {name}: {pointcut.text!r} matches no port" + (f", did you mean {close!r}?" if close else ""),
-                pointcut.position,
-                _valid_ends(full, ports),
-                scope=scope,
+            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
+            return None
+        if not found and not self.graph.is_excused(full):
+            close = nearest(full, [path for path in self.ports if self.graph.direction(path) in self.cls.stands_at])
+            near = f", did you mean {close!r}?" if close else ""
+            self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, _valid_ends(full, self.ports))
+        return found
+
+    def _chosen(self, pointcut: PointcutText) -> list[str] | None:
+        """The ports of the actors and composites of a type, or with a tag."""
+        graph = self.graph
+        kinds = {path: type(actor).__name__ for path, actor in graph.actors.items()} | graph.composites
+        inside = [path for path in kinds if not self.scope or path.startswith(f"{self.scope}.")]
+        if pointcut.type is not None:
+            owners = {path for path in inside if kinds[path] == pointcut.type.text}
+            asked, known = f"actor of type {pointcut.type.text!r}", {kinds[path] for path in inside}
+            wanted = pointcut.type
+        else:
+            assert pointcut.tag is not None
+            wanted = pointcut.tag
+            owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
+            asked = f"actor with the tag {wanted.text!r}"
+            known = {tag for path in inside for tag in graph.tags.get(path, ())}
+        if not owners:
+            what = "types" if pointcut.type is not None else "tags"
+            self._problem(
+                f"there is no {asked}{did_you_mean(wanted.text, sorted(known))}",
+                wanted,
+                f"{what} in it: {', '.join(sorted(known)) or 'none'}",
             )
-        elif found and not fitting:
-            problems.add(
-                f"aspect {name}: {aspect.__name__} stands at {' or '.join(sorted(aspect.stands_at))} ports, "
-                f"but {found[0]} is an {graph.direction(found[0])} port",
-                pointcut.position,
-                scope=scope,
+            return None
+        ports = [path for path in self.ports if graph.owner(path) in owners]
+        if pointcut.port is None:
+            return [path for path in ports if graph.direction(path) in self.cls.stands_at]
+        found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
+        if not found:
+            names = sorted({path.rpartition(".")[2] for path in ports})
+            self._problem(
+                f"no {asked} has a port {pointcut.port.text!r}{did_you_mean(pointcut.port.text, names)}",
+                pointcut.port,
+                f"their ports: {', '.join(names) or 'none'}",
             )
-        chosen.update(dict.fromkeys(fitting))
-    return ports.in_order(chosen)
+            return None
+        return found
+
+    def _select_connections(self, pointcuts: list[PointcutText]) -> list[tuple[str, str]]:
+        """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
+        chosen: dict[tuple[str, str], None] = {}
+        for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
+            if "->" not in pointcut.text:
+                continue
+            if "input" not in self.cls.stands_at:
+                self._problem(f"{self.cls.__name__} stands at output ports, not on connections", pointcut)
+                continue
+            left, _, right = (part.strip() for part in pointcut.text.partition("->"))
+            try:
+                found = [
+                    (hop.source, hop.destination)
+                    for *_, hop in self.graph.ports.edges(data="hop")
+                    if matches(self._full(left), hop.source) and matches(self._full(right), hop.destination)
+                ]
+            except PatternError as error:
+                self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
+                continue
+            if not found and not (self.graph.is_excused(self._full(left)) or self.graph.is_excused(self._full(right))):
+                known = [f"{hop.source} -> {hop.destination}" for *_, hop in self.graph.ports.edges(data="hop")]
+                self._problem(
+                    f"{pointcut.text!r} matches no connection"
+                    f"{did_you_mean(f'{self._full(left)} -> {self._full(right)}', known)}",
+                    pointcut,
+                )
+            for connection in found:
+                if pointcut.exclude:
+                    chosen.pop(connection, None)
+                else:
+                    chosen[connection] = None
+        return list(chosen)
+
+    def _reading(self, reference: str, position: Position | None) -> Reading:
+        """The port that a dotted name in ``when`` begins with, and the fields that follow."""
+        parts = self._full(reference).split(".")
+        outputs = [path for path in self.ports if self.graph.direction(path) == "output"]
+        for length in range(len(parts), 1, -1):
+            port = ".".join(parts[:length])
+            if port in self.ports and self.graph.direction(port) == "output":
+                fields = tuple(parts[length:])
+                self._check_fields(reference, port, fields, position)
+                return port, fields
+        if self._full(reference) in self.ports:
+            self._problem(f"when: {reference} is an input port, but an output port is needed", position)
+        else:
+            close = nearest(self._full(reference), outputs)
+            near = f", did you mean {close!r}?" if close else ""
+            self._problem(f"when: {reference!r} names no output port{near}", position)
+        return reference, ()
+
+    def _check_fields(self, reference: str, port: str, fields: tuple[str, ...], position: Position | None) -> None:
+        """Whether the tokens of a port have the field, where their type tells."""
+        for source in self.graph.source_of(port) if fields else ():
+            if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
+                names = [each.name for each in dataclasses.fields(source.type)]
+                if fields[0] not in names:
+                    self._problem(
+                        f"when: {reference}: {source.type.__name__} has no field {fields[0]!r}"
+                        f"{did_you_mean(fields[0], names)}",
+                        position,
+                        f"its fields: {', '.join(names)}",
+                    )
+                return
+
+    def _full(self, text: str) -> str:
+        return f"{self.scope}.{text}" if self.scope else text
+
+    def _problem(self, message: str, where: PointcutText | Text | Position | None, *hints: str) -> None:
+        position = where.position if isinstance(where, (PointcutText, Text)) else where
+        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
+
+
+def value_at(token: Any, fields: Iterable[str]) -> Any:
+    """A part of a token; None where there is no such part."""
+    for name in fields:
+        token = token.get(name) if isinstance(token, dict) else getattr(token, name, None)
+    return token
 
 
 def _valid_ends(pattern: str, ports: PathIndex) -> str:
