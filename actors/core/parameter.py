@@ -274,14 +274,14 @@ _declared: WeakKeyDictionary[type, Mapping[str, Parameter[Any]]] = WeakKeyDictio
 
 
 def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
-    """The parameters of a class by name, those of its bases first."""
+    """The parameters of a class by name, its own before those of its bases."""
     if (known := _declared.get(cls)) is not None:  # asked for every instance of a class
         return known
     found: dict[str, Parameter[Any]] = {}
-    for base in reversed(cls.__mro__):
+    for base in cls.__mro__:
         for value in vars(base).values():
             if isinstance(value, Parameter):
-                found[value.name] = value
+                found.setdefault(value.name, value)
     return _declared.setdefault(cls, types.MappingProxyType(found))
 
 

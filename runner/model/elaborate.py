@@ -459,6 +459,7 @@ class Elaborator:
                 scope=scope,
             )
         self.graph.positions[f"aspect {name}"] = part.position
+        is_enabled = self._is_enabled(name, scope, part, names)
         weaving = Weaving(self.graph, all_ports, name, cls, scope, self.problems)
         try:
             aspect = None if values is None else cls(**values)
@@ -469,7 +470,7 @@ class Elaborator:
             weaving.select(part.at)  # for what is wrong with it
             return
         woven = weaving.weave(aspect, part.at, part.values["when"].value.position if "when" in part.values else None)
-        if self._is_enabled(name, scope, part, names):
+        if is_enabled:
             self.aspects.append(woven)
 
     def _is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:

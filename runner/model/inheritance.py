@@ -4,8 +4,8 @@ What a class says comes on top of what its base says, name by name:
 
 - a parameter or port of the base's stays; the keys that are given anew (a default, a bound, a type) replace the old;
 - an actor or aspect with the same ``type``, or none, keeps its values but for those given anew; another ``type`` drops
-  the old values and keeps its place: ``count``, ``priority``, ``at``, ``enabled``; ``name: null`` takes it away, with
-  the base's connections to it and the pointcuts at it;
+  the old values and keeps its place: ``count``, ``priority``, ``at``, ``enabled``, ``tags``; ``name: null`` takes it
+  away, with the base's connections to it and the pointcuts at it;
 - connections are added; ``remove: a.out -> b.in`` takes one of the base's away.
 """
 
@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
-from .declarations import CompositeText, ConnectionText, PartText, PortText
+from .declarations import CompositeText, ConnectionText, PartText, PointcutText, PortText
 from .problems import Position, Problems, did_you_mean
 from .reading import Text
 
@@ -169,6 +169,7 @@ class _Heir:
                     priority=part.priority or before.priority,
                     at=part.at or before.at,
                     enabled=part.enabled or before.enabled,
+                    tags=part.tags or before.tags,
                 )
         return parts
 
@@ -218,7 +219,7 @@ def _pairs(connection: ConnectionText) -> list[tuple[str, str]]:
     return [(source.text, end.text) for source in connection.sources for end in connection.destinations]
 
 
-def _head(text: Text) -> str:
+def _head(text: Text | PointcutText) -> str:
     """The actor that an endpoint or pointcut names first; nothing for an own port."""
     first, dot, _ = text.text.partition(".")
     return first.partition("[")[0] if dot else ""

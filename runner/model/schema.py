@@ -37,7 +37,9 @@ _LIST = rf"[\s,]*{_ENDPOINT}(\s*,[\s,]*{_ENDPOINT})*[\s,]*"
 _SIDE = rf"(\s*\[{_LIST}\]\s*|{_LIST})"
 CONNECTION = f"^{_SIDE}(->|=>){_SIDE}$"
 _SEGMENT = rf"(\*\*|(\*|{NAME})(\[(\*|[0-9]{{1,9}})\])?)"
-PATTERN = rf"^{_SEGMENT}(\.{_SEGMENT})*$"
+_PATH = rf"{_SEGMENT}(\.{_SEGMENT})*"
+PATTERN = f"^{_PATH}$"
+POINTCUT = rf"^\s*!?\s*{_PATH}(\s*->\s*{_PATH})?\s*$"
 
 TEXT: Schema = {"type": ["string", "number", "boolean", "null"]}
 
@@ -58,6 +60,9 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         },
         "ports": {"anyOf": [_ref("port"), {"type": "array", "items": _ref("port"), "minItems": 1}]},
         "patterns": _one_or_more(_PATTERN),
+        "pointcuts": _one_or_more(
+            {"anyOf": [_POINTCUT_TEXT, {**_mapping(language.POINTCUT_KEYS, _POINTCUT, None), "type": "object"}]}
+        ),
         "parameter": _parameter_declaration(),
         "connection": _connection(),
         "metric": _metric(),
@@ -140,6 +145,10 @@ _PATTERN: Schema = {
     "type": "string",
     **_text(PATTERN, "expected a port as a dotted path; * is one segment, name[*] all of an array, ** any segments"),
 }
+_POINTCUT_TEXT: Schema = {
+    "type": "string",
+    **_text(POINTCUT, "expected ports as a pattern, a connection 'a.out -> b.in', or one of these after a !"),
+}
 _FLAG: Schema = {"type": ["boolean", "string"], **_text(EXPRESSION, "expected true or false")}
 _BODY: dict[str, tuple[Schema, str]] = {
     "model": (_ref("name"), "The name of the model."),
@@ -201,6 +210,11 @@ _PORT: dict[str, tuple[Schema, str]] = {
     "type": (_ref("text"), "What travels through it, such as float, 'float | int', array[2] or a token class."),
     "doc": (_ref("text"), "What it is."),
 }
+_POINTCUT: dict[str, tuple[Schema, str]] = {
+    "type": (_ref("text"), "The type of the actors and composites at whose ports it stands."),
+    "tag": (_ref("text"), "A tag of the actors and composites at whose ports it stands."),
+    "port": (_ref("text"), "The name of the port; none: all ports where it can stand."),
+}
 _METRIC: dict[str, tuple[Schema, str]] = {
     "of": (_PATTERN, "The output port (or a pattern for several)."),
     "take": ({"enum": list(language.REDUCTIONS)}, "What is taken from the numbers that it sends (default: last)."),
@@ -214,7 +228,11 @@ _BESIDE: dict[str, tuple[Schema, str]] = {
         _number("integer"),
         "Of two actors that could fire at the same tag and depth, the smaller one is first.",
     ),
-    "at": (_ref("patterns"), "The ports that it stands at, as patterns."),
+    "at": (
+        _ref("pointcuts"),
+        "Where it stands: patterns of ports, 'a.out -> b.in', {type, port} or {tag, port}; !pattern leaves out.",
+    ),
+    "tags": (_one_or_more(_ref("text")), "Names by which aspects can choose it: 'at: {tag: ...}'."),
     "enabled": (_FLAG, "Whether it does anything (default: true)."),
 }
 # A key of the language that is missing here is allowed to hold anything; a test says so.
@@ -227,6 +245,7 @@ RULES = {
     "PARAMETER_KEYS": _PARAMETER,
     "CONNECTION_KEYS": _CONNECTION,
     "PORT_KEYS": _PORT,
+    "POINTCUT_KEYS": _POINTCUT,
     "METRIC_KEYS": _METRIC,
 }
 

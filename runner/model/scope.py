@@ -25,7 +25,7 @@ from epicycle.actors import (
 )
 from epicycle.aspects import Aspect
 
-from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PortText
+from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
 from .document import Scalar
 from .graph import Hop
 from .patterns import PathIndex
@@ -33,7 +33,7 @@ from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .reading import NAME, Text, within
 from .site import call_site, node_of
 from .values import Values
-from .weave import WovenAspect, select_ports
+from .weave import Weaving, WovenAspect
 from .wiring import Child, Wiring
 
 if TYPE_CHECKING:
@@ -399,15 +399,15 @@ class Scope:
                 problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
-            texts = []
+            pointcuts = []
             for end in _each(at):
                 path = end if isinstance(end, str) else self._known(end, position, problems)
                 if path is not None:
                     name_here = path if path is end else path.removeprefix(self._full(""))
-                    texts.append(Text(name_here, within(Text(name_here, position), name_here)))
+                    pointcuts.append(PointcutText.of(Text(name_here, within(Text(name_here, position), name_here))))
             index = PathIndex(self._model.graph.ports.nodes)
-            ports = select_ports(self._model.graph, index, full, type(aspect), self.path, texts, problems)
-        woven = WovenAspect(full, aspect, ports)
+            weaving = Weaving(self._model.graph, index, full, type(aspect), self.path, problems)
+            woven = weaving.weave(aspect, pointcuts, position)
         self._model.aspects.append(woven)
         return woven
 

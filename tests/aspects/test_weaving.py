@@ -203,7 +203,7 @@ def test_wrong_places_and_times(aspect: str, message: str) -> None:
 def test_a_condition_that_cannot_be_evaluated() -> None:
     with pytest.raises(ActorError) as caught:
         dropped("type: PacketLoss, probability: 1, at: 'twin[0].go', when: 'b.output[0] > 3'")
-    assert str(caught.value) == (
+    assert str(caught.value).partition("\n")[0] == (
         "aspect loss failed in when at (0.001 s, 1): 'b.output[0] > 3': b.output[0]: a number has no elements, "
         "with b.output = 0.0"
     )
@@ -257,7 +257,7 @@ def test_an_aspect_may_look_at_ports_and_share_a_memory() -> None:
 def test_a_failing_aspect_is_named_and_not_the_sender() -> None:
     with pytest.raises(ActorError) as caught:
         dropped("type: Bias, by: 1, fields: x, at: t.output")
-    assert str(caught.value) == (
+    assert str(caught.value).partition("\n")[0] == (
         "aspect loss failed in pass_token() at t.output at (0 s, 1): "
         "a token of type int has no fields; leave out 'fields' to alter all of it"
     )
