@@ -277,9 +277,9 @@ STEPS = "this takes more than 100,000 steps"
     ],
 )
 def test_bombs_are_refused_at_once(source: str, message: str | None) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     found, _ = fault(source)
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
     assert message in (None, found)
 
 

@@ -137,9 +137,9 @@ BOMBS = {
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_do_no_harm(name: str, tmp_path: Path) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     assert "error: " in said(BOMBS[name], tmp_path)
-    assert time.perf_counter() - started < 10
+    assert time.process_time() - started < 10
 
 
 def test_what_is_said_about_bombs(tmp_path: Path) -> None:
