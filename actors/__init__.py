@@ -85,6 +85,7 @@ from .robotics import (
     Vehicle,
 )
 from .sampling import MostRecent, Sampler, Synchronizer
+from .shop import Machine, Station
 from .sinks import Display, Histogram, Recorder, Stop, Test
 from .sources import Clock, PoissonClock, SingleEvent
 from .statistics import MovingAverage, MovingStatistics
@@ -136,6 +137,7 @@ __all__ = [
     "LogNormal",
     "LogicGate",
     "LookupTable",
+    "Machine",
     "MappingParameter",
     "MathFunction",
     "Measurement",
@@ -176,6 +178,7 @@ __all__ = [
     "Server",
     "SingleEvent",
     "Solver",
+    "Station",
     "Stop",
     "Switch",
     "Synchronizer",

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 from epicycle.actors import Configurable, Parameter, array_parameter, texts_parameter
 
 from ..engine import Results, Signal
+from ..engine.encoding import scalars
 from ..model.patterns import select
+
+COLOURS = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")
 
 
 class Figure(Configurable):
@@ -46,27 +49,18 @@ class Trajectories(Figure):
         return tuple(pattern for pattern in (*self.robots, self.obstacle, self.estimate) if pattern)
 
     def draw(self, results: Results, path: Path) -> None:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure as Canvas
-
-        canvas = Canvas()
-        FigureCanvasAgg(canvas)
-        axes = canvas.add_subplot()
+        canvas, axes = _sheet(results, 6.4, 4.8)
         robots = [results.signals[name] for pattern in self.robots for name in select(pattern, results.signals)]
         if self.obstacle:
             self._obstacle(axes, results.signals[self.obstacle])
         if self.estimate:
             self._ellipses(axes, results.signals[self.estimate])
-        colours = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")
         for index, signal in enumerate(robots):
-            self._path(axes, signal, colours[index % len(colours)], main=index == 0, legend=index < 8)
+            self._path(axes, signal, COLOURS[index % len(COLOURS)], main=index == 0, legend=index < 8)
         axes.plot(*self.goal, marker="*", markersize=15, color="#c62828", linestyle="none", label="goal", zorder=6)
         axes.set_aspect("equal")
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
-        axes.grid(color="0.9", linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.set_title(f"{results.model}, seed {results.seed}, {results.end:g} s", fontsize=10)
         axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, fontsize=8, frameon=False)
         # One metre is as long in x as in y; the sheet takes the shape of what is on it.
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
@@ -133,6 +127,105 @@ class Trajectories(Figure):
                 marks.append(index)
                 upcoming = (np.floor(time / self.interval + 1e-9) + 1) * self.interval
         return marks
+
+
+class TimeSeries(Figure):
+    """Signals over time, each number in their tokens a line."""
+
+    signals = texts_parameter(doc="which signals (patterns)")
+    style = Parameter(
+        str,
+        "steps",
+        choices=("steps", "line", "points"),
+        doc="whether a value stays until the next one, leads straight to it, or stands for its moment only",
+    )
+    label = Parameter(str, "", doc="what the vertical axis shows, with its unit; the signal's name if left out")
+    start: Parameter[float | None] = Parameter(float, None, unit="s", doc="where the time axis begins")
+    end: Parameter[float | None] = Parameter(float, None, unit="s", doc="where the time axis ends")
+
+    def signal_patterns(self) -> tuple[str, ...]:
+        return self.signals
+
+    def draw(self, results: Results, path: Path) -> None:
+        lines = {
+            f"{name}.{place}" if place else name: points
+            for name in _selected(self.signals, results)
+            for place, points in _numbers(results.signals[name]).items()
+        }
+        canvas, axes = _sheet(results, 7.0, 3.4)
+        look = {"steps": {"drawstyle": "steps-post"}, "line": {}, "points": {"linestyle": "none", "marker": "."}}
+        for index, (name, (times, values)) in enumerate(lines.items()):
+            if self.style == "steps" and times:
+                # What is over at the moment at which it comes is not seen; the last value holds to the run's end.
+                latest = {**dict(zip(times, values, strict=True)), max(results.end, times[-1]): values[-1]}
+                times, values = list(latest), list(latest.values())
+            colour = COLOURS[index % len(COLOURS)]
+            axes.plot(times, values, color=colour, linewidth=1.2, markersize=4, label=name, **look[self.style])
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel(self.label or (next(iter(lines)) if len(lines) == 1 else ""))
+        axes.set_xlim(0.0 if self.start is None and self.end is not None else self.start, self.end)
+        if len(lines) > 1:
+            axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, fontsize=8, frameon=False)
+        canvas.savefig(path, dpi=200, bbox_inches="tight")
+
+
+class Histogram(Figure):
+    """How often values of a signal come, in bins of equal width; of several signals, one over the other."""
+
+    signals = texts_parameter(doc="which signals of numbers (patterns)")
+    bins = Parameter(int, 40, min=1, max=10_000, doc="how many bins there are")
+    label = Parameter(str, "", doc="what the values are, with their unit; the signal's name if left out")
+
+    def signal_patterns(self) -> tuple[str, ...]:
+        return self.signals
+
+    def draw(self, results: Results, path: Path) -> None:
+        columns = {
+            f"{name}.{place}" if place else name: [value for value in values if np.isfinite(value)]
+            for name in _selected(self.signals, results)
+            for place, (_, values) in _numbers(results.signals[name]).items()
+        }
+        canvas, axes = _sheet(results, 6.0, 3.4)
+        everything = [value for values in columns.values() for value in values]
+        edges = np.histogram_bin_edges(everything or [0.0], self.bins)
+        for index, (name, values) in enumerate(columns.items()):
+            label = f"{name}, mean {np.mean(values):.4g}" if values else f"{name}, no values"
+            colour = COLOURS[index % len(COLOURS)]
+            axes.hist(values, edges, density=bool(values), color=colour, alpha=0.55, label=label)
+        axes.set_xlabel(self.label or (next(iter(columns)) if len(columns) == 1 else ""))
+        axes.set_ylabel("share per unit")
+        axes.legend(fontsize=8, frameon=False)
+        canvas.savefig(path, dpi=200, bbox_inches="tight")
+
+
+def _selected(patterns: tuple[str, ...], results: Results) -> list[str]:
+    """The signals that patterns select, each once."""
+    return list(dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals)))
+
+
+def _numbers(signal: Signal) -> dict[str, tuple[list[float], list[float]]]:
+    """Times and values of each number inside the tokens, by its place."""
+    found: dict[str, tuple[list[float], list[float]]] = {}
+    for tag, token in zip(signal.tags, signal.tokens, strict=True):
+        for place, value in scalars(token):
+            times, values = found.setdefault(place, ([], []))
+            times.append(tag.seconds)
+            values.append(value)
+    return found
+
+
+def _sheet(results: Results, width: float, height: float) -> tuple[Any, Any]:
+    """An empty figure of a run, sizes in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Canvas
+
+    canvas = Canvas(figsize=(width, height))
+    FigureCanvasAgg(canvas)
+    axes = canvas.add_subplot()
+    axes.grid(color="0.9", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.set_title(f"{results.model}, seed {results.seed}, {results.end:g} s", fontsize=10)
+    return canvas, axes
 
 
 def positions(signal: Signal) -> NDArray[np.float64]:

@@ -1,0 +1,190 @@
+"""The packaged demo models do what theory says, sample by sample where that can be said, else within 99 %."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.stats
+import simpy
+
+from epicycle.runner import Simulation, load_model
+from epicycle.runner.engine import Results
+from epicycle.runner.model import Problems
+from epicycle.runner.show import figures_of
+
+
+def run(name: str, seed: int = 1, until: float | None = None, keep_log: bool = False, **settings: Any) -> Results:
+    model = load_model(name, set=[f"{path}={value}" for path, value in settings.items()])
+    return Simulation(model, seed=seed, keep_log=keep_log).run(until=until)
+
+
+def interval(samples: list[float]) -> tuple[float, float]:
+    """The 99 % confidence interval of the mean of independent replications."""
+    error = scipy.stats.sem(samples) * scipy.stats.t.ppf(0.995, len(samples) - 1)
+    return float(np.mean(samples) - error), float(np.mean(samples) + error)
+
+
+def assert_within(samples: list[float], theory: float, sharpness: float) -> None:
+    """Theory lies in the interval, which is narrow enough for that to mean something."""
+    low, high = interval(samples)
+    assert low <= theory <= high
+    assert high - low < 2 * sharpness * theory
+
+
+def waits(name: str, seed: int, until: float, **settings: Any) -> float:
+    """The mean wait of a run after it has settled."""
+    wait = run(name, seed, until, **settings).signals["wait.output"]
+    return float(np.mean(wait.values[wait.times > 0.1 * until]))
+
+
+# -- queues ---------------------------------------------------------------------------------------------------------
+
+
+def test_waits_obey_lindleys_equation() -> None:
+    """Whoever comes waits for what the one before had still to wait and to be served: W' = max(0, W + S - A)."""
+    results = run("mm1", 3, 600.0, keep_log=True)
+    records = [record for record in results.log.records if record.event == "send"]
+    arrivals = [record.tag.seconds for record in records if record.actor == "customers"]
+    services = [record.value for record in records if record.actor == "service"]
+    wait, expected = 0.0, [0.0]
+    for gap, service in zip(np.diff(arrivals), services, strict=False):
+        wait = max(0.0, wait + service - gap)
+        expected.append(wait)
+    found = results.signals["wait.output"].values
+    assert len(found) > 400
+    # Services are rounded to whole nanoseconds, and the roundings of a busy period add up.
+    assert found == pytest.approx(expected[: len(found)], abs=1e-6)
+
+
+def test_number_in_the_system_is_the_integral_over_all_stays() -> None:
+    """Little's law as an identity: the area under the number is the sum of the times that customers are there."""
+    results = run("mm1", 4, 500.0, keep_log=True)
+    sends = [record for record in results.log.records if record.event == "send"]
+    comes = [record.tag.seconds for record in sends if record.actor == "customers"]
+    leaves = [record.tag.seconds for record in sends if (record.actor, record.port) == ("server", "output")]
+    last = [record for record in sends if record.actor == "customer_seconds"][-1]
+    stays = sum(leaves) + last.tag.seconds * (len(comes) - len(leaves)) - sum(comes)
+    assert last.value == pytest.approx(stays, rel=1e-9)
+
+
+def test_mm1_waits_as_long_as_theory_says() -> None:
+    load = 0.6
+    samples = [waits("mm1", seed, 1200.0, load=load) for seed in range(16)]
+    assert_within(samples, load / (1 - load), 0.2)
+
+
+@pytest.mark.parametrize(("variation", "replications"), [(0.1, 12), (2.0, 24)])
+def test_mg1_waits_as_long_as_pollaczek_and_khinchine_say(variation: float, replications: int) -> None:
+    load = 0.5
+    samples = [waits("mg1", seed, 1000.0, load=load, variation=variation) for seed in range(replications)]
+    assert_within(samples, load / (1 - load) * (1 + variation) / 2, 0.35)
+
+
+# -- SimPy's examples -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("washers", [1, 2])
+def test_car_wash_does_what_plain_simpy_does(washers: int) -> None:
+    results = run("car_wash", 7, washers=washers)
+    environment = simpy.Environment()
+    wash = simpy.Resource(environment, washers)
+    begun, done = [], []
+
+    def car(arrival: float) -> Any:
+        yield environment.timeout(arrival)
+        with wash.request() as request:
+            yield request
+            begun.append(environment.now)
+            yield environment.timeout(300.0)
+            done.append(environment.now)
+
+    arrivals = results.signals["arrival.output"].times
+    for arrival in arrivals:
+        environment.process(car(float(arrival)))
+    environment.run(until=8 * 3600 + 1e-6)
+    assert len(done) > 60
+    assert results.signals["wash.begun"].times == pytest.approx(begun, abs=1e-6)
+    assert results.signals["wash.output"].times == pytest.approx(done, abs=1e-6)
+    gaps = np.diff(arrivals[4:])
+    assert gaps.min() >= 300
+    assert gaps.max() <= 540
+
+
+def running_machines(machines: int, ratio: float) -> float:
+    """The mean number of machines that run with one repairman and repairs of one length (Ashcroft 1950).
+
+    ``ratio`` is the repair time over the mean time to failure.
+    """
+    factors = np.cumprod([1.0, *(math.expm1(k * ratio) for k in range(1, machines))])
+    repairs = sum(math.comb(machines - 1, k) * factors[k] for k in range(machines))
+    return float(machines * repairs / (1 + machines * ratio * repairs))
+
+
+def test_machine_shop_has_as_many_machines_broken_as_theory_says() -> None:
+    assert running_machines(1, 0.1) == pytest.approx(1 / 1.1)
+    # Parts do not matter for this, and take time to simulate.
+    day = 86_400.0
+    samples = [run("machine_shop", seed, 14 * day, part_time="300 min").metrics["mean_broken"] for seed in range(8)]
+    assert_within(samples, 10 - running_machines(10, 0.1), 0.15)
+
+
+def test_machines_make_parts_as_long_as_they_run() -> None:
+    results = run("machine_shop", 5, part_spread="0.001 min")
+    metrics = results.metrics
+    running = 10 - metrics["mean_broken"]
+    assert metrics["parts"] == pytest.approx(running * results.end / 600, rel=0.002)
+
+
+# -- the others -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("variation", [0.04, 1.0])
+def test_inspection_paradox(variation: float) -> None:
+    runs = [run("inspection_paradox", seed, 2 * 86_400.0, variation=variation) for seed in range(10)]
+    mean_square = 1 + variation  # E[X^2] / E[X]^2
+    assert_within([each.metrics["mean_wait"] for each in runs], 600 * mean_square / 2, 0.25)
+    assert_within([each.metrics["mean_gap_met"] for each in runs], 600 * mean_square, 0.25)
+    assert_within([each.metrics["mean_gap"] for each in runs], 600, 0.25)
+
+
+@pytest.mark.parametrize(("gain", "delay"), [(0.2, 3), (0.4, 2), (0.05, 0)])
+def test_feedback_obeys_its_difference_equation(gain: float, delay: int) -> None:
+    results = run("feedback", gain=gain, delay=f"{delay} s")
+    levels, rate = [0.0], 0.0
+    for step in range(60):
+        if step >= delay:
+            rate = gain * (1.0 - levels[step - delay])
+        levels.append(levels[-1] + rate)
+    assert results.signals["tank.level"].values == pytest.approx(levels, abs=1e-9)
+
+
+@pytest.mark.parametrize("restitution", [0.8, 0.5])
+def test_ball_bounces_when_the_closed_form_says(restitution: float) -> None:
+    results = run("bouncing_ball", bounces=12, restitution=restitution)
+    speed = math.sqrt(2 * 9.81 * 10)
+    flights = [2 * speed * restitution**k / 9.81 for k in range(1, 12)]
+    expected = speed / 9.81 + np.concatenate([[0.0], np.cumsum(flights)])
+    assert results.signals["ball.bounce"].times == pytest.approx(expected, abs=5e-9)
+    assert results.end == pytest.approx(expected[-1], abs=5e-9)
+    height = results.signals["ball.height"]
+    fall = height.times < expected[0]
+    assert height.values[fall] == pytest.approx(10 - 9.81 / 2 * height.times[fall] ** 2, abs=1e-9)
+
+
+# -- figures --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["car_wash", "feedback"])
+def test_figures_are_drawn(name: str, tmp_path: Path) -> None:
+    model = load_model(name)
+    problems = Problems()
+    figures = figures_of(model, problems)
+    assert len(problems) == 0
+    results = Simulation(model).run(until=60.0)
+    for figure, drawn in figures.items():
+        drawn.draw(results, tmp_path / f"{figure}.png")
+        assert (tmp_path / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
