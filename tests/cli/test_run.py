@@ -135,7 +135,8 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
             ("run", "colision_avoidance"),
             (
                 "error: there is no packaged model 'colision_avoidance', did you mean 'collision_avoidance'?\n"
-                "   help: packaged models: collision_avoidance; a path to a file ends in .yaml\n"
+                "   help: packaged models: bouncing_ball, car_wash, collision_avoidance, feedback, inspection_paradox, "
+                "machine_shop, mg1, mm1; a path to a file ends in .yaml\n"
             ),
         ),
         (
