@@ -70,7 +70,8 @@ def check(drawing: Drawing) -> None:
 
     for placed in drawing.boxes:
         around = boxes.get(placed.box.path.rpartition(".")[0])
-        assert not outside(area(placed), area(around) if around else sheet)
+        left, top, right, bottom = area(around) if around else sheet
+        assert not outside(area(placed), (left + 4, top + 4, right - 4, bottom - 4))
         for port in placed.ports:  # inputs on the left edge, outputs on the right one
             assert port.x == (placed.x if port.port in placed.box.inputs else placed.x + placed.width)
             assert placed.y < port.y < placed.y + placed.height
@@ -305,14 +306,17 @@ def test_instances_are_one_box_if_they_are_alike(
     assert not any(".." in name for name in names(outline(model, expand=True)))
 
 
-def test_every_pair_is_told_from_equal_indices(tmp_path: Path) -> None:
-    """The same boxes, but another wiring: that is written on the connection."""
-    equal = outline(small(tmp_path, too("{from: 'cell[*].end', to: 'cell[*].start', delay: 1 s}")))
+def test_number_of_connections_is_written_if_boxes_do_not_say_it(tmp_path: Path) -> None:
     cells = ["cell[0].end", "cell[1].end", "cell[2].end"]
-    every = outline(small(tmp_path, too(f"{{from: {cells}, to: 'cell[*].start', delay: 1 s}}")))
-    assert names(equal) == names(every)
-    written = [sorted(pill.text for pill in draw(each).pills if not pill.aspect) for each in (equal, every)]
-    assert written == [["1 s", "10 ms"], ["1 s, each to all", "10 ms"]]
+    wirings = {
+        "{from: 'cell[*].end', to: 'cell[*].start', delay: 1 s}": "1 s",
+        f"{{from: {cells}, to: 'cell[*].start', delay: 1 s}}": "1 s, each to all",
+        f"{{from: {cells * 2}, to: 'cell[*].start', delay: 1 s}}": "1 s, ×18",
+    }
+    for wiring, written in wirings.items():
+        drawn = outline(small(tmp_path, too(wiring)))
+        assert names(drawn) == ["clock: Clock", *ONE, "all: BroadcastChannel", "last: MostRecent"]
+        assert sorted(pill.text for pill in draw(drawn).pills if not pill.aspect) == sorted(["10 ms", written])
 
 
 def test_aspects_and_delays_are_written_where_they_are(tmp_path: Path) -> None:

@@ -228,7 +228,7 @@ class _Scope:
         self.boxes_at: list[float] = []
         self.trunks: dict[Run, list[Trunk]] = {}
         self.track_x: dict[Trunk, float] = {}
-        x = 0.0
+        x = 0.0 if self.layering.layers[0] or not self.box.path else MARGIN
         for number, cells in enumerate(self.layering.layers):
             before = max((self._margin(cell, cell.left) for cell in cells), default=0.0)
             after = max((self._margin(cell, cell.right) for cell in cells), default=0.0)
@@ -247,7 +247,7 @@ class _Scope:
                 self.track_x[trunk] = x + PADDING + TRACK * trunk.track
             if runs:
                 x += 2 * PADDING + TRACK * max(count - 1, 0)
-        self.width = x
+        self.width = x if self.layering.layers[-1] or not self.box.path else x + MARGIN
 
     def _margin(self, cell: Cell, pins: list[Pin]) -> float:
         """The room that a box needs on one side for badges and arrowheads."""

@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
-from epicycle.actors import InputPort, OutputPort
+from epicycle.actors import InputPort, OutputPort, PortParameter
 
 from ...model import Model
 from ...model.clock import Clock
@@ -35,14 +36,13 @@ class Port:
 class Link:
     """A connection; ``delay`` is in ns.
 
-    Between two arrays that are one box each, it stands for one connection of every pair of equal indices, or, with
-    ``each_to_all``, of every pair.
+    If it stands for several, ``count`` says how many if that is not one for each instance of the boxes at its ends.
     """
 
     source: str
     target: str
     delay: int | None
-    each_to_all: bool = False
+    count: str = ""
 
 
 @dataclass(eq=False)
@@ -256,6 +256,8 @@ class _Outliner:
         for port_path in self.ports.get(path, ()):
             port = self.graph.ports.nodes[port_path]["port"]
             is_multi = isinstance(port, InputPort | OutputPort) and port.multi
+            if not (self.graph.incoming(port_path) or port_path in self.standing) and _is_parameter(port):
+                continue
             aspects = tuple(short_name(name) for name in self.standing.get(port_path, ()))
             ports = box.inputs if self.graph.direction(port_path) == "input" else box.outputs
             ports.append(Port(port_path, port_path.rpartition(".")[2], is_multi, aspects))
@@ -276,10 +278,18 @@ class _Outliner:
         for hop in self.hops.get(path, ()):
             key = (self._shown(hop.source), self._shown(hop.destination), hop.delay)
             counts[key] = counts.get(key, 0) + 1
-        return [
-            Link(source, target, delay, count > max(self._instances(source), self._instances(target)))
-            for (source, target, delay), count in counts.items()
-        ]
+        return [Link(*key, self._how_many(path, *key[:2], count)) for key, count in counts.items()]
+
+    def _how_many(self, path: str, source: str, target: str, count: int) -> str:
+        """What to say of the number of connections that one link inside a composite stands for."""
+        one, other = [1 if _owner(port) == path else self._instances(port) for port in (source, target)]
+        if count == max(one, other):
+            return ""
+        if min(one, other) > 1 and count == one * other:
+            return "each to all"
+        if min(one, other) > 1 and count == one * (one - 1) and _owner(source) == _owner(target):
+            return "each to all others"
+        return f"×{count}"
 
     def _instances(self, port: str) -> int:
         """How many instances the box of a port stands for."""
@@ -306,7 +316,7 @@ def duration(nanoseconds: int) -> str:
 def label(link: Link) -> str:
     """What is written on a connection."""
     parts = [] if link.delay is None else [duration(link.delay)]
-    return ", ".join([*parts, "each to all"] if link.each_to_all else parts)
+    return ", ".join([*parts, link.count] if link.count else parts)
 
 
 def short_name(aspect: str) -> str:
@@ -319,6 +329,11 @@ def _clock(clock: Clock) -> str:
     parts = [f"from {duration(clock.start)}"] if clock.start else []
     parts += [f"×{float(clock.rate):g}"] if clock.rate != 1 else []
     return f", clock {' '.join(parts)}" if parts else ""
+
+
+def _is_parameter(port: Any) -> bool:
+    """Whether a port is that of a parameter, and need not be seen unless something is connected to it."""
+    return port is not None and isinstance(getattr(type(port.actor), port.name, None), PortParameter)
 
 
 def _owner(path: str) -> str:

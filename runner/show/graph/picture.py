@@ -16,14 +16,15 @@ from typing import Any
 import networkx as nx
 
 from . import text
-from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, PlacedPort, Point, Words, pill_width
+from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width
 from .outline import short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
 FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")
 ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0072B2", "#999999")
 DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
-DPI, LARGEST = (288, 144, 72), 30000  # of a PNG: whole pixels for a point; pixels that a side may have
+# Of a PNG: whole pixels for a point, so that lines are sharp; how many pixels there may be, and on one side.
+DPI, PIXELS, SIDE = (288, 144, 72), 4e7, 30000
 # What matplotlib would write into a file of its own accord: names, versions, times.
 METADATA = {
     "svg": ("Creator", "Date", "Format", "Type"),
@@ -41,7 +42,6 @@ def write_picture(drawing: Drawing, path: Path) -> None:
     legend = _legend(drawing)
     width = max([drawing.width, *(row.width + 2 * MARGIN for row in legend)])
     height = drawing.height + sum(row.height for row in legend) + (MARGIN if legend else 0.0)
-    dpi = next((dpi for dpi in DPI if max(width, height) * dpi / 72 <= LARGEST), LARGEST * 72 / max(width, height))
     kind = path.suffix.lower()[1:]
     with mpl.rc_context(), warnings.catch_warnings():
         mpl.rcdefaults()  # whatever the user's own style is
@@ -52,14 +52,22 @@ def write_picture(drawing: Drawing, path: Path) -> None:
         sheet = figure.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
         sheet.set_axis_off()
         _Painter(sheet, drawing, legend).paint()
-        figure.savefig(path, format=kind, dpi=dpi, facecolor="white", metadata=dict.fromkeys(METADATA[kind]))
+        figure.savefig(
+            path, format=kind, dpi=_resolution(width, height), facecolor="white", metadata=dict.fromkeys(METADATA[kind])
+        )
+
+
+def _resolution(width: float, height: float) -> float:
+    """The dots per inch of a PNG."""
+    most = 72 * min(SIDE / max(width, height), math.sqrt(PIXELS / (width * height)))
+    return next((dpi for dpi in DPI if dpi <= most), most)
 
 
 @dataclass
 class Row:
     """A line of the legend: a sample of something in the drawing, and what it means."""
 
-    sample: str  # aspect, label, stack, director or closed
+    sample: str  # aspect, label, port, stack, director or closed
     words: str
     explanation: str
 
@@ -89,6 +97,8 @@ def _legend(drawing: Drawing) -> list[Row]:
         delayed = [words for words in labels if words[0].isdigit()]
         if delayed:
             rows.append(Row("label", delayed[0].partition(",")[0], "delay of a connection"))
+    if any(port.port.is_multi for placed in drawing.boxes for port in placed.ports):
+        rows.append(Row("port", "", "port for any number of connections"))
     if any(box.count > 1 for box in boxes):
         rows.append(Row("stack", "", "instances that are alike"))
     if any(box.has_director for box in boxes):
@@ -121,7 +131,7 @@ class _Painter:
         self.wires()
         for placed in self.drawing.boxes:
             for port in placed.ports:
-                self.port(port)
+                self.port(port.x, port.y, INK if port.is_joined else FAINT, port.port.is_multi)
         for words in self.drawing.words:
             self.words(words)
         for pill in self.drawing.pills:
@@ -152,21 +162,23 @@ class _Painter:
         from matplotlib.patches import FancyBboxPatch
 
         style = "round,pad=0,rounding_size=3"
-        self.sheet.add_patch(FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, linewidth=1.0))
+        self.sheet.add_artist(
+            FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, linewidth=1.0)
+        )
 
     def closed(self, x: float, y: float) -> None:
         """The sign of a composite that is drawn closed."""
         self.path([((x, y), (x + 7, y), (x + 7, y + 7), (x, y + 7), (x, y))], SOFT, 0.7, radius=0.0)
         self.path([((x + 1.5, y + 3.5), (x + 5.5, y + 3.5)), ((x + 3.5, y + 1.5), (x + 3.5, y + 5.5))], SOFT, 0.7)
 
-    def port(self, port: PlacedPort) -> None:
+    def port(self, x: float, y: float, ink: str, is_multi: bool) -> None:
         """A mark on the edge, white if any number of connections may meet there."""
         from matplotlib.patches import Rectangle
 
-        ink = INK if port.is_joined else FAINT
-        fill = "white" if port.port.is_multi else ink
-        corner = (port.x - 2.2, port.y - 2.2)
-        self.sheet.add_patch(Rectangle(corner, 4.4, 4.4, facecolor=fill, edgecolor=ink, linewidth=0.8, zorder=3))
+        fill = "white" if is_multi else ink
+        self.sheet.add_artist(
+            Rectangle((x - 2.2, y - 2.2), 4.4, 4.4, facecolor=fill, edgecolor=ink, linewidth=0.8, zorder=3)
+        )
 
     def wires(self) -> None:
         """All lines, dots where one branches, and arrowheads where they end; lines that run together bend into it."""
@@ -180,11 +192,11 @@ class _Painter:
             self.path([line for wire in self.drawing.wires if wire in together for line in wire.lines], INK, 1.0)
         dots = [dot for wire in self.drawing.wires for dot in wire.dots]
         for dot in dots:
-            self.sheet.add_patch(Circle(dot, 1.8, facecolor=INK, edgecolor="none", zorder=2.5))
+            self.sheet.add_artist(Circle(dot, 1.8, facecolor=INK, edgecolor="none", zorder=2.5))
         for x, y in [head for wire in self.drawing.wires for head in wire.heads]:
             tip = x - 2.4
             corners = [(tip, y), (tip - 6.0, y - 2.6), (tip - 6.0, y + 2.6)]
-            self.sheet.add_patch(Polygon(corners, closed=True, facecolor=INK, edgecolor="none", zorder=2.5))
+            self.sheet.add_artist(Polygon(corners, closed=True, facecolor=INK, edgecolor="none", zorder=2.5))
 
     def path(self, lines: Iterable[Line], colour: str, width: float, radius: float = 4.0) -> None:
         """Lines with round corners."""
@@ -204,7 +216,7 @@ class _Painter:
             codes.append(Outline.LINETO)
         if corners:
             shape = Outline(corners, codes)
-            self.sheet.add_patch(
+            self.sheet.add_artist(
                 PathPatch(shape, fill=False, edgecolor=colour, linewidth=width, capstyle="round", zorder=2)
             )
 
@@ -219,7 +231,7 @@ class _Painter:
         patch = FancyBboxPatch(
             place, pill_width(words), PILL_HEIGHT, style, facecolor=fill, edgecolor=INK, linewidth=0.6, zorder=4
         )
-        self.sheet.add_patch(patch)
+        self.sheet.add_artist(patch)
         ink = "white" if fill in DARK else INK
         self.words(Words(words, x + pill_width(words) / 2, y + 0.35 * text.PILL, text.PILL, align="center"), ink)
 
@@ -243,6 +255,8 @@ class _Painter:
         if row.sample == "stack":
             for step in (2, 1, 0):
                 self.rectangle(x + step, middle - 4.0 + 1.7 * step, 13.0 - 2 * step, 6.0, "white")
+        elif row.sample == "port":
+            self.port(x + 7.0, middle, INK, True)
         elif row.sample == "director":
             self.rectangle(x, middle - 5.0, 13.0, 10.0, "white")
             self.rectangle(x + 2.0, middle - 3.0, 9.0, 6.0, "white")
