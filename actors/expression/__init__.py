@@ -1,6 +1,6 @@
 """The expression language: what stands in the `${...}` of a model and in the parameters of actors that compute."""
 
-from .evaluation import evaluate, interpolate, names_in
+from .evaluation import check_names, evaluate, interpolate, names_in
 from .formula import Formula, FormulaParameter, operand
 from .port_formula import PortFormula, PortFormulaParameter
 from .syntax import ExpressionError
@@ -14,6 +14,7 @@ __all__ = [
     "FormulaParameter",
     "PortFormula",
     "PortFormulaParameter",
+    "check_names",
     "evaluate",
     "interpolate",
     "names_in",

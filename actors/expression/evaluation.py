@@ -9,7 +9,7 @@ import ast
 import contextlib
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import lru_cache
 from typing import ParamSpec, TypeVar
 
@@ -77,6 +77,27 @@ def names_in(text: str) -> frozenset[str]:
             with _shifted(offset):
                 found |= free_names(parse(source), frozenset())
     return frozenset(found - CONSTANTS.keys())
+
+
+def check_names(text: str, known: Collection[str]) -> None:
+    """Raise ``ExpressionError`` if the `${...}` of a text ask for a name that is not known."""
+    for offset, source in _pieces(text):
+        if offset is None:
+            continue
+        with _shifted(offset):
+            tree = parse(source)
+            strange = free_names(tree, frozenset()) - set(known) - CONSTANTS.keys() - FUNCTIONS.keys()
+            for node in ast.walk(tree):
+                if isinstance(node, ast.Name) and node.id in strange:
+                    length = (node.end_col_offset or 0) - node.col_offset
+                    raise ExpressionError(_unknown(node.id, known), node.col_offset, length)
+
+
+def _unknown(name: str, names: Collection[str]) -> str:
+    known = sorted(names)
+    shown = ", ".join(known[:_MAX_NAMES_SHOWN]) + (", ..." if len(known) > _MAX_NAMES_SHOWN else "")
+    guess = did_you_mean(name, [*known, *CONSTANTS, *FUNCTIONS])
+    return f"unknown name '{name}'{guess or ','} known names: {shown or 'none'}"
 
 
 # --- finding expressions in a text --------------------------------------------------------------------
@@ -239,10 +260,8 @@ class _Evaluation:
             return CONSTANTS[name]
         if name in FUNCTIONS:
             raise self._error(node, f"'{name}' is a function: write {name}(...)")
-        known = sorted({*self._names, *(bound for scope in self._bound for bound in scope)})
-        shown = ", ".join(known[:_MAX_NAMES_SHOWN]) + (", ..." if len(known) > _MAX_NAMES_SHOWN else "")
-        guess = did_you_mean(name, [*known, *CONSTANTS, *FUNCTIONS])
-        raise self._error(node, f"unknown name '{name}'{guess or ','} known names: {shown or 'none'}")
+        known = {*self._names, *(bound for scope in self._bound for bound in scope)}
+        raise self._error(node, _unknown(name, known))
 
     def _dict(self, node: ast.Dict) -> dict[str, object]:
         result: dict[str, object] = {}

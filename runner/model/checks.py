@@ -18,14 +18,17 @@ MAX_PASSAGE = 200  # composite ports in a row
 MAX_SHOWN = 10  # names in one message
 
 
-def check(graph: ModelGraph, problems: Problems) -> None:
-    """Add every problem of wiring: types, missing connections, two writers, loops without delay; warn of idle ones."""
+def check(graph: ModelGraph, problems: Problems, *, whole: bool = True) -> None:
+    """Add every problem of wiring: types, missing connections, two writers, loops without delay.
+
+    If it is the ``whole`` model and nothing is wrong, warn of actors that can never fire.
+    """
     if not check_passages(graph, problems):
         return
     check_types(graph, problems)
     check_connections(graph, problems)
     check_loops(graph, problems)
-    if not len(problems):
+    if whole and not len(problems):
         check_reach(graph, problems)
 
 

@@ -44,7 +44,7 @@ MAX_INSTANCES = 200_000  # of actors and composites together
 MAX_DEPTH = 50
 
 
-class _TooLargeError(Exception):
+class TooLargeError(Exception):
     """The model has too many parts to go on; the reason has been noted."""
 
 
@@ -72,6 +72,7 @@ class Elaborator:
         self.aspects: list[WovenAspect] = []
         # Aspects are woven when all ports exist: (name, scope, declaration, names).
         self._to_weave: list[tuple[str, str, PartText, dict[str, object]]] = []
+        self.made: set[str] = set()  # the composite classes of which there are instances
         self._instances = 0
         self._port_types: dict[str, Any] = {}
         self._token_types: dict[str, type] | None = None
@@ -88,7 +89,7 @@ class Elaborator:
         names = self._parameters("", root, {}, {}, None)
         try:
             self._body("", root, names, ())
-        except _TooLargeError:
+        except TooLargeError:
             return Model(root.name)
         ports = PathIndex(self.graph.ports.nodes)
         for name, scope, part, scope_names in self._to_weave:
@@ -115,7 +116,7 @@ class Elaborator:
         names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
         try:
             self._actor(path, path.rpartition(".")[0], part, names, ())
-        except _TooLargeError:
+        except TooLargeError:
             return []
         ports = PathIndex(self.graph.ports.nodes)
         for name, scope, aspect, scope_names in self._to_weave:
@@ -301,13 +302,7 @@ class Elaborator:
             self.graph.empty_arrays.add(path)
         before, was_muted = len(self.problems), self.problems.muted
         for index in range(count or 0):
-            self._instances += 1
-            if self._instances > MAX_INSTANCES:
-                self.problems.muted = False
-                self.problems.add(
-                    f"{path}: the model has more than {MAX_INSTANCES:,} actors and composites", part.position
-                )
-                raise _TooLargeError
+            self._enlist(path, part)
             instance = f"{path}[{index}]" if part.count is not None else path
             scope = {**names, "index": index} if part.count is not None else names
             child.paths.append(instance)
@@ -323,6 +318,14 @@ class Elaborator:
                 self.problems.muted = True  # the other instances would only repeat it
         self.problems.muted = was_muted
         return child
+
+    def _enlist(self, path: str, part: PartText) -> None:
+        """Count one more instance; raises ``TooLargeError`` if there are too many."""
+        self._instances += 1
+        if self._instances > MAX_INSTANCES:
+            self.problems.muted = False
+            self.problems.add(f"{path}: the model has more than {MAX_INSTANCES:,} actors and composites", part.position)
+            raise TooLargeError
 
     def _count(self, path: str, composite: str, part: PartText, names: dict[str, object]) -> int | None:
         """How many instances there are; None if that is not known."""
@@ -348,11 +351,23 @@ class Elaborator:
         inside = self._parameters(path, composite, part.values, names, part.position)
         if "index" in names:
             inside.setdefault("index", names["index"])
+        self._unfold(path, composite, inside, part.position, within)
+
+    def _unfold(
+        self,
+        path: str,
+        composite: CompositeText,
+        inside: dict[str, object],
+        position: Position | None,
+        within: tuple[str, ...],
+    ) -> None:
+        """One instance of a composite, its ports and all that is in it; ``inside`` are its parameters."""
+        self.made.add(composite.name)
         self.graph.composites[path] = composite.name
         for direction, ports in (("input", composite.inputs), ("output", composite.outputs)):
             for name, port in ports.items():
                 self.graph.add_composite_port(
-                    f"{path}.{name}", direction, part.position, self._port_type(composite, port), port.position
+                    f"{path}.{name}", direction, position, self._port_type(composite, port), port.position
                 )
         if composite.director is not None:
             start, drift = self._clock(path, composite.director, inside)

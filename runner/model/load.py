@@ -16,6 +16,8 @@ from .model import Model
 from .problems import Problems, did_you_mean
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
 from .site import call_site, node_of
+from .trial import try_classes
+from .usage import check_usage
 
 MAX_INCLUDES = 200
 
@@ -97,14 +99,17 @@ def load_model(
     if text is None:
         problems.raise_if_any()
         raise AssertionError("a model that is no mapping is a problem")
-    composites = included_composites(text, path, reader, problems)
+    declared = included_composites(text, path, reader, problems)
+    catalogue = installed().with_types(types)
+    composites, broken = inherit(declared, catalogue.actors, problems)
+    check_usage(text, declared, composites, catalogue.actors, problems)
     for change in without_aspects:
         without(text, change, problems)
     for change in aspects:
         change_aspect(text, change, problems)
-    catalogue = installed().with_types(types)
-    composites, broken = inherit(composites, catalogue.actors, problems)
-    model = Elaborator(text, composites, Settings(settings), problems, catalogue, broken).model()
+    elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken)
+    model = elaborator.model()
+    try_classes(composites, elaborator.made, problems, catalogue, broken)
     problems.raise_if_any()
     model.is_checked = True
     return model

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Collection
 from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, Quantity, plain
-from epicycle.actors.expression import ExpressionError, interpolate, names_in
+from epicycle.actors.expression import ExpressionError, check_names, interpolate, names_in
 
 from .declarations import ParameterText
 from .document import Mapping, Node, Scalar, Sequence
@@ -25,7 +25,7 @@ class Values:
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
 
-    def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Container[str] = ()) -> Any:
+    def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Collection[str] = ()) -> Any:
         """The value of a node, or ``missing``.
 
         ``label`` is whose value it is, ``scope`` the composite in which it stands; ``later`` are the names that are
@@ -41,6 +41,8 @@ class Values:
             return node.value
         try:
             asked = names_in(node.value)
+            if any(name not in names and name not in later for name in asked):
+                check_names(node.value, {*names, *later})
             if any(names.get(name) is self.missing for name in asked):
                 return self.missing  # what is wrong with that name has been told
             if early := sorted(name for name in asked if name in later and name not in names):
