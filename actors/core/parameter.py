@@ -266,7 +266,12 @@ class Configurable:
                 raise TypeError(f"{cls.__name__}: a parameter may not be called {name!r}")
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={self.__dict__.get(name)!r}" for name in declared_parameters(type(self)))
+        """The parameters that are not left at their defaults."""
+        values = ", ".join(
+            f"{name}={self.__dict__.get(name)!r}"
+            for name, parameter in declared_parameters(type(self)).items()
+            if parameter.required or self.__dict__.get(name) is not parameter.default_value
+        )
         return f"{type(self).__name__}({values})"
 
 

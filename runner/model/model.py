@@ -144,6 +144,7 @@ class Model(Scope):
         self.scopes.remove(path)
         for woven in self.aspects:
             woven.ports = [port for port in woven.ports if not is_within(port, path)]
+            woven.connections = [ends for ends in woven.connections if not any(is_within(end, path) for end in ends)]
         self.aspects = [woven for woven in self.aspects if not is_within(woven.name, path)]
         self.recorded = [port for port in self.recorded if not is_within(port, path)]
         self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
@@ -178,7 +179,7 @@ class Model(Scope):
             (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")
             for hop in self.graph.since(0)
         ]
-        aspects = [(woven.name, repr(woven.aspect), ", ".join(woven.ports)) for woven in self.aspects]
+        aspects = [(woven.name, repr(woven.aspect), ", ".join(woven.places)) for woven in self.aspects]
         parameters = [(name, short(value)) for name, value in self.parameters.items()]
         return [
             Table(("parameter", "value"), parameters),

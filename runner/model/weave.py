@@ -38,6 +38,11 @@ class WovenAspect:
     reads: list[str] = field(default_factory=list)
 
     @property
+    def places(self) -> list[str]:
+        """Where it stands, in words."""
+        return [*self.ports, *(f"{source} -> {destination}" for source, destination in self.connections)]
+
+    @property
     def looks_at(self) -> list[str]:
         """All ports whose latest tokens it needs to know."""
         return [*self.reads, *(port for port, _ in self.condition)]
