@@ -1,7 +1,7 @@
 """What can be woven around a model: aspects, and the join points that they act at."""
 
 from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
-from .core import Aspect, CommunicationAspect, JoinPoint, MeasurementAspect, Weaver
+from .core import Aspect, CommunicationAspect, JoinPoint, MeasurementAspect, ObservationAspect, Reading, Weaver
 from .measurement import (
     Alteration,
     Bias,
@@ -13,26 +13,33 @@ from .measurement import (
     Saturate,
     StuckAt,
 )
+from .observation import Assert, Count, InvariantError, Probe
 from .tokens import FieldError
 
 __all__ = [
     "Alteration",
     "Aspect",
+    "Assert",
     "Bias",
     "CommunicationAspect",
     "Corrupt",
+    "Count",
     "Drift",
     "Duplicate",
     "FieldError",
     "GilbertElliott",
+    "InvariantError",
     "JoinPoint",
     "Latency",
     "MeasurementAspect",
     "MeasurementFailure",
     "Noise",
+    "ObservationAspect",
     "Outlier",
     "PacketLoss",
+    "Probe",
     "Quantise",
+    "Reading",
     "Reorder",
     "Saturate",
     "StuckAt",

@@ -19,13 +19,16 @@ draw the same number of random values whatever its strength, so that runs at dif
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from epicycle.actors import Configurable, EpicycleError, Parameter, Tag, random_stream, to_nanoseconds, to_seconds
-from epicycle.actors.expression import PortFormulaParameter
+from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand, value_at
+
+Reading = tuple[str, tuple[str, ...]]  # an output port, and the fields that lead to a part of its token
 
 
 class Weaver(Protocol):
@@ -48,13 +51,19 @@ class Weaver(Protocol):
     def note(self, aspect: str, port: str, event: str, token: Any) -> None:
         """Write an act of an aspect into the event log."""
 
+    def record(self, signal: str, token: Any) -> None:
+        """Append a token to a signal among the results of the run."""
+
+    def stop(self, reason: str) -> None:
+        """End the run when the present tag has been handled; the first who asks gives the reason."""
+
 
 class JoinPoint:
     """One port that an aspect stands at.
 
     ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for what it must remember
     about this port between tokens; ``shared`` is one for all its ports.  ``place`` is the connection, for an aspect
-    that stands on one connection to the port alone.
+    that stands on one connection to the port alone.  ``readings`` are what the aspect's expressions over ports ask for.
     """
 
     def __init__(
@@ -65,6 +74,7 @@ class JoinPoint:
         forward: Callable[[Any], None],
         shared: dict[Any, Any] | None = None,
         place: str = "",
+        readings: Mapping[PortFormula, Sequence[Reading]] | None = None,
     ) -> None:
         self.aspect = aspect
         self.port = port
@@ -74,6 +84,7 @@ class JoinPoint:
         self.random: np.random.Generator = random_stream(weaver.seed, place or port, f"aspect {aspect}")
         self._weaver = weaver
         self._forward = forward
+        self._readings = readings or {}
 
     @property
     def tag(self) -> Tag:
@@ -94,6 +105,19 @@ class JoinPoint:
         """What an output port that the aspect ``reads`` has sent last; None if it has sent nothing yet."""
         return self._weaver.latest(port)
 
+    def value_of(self, formula: PortFormula, **given: object) -> Any:
+        """The present value of a parameter of the aspect that is an expression over ports and ``given`` names.
+
+        None as long as one of its ports has sent nothing; raises ``EpicycleError``.
+        """
+        values = []
+        for port, fields in self._readings.get(formula, ()):
+            latest = self._weaver.latest(port)
+            if latest is None:
+                return None
+            values.append(operand(value_at(latest, fields)))
+        return formula(values, **given)
+
     def forward(self, token: Any, delay: float | None = None) -> None:
         """Let a token pass, at once or after ``delay`` seconds (0 is the next microstep)."""
         if delay is None:
@@ -101,13 +125,25 @@ class JoinPoint:
         else:
             self._weaver.later(to_nanoseconds(delay), self._forward, token)
 
+    def count(self, event: str) -> None:
+        """Count an event for the summary, and leave no trace in the log."""
+        self.counts[event] = self.counts.get(event, 0) + 1
+
     def act(self, event: str, token: Any, *details: Any) -> None:
         """Count an event and write it into the event log: the token as it came, then what was done to it.
 
         Details are a new token or a delay in seconds; with details the logged value is a list.
         """
-        self.counts[event] = self.counts.get(event, 0) + 1
+        self.count(event)
         self._weaver.note(self.aspect, self.port, event, [token, *details] if details else token)
+
+    def record(self, token: Any) -> None:
+        """Append a token to the signal of this join point, ``aspect@port``, among the results of the run."""
+        self._weaver.record(f"{self.aspect}@{self.port}", token)
+
+    def stop(self) -> None:
+        """End the run when the present tag has been handled; the aspect is given as the reason."""
+        self._weaver.stop(f"aspect {self.aspect}")
 
 
 class Aspect(Configurable):
@@ -164,6 +200,21 @@ class CommunicationAspect(Aspect):
     """An aspect of the way to an input port."""
 
     stands_at: ClassVar[frozenset[str]] = frozenset({"input"})
+
+
+class ObservationAspect(Aspect, ABC):
+    """An aspect that looks at what passes and never changes it: write ``observe``.
+
+    Every token goes on at once, whatever ``observe`` does with what it sees.
+    """
+
+    @abstractmethod
+    def observe(self, token: Any, point: JoinPoint) -> None:
+        """Look at a token before it goes on."""
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        self.observe(token, point)
+        point.forward(token)
 
 
 class MeasurementAspect(Aspect):

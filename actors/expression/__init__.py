@@ -2,9 +2,9 @@
 
 from .evaluation import check_names, evaluate, interpolate, names_in
 from .formula import Formula, FormulaParameter, operand
-from .port_formula import PortFormula, PortFormulaParameter
+from .port_formula import PortFormula, PortFormulaParameter, value_at
 from .syntax import ExpressionError
-from .values import CONSTANTS, FUNCTIONS
+from .values import CONSTANTS, FUNCTIONS, text_of
 
 __all__ = [
     "CONSTANTS",
@@ -19,4 +19,6 @@ __all__ = [
     "interpolate",
     "names_in",
     "operand",
+    "text_of",
+    "value_at",
 ]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..core import REQUIRED, EpicycleError, Parameter, ParameterError
-from .formula import Formula
+from .formula import Formula, operand
 from .syntax import ExpressionError
 
 # Dotted names with an index only where another name follows: a last index is a subscript of the token.
@@ -23,12 +23,13 @@ class PortFormula:
     """A checked expression in which dotted names stand for tokens: ``references``, in the order of their appearance.
 
     A reference is the path of an output port, with the fields that lead to a part of its token: ``main.state`` or
-    ``main.state.position``.  Raises ``ExpressionError`` if the text is no such expression.
+    ``main.state.position``.  A name in ``given`` stands for itself: its value, of which fields can be named as well,
+    comes with each call.  Raises ``ExpressionError`` if the text is no such expression.
     """
 
-    __slots__ = ("_formula", "_names", "references", "source")
+    __slots__ = ("_formula", "_given", "_paths", "_ports", "references", "source")
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, given: Sequence[str] = ()) -> None:
         names: dict[str, str] = {}
 
         def stand_in(match: re.Match[str]) -> str:
@@ -36,32 +37,49 @@ class PortFormula:
             return match[0] if path is None else names.setdefault(path, f"port_{len(names)}")
 
         self._formula = Formula(_REFERENCE.sub(stand_in, source))
+        self._paths = tuple(names)
         for name in self._formula.names:
-            if name not in names.values():
-                raise ExpressionError(f"the name {name!r} is unknown: a port is written 'actor.port'")
+            if name in given:
+                names[name] = name
+            elif name not in names.values():
+                also = "".join(f", and {each!r} is known" for each in given)
+                raise ExpressionError(f"the name {name!r} is unknown: a port is written 'actor.port'{also}")
         if not names:
-            raise ExpressionError("no port is named in it: write a port as 'actor.port'")
+            what = " or ".join([*map(repr, given), "a port as 'actor.port'"])
+            raise ExpressionError(f"{'nothing' if given else 'no port'} is named in it: write {what}")
         self.source = source
-        self.references = tuple(names)
-        self._names = tuple(names.values())
+        self._ports = {path: name for path, name in names.items() if path.split(".")[0] not in given}
+        self._given = {name: path.split(".") for path, name in names.items() if path not in self._ports}
+        self.references = tuple(self._ports)
 
-    def __call__(self, values: Sequence[object]) -> Any:
-        """The value for those of the references, in their order; raises ``EpicycleError``."""
+    def __call__(self, values: Sequence[object], **given: object) -> Any:
+        """The value for those of the references, in their order, and of the given names; raises ``EpicycleError``."""
+        known = dict(zip(self._ports.values(), values, strict=True))
+        for name, (root, *fields) in self._given.items():
+            known[name] = operand(value_at(given[root], fields))
         try:
-            return self._formula(dict(zip(self._names, values, strict=True)))
+            return self._formula(known)
         except EpicycleError as error:
-            told = _STAND_IN.sub(lambda match: self.references[int(match[1])], str(error))
+            told = _STAND_IN.sub(lambda match: self._paths[int(match[1])], str(error))
             raise EpicycleError(told) from None
 
     def __repr__(self) -> str:
         return repr(self.source)
 
 
-class PortFormulaParameter(Parameter[PortFormula | None]):
-    """A parameter whose value is an expression over ports."""
+def value_at(token: Any, fields: Iterable[str]) -> Any:
+    """A part of a token; None where there is no such part."""
+    for name in fields:
+        token = token.get(name) if isinstance(token, Mapping) else getattr(token, name, None)
+    return token
 
-    def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
+
+class PortFormulaParameter(Parameter[PortFormula | None]):
+    """A parameter whose value is an expression over ports, and over the ``given`` names."""
+
+    def __init__(self, default: Any = REQUIRED, *, given: Sequence[str] = (), doc: str = "") -> None:
         super().__init__(str, default, doc=doc)  # type: ignore[arg-type]
+        self.given = tuple(given)
 
     def describe_type(self) -> str:
         return "expression over ports"
@@ -74,6 +92,6 @@ class PortFormulaParameter(Parameter[PortFormula | None]):
         if not isinstance(value, str):
             raise ParameterError(f"{value!r} is not an expression over ports")
         try:
-            return PortFormula(value)
+            return PortFormula(value, self.given)
         except ExpressionError as error:
             raise ParameterError(f"{value!r} is not an expression over ports: {error}") from None

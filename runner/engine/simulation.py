@@ -44,7 +44,7 @@ class Simulation:
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
         self._has_run = False
         self._started = 0.0
-        self._wiring = Wiring(model, self.director, self.log, self._listeners())
+        self._wiring = Wiring(model, self.director, self.log, self._listeners(), self.signals)
 
     # -- what is watched ------------------------------------------------------------------------------------------
 

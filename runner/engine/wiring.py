@@ -7,13 +7,13 @@ from functools import partial
 from typing import Any
 
 from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag
-from epicycle.actors.expression import operand
 from epicycle.aspects import JoinPoint
 
-from ..model import Hop, Model, WovenAspect, value_at
+from ..model import Hop, Model, WovenAspect
 from .director import ActorError, Director, LoopError, describe
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog
+from .signal import Signal
 
 Emit = Callable[[Any, int | None], None]
 
@@ -22,14 +22,23 @@ class Wiring:
     """What ``send`` does at each port of a model: through delays, borders and join points to where a token is heard.
 
     ``listeners`` are told of every token that leaves the port of their path, be it an actor's or a composite's.
+    ``signals`` is where aspects record what they see.
     """
 
-    def __init__(self, model: Model, director: Director, log: EventLog, listeners: dict[str, list[Deliver]]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        director: Director,
+        log: EventLog,
+        listeners: dict[str, list[Deliver]],
+        signals: dict[str, Signal],
+    ) -> None:
         self.graph = model.graph
         self.director = director
         self.log = log
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
         self._listeners = listeners
+        self._signals = signals
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
         self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
@@ -162,7 +171,7 @@ class Wiring:
 
     def _through(self, woven: WovenAspect, path: str, onward: Deliver, place: str = "") -> Deliver:
         """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
-        point, pass_token = self._point(woven.name, path, onward, place or path), woven.aspect.pass_token
+        point, pass_token = self._point(woven, path, onward, place or path), woven.aspect.pass_token
 
         def through(token: Any) -> None:
             try:
@@ -176,31 +185,29 @@ class Wiring:
             return through
 
         def through_if_active(token: Any) -> None:
-            if woven.aspect.is_due(point.tag.time) and self._holds(woven):
+            if woven.aspect.is_due(point.tag.time) and self._holds(woven, point):
                 through(token)
             else:
                 onward(token)
 
         return through_if_active
 
-    def _holds(self, woven: WovenAspect) -> bool:
+    def _holds(self, woven: WovenAspect, point: JoinPoint) -> bool:
         """Whether the ``when`` of an aspect is true of what the ports have sent last; before they have, it is not."""
         if woven.aspect.when is None:
             return True
-        if any(port not in self._latest for port, _ in woven.condition):
-            return False
         try:
-            values = [operand(value_at(self._latest[port], fields)) for port, fields in woven.condition]
-            return bool(woven.aspect.when(values))
+            return bool(point.value_of(woven.aspect.when))
         except EpicycleError as error:
             raise self._error(woven, "when", error) from None
 
     def _error(self, woven: WovenAspect, doing: str, error: Exception) -> ActorError:
         return ActorError(f"aspect {woven.name}", self.director.tag, doing, describe(error))
 
-    def _point(self, name: str, path: str, onward: Deliver, place: str) -> JoinPoint:
-        loom = Loom(self.director_of(self.graph.owner(path)), self.director, self.log, self._latest)
-        point = JoinPoint(name, path, loom, onward, self._shared[name], place)
+    def _point(self, woven: WovenAspect, path: str, onward: Deliver, place: str) -> JoinPoint:
+        name = woven.name
+        loom = Loom(self.director_of(self.graph.owner(path)), self.director, self.log, self._latest, self._signals)
+        point = JoinPoint(name, path, loom, onward, self._shared[name], place, woven.readings)
         first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)
@@ -210,17 +217,24 @@ class Wiring:
 
 
 class Loom:
-    """What the engine offers to a join point: the time of the director that it stands under, and the log."""
+    """What the engine offers to a join point: the time of the director that it stands under, the log and signals."""
 
     def __init__(
-        self, local: Director | LocalDirector, director: Director, log: EventLog, latest: dict[str, Any]
+        self,
+        local: Director | LocalDirector,
+        director: Director,
+        log: EventLog,
+        latest: dict[str, Any],
+        signals: dict[str, Signal],
     ) -> None:
         self.seed = director.seed
         self.latest = latest.get
         self.later = local.later
+        self.stop = director.stop
         self._local = local
         self._director = director
         self._log = log
+        self._signals = signals
 
     @property
     def tag(self) -> Tag:
@@ -231,6 +245,10 @@ class Loom:
         """Write an act of an aspect into the log."""
         actor, _, name = port.rpartition(".")
         self._log.add(self._director.tag, event, actor, name, None, aspect, token)
+
+    def record(self, signal: str, token: Any) -> None:
+        """Append a token to a signal of the results."""
+        self._signals.setdefault(signal, Signal(signal)).add(self._director.tag, token)
 
 
 def _all(ways: list[Deliver]) -> Deliver:

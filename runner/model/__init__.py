@@ -10,7 +10,7 @@ from .patterns import PatternError, select
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
 from .scope import Composite, CompositePort, Instance
-from .weave import WovenAspect, value_at
+from .weave import WovenAspect
 
 __all__ = [
     "Clock",
@@ -35,5 +35,4 @@ __all__ = [
     "load_model",
     "packaged_models",
     "select",
-    "value_at",
 ]

@@ -484,7 +484,9 @@ class Elaborator:
         if aspect is None:
             weaving.select(part.at)  # for what is wrong with it
             return
-        woven = weaving.weave(aspect, part.at, part.values["when"].value.position if "when" in part.values else None)
+        woven = weaving.weave(
+            aspect, part.at, lambda name: part.values[name].value.position if name in part.values else None
+        )
         if is_enabled:
             self.aspects.append(woven)
 

@@ -407,7 +407,7 @@ class Scope:
                     pointcuts.append(PointcutText.of(Text(name_here, within(Text(name_here, position), name_here))))
             index = PathIndex(self._model.graph.ports.nodes)
             weaving = Weaving(self._model.graph, index, full, type(aspect), self.path, problems)
-            woven = weaving.weave(aspect, pointcuts, position)
+            woven = weaving.weave(aspect, pointcuts, lambda _: position)
         self._model.aspects.append(woven)
         return woven
 

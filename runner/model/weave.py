@@ -8,11 +8,12 @@ with a ``!`` before it selects is left out again.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
-from epicycle.aspects import Aspect
+from epicycle.actors import declared_parameters
+from epicycle.actors.expression import PortFormula
+from epicycle.aspects import Aspect, Reading
 
 from .declarations import PointcutText
 from .graph import ModelGraph
@@ -20,21 +21,19 @@ from .patterns import PathIndex, PatternError, matches
 from .problems import Position, Problems, did_you_mean, nearest
 from .reading import Text
 
-Reading = tuple[str, tuple[str, ...]]  # an output port, and the fields that lead to a part of its token
-
 
 @dataclass
 class WovenAspect:
     """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
 
-    ``condition`` are the readings of its ``when``, ``reads`` the ports that it looks at otherwise.
+    ``readings`` are what its expressions over ports ask for, ``reads`` the ports that it looks at otherwise.
     """
 
     name: str
     aspect: Aspect
     ports: list[str]
     connections: list[tuple[str, str]] = field(default_factory=list)
-    condition: list[Reading] = field(default_factory=list)
+    readings: dict[PortFormula, list[Reading]] = field(default_factory=dict)
     reads: list[str] = field(default_factory=list)
 
     @property
@@ -45,7 +44,7 @@ class WovenAspect:
     @property
     def looks_at(self) -> list[str]:
         """All ports whose latest tokens it needs to know."""
-        return [*self.reads, *(port for port, _ in self.condition)]
+        return [*self.reads, *(port for readings in self.readings.values() for port, _ in readings)]
 
 
 class Weaving:
@@ -61,15 +60,20 @@ class Weaving:
         self.scope = scope
         self.problems = problems
 
-    def weave(self, aspect: Aspect, pointcuts: list[PointcutText], when: Position | None) -> WovenAspect:
+    def weave(
+        self, aspect: Aspect, pointcuts: list[PointcutText], position_of: Callable[[str], Position | None]
+    ) -> WovenAspect:
         """The aspect with its places and all that it looks at; a pointcut that selects nothing is a problem.
 
-        ``when`` is where its condition stands in the model file.
+        ``position_of`` tells where a parameter is set in the model file.
         """
         woven = WovenAspect(self.name, aspect, self.select(pointcuts))
         woven.connections = self._select_connections(pointcuts)
-        if aspect.when is not None:
-            woven.condition = [self._reading(reference, when) for reference in aspect.when.references]
+        for name in declared_parameters(type(aspect)):
+            formula = getattr(aspect, name)
+            if isinstance(formula, PortFormula):
+                position = position_of(name)
+                woven.readings[formula] = [self._reading(name, each, position) for each in formula.references]
         chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
         woven.reads = self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return woven
@@ -183,32 +187,34 @@ class Weaving:
                     chosen[connection] = None
         return list(chosen)
 
-    def _reading(self, reference: str, position: Position | None) -> Reading:
-        """The port that a dotted name in ``when`` begins with, and the fields that follow."""
+    def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
+        """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
         parts = self._full(reference).split(".")
         outputs = [path for path in self.ports if self.graph.direction(path) == "output"]
         for length in range(len(parts), 1, -1):
             port = ".".join(parts[:length])
             if port in self.ports and self.graph.direction(port) == "output":
                 fields = tuple(parts[length:])
-                self._check_fields(reference, port, fields, position)
+                self._check_fields(name, reference, port, fields, position)
                 return port, fields
         if self._full(reference) in self.ports:
-            self._problem(f"when: {reference} is an input port, but an output port is needed", position)
+            self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
         else:
             close = nearest(self._full(reference), outputs)
             near = f", did you mean {close!r}?" if close else ""
-            self._problem(f"when: {reference!r} names no output port{near}", position)
+            self._problem(f"{name}: {reference!r} names no output port{near}", position)
         return reference, ()
 
-    def _check_fields(self, reference: str, port: str, fields: tuple[str, ...], position: Position | None) -> None:
+    def _check_fields(
+        self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position | None
+    ) -> None:
         """Whether the tokens of a port have the field, where their type tells."""
         for source in self.graph.source_of(port) if fields else ():
             if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
                 names = [each.name for each in dataclasses.fields(source.type)]
                 if fields[0] not in names:
                     self._problem(
-                        f"when: {reference}: {source.type.__name__} has no field {fields[0]!r}"
+                        f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}"
                         f"{did_you_mean(fields[0], names)}",
                         position,
                         f"its fields: {', '.join(names)}",
@@ -221,13 +227,6 @@ class Weaving:
     def _problem(self, message: str, where: PointcutText | Text | Position | None, *hints: str) -> None:
         position = where.position if isinstance(where, (PointcutText, Text)) else where
         self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
-
-
-def value_at(token: Any, fields: Iterable[str]) -> Any:
-    """A part of a token; None where there is no such part."""
-    for name in fields:
-        token = token.get(name) if isinstance(token, dict) else getattr(token, name, None)
-    return token
 
 
 def _valid_ends(pattern: str, ports: PathIndex) -> str:

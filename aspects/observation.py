@@ -1,0 +1,81 @@
+"""Observation: aspects that stand at any port, look at what passes, and change neither a token nor its time."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from epicycle.actors import EpicycleError, Parameter
+from epicycle.actors.expression import PortFormulaParameter, text_of
+
+from .core import JoinPoint, ObservationAspect
+
+TOKEN = "token"
+NOTE, STOP, FAIL = "note", "stop", "fail"
+MOST_VALUES = 100  # that Count tells apart at a port: the summary is for people
+
+
+class InvariantError(EpicycleError):
+    """An invariant that a model must keep, and has not kept."""
+
+
+class Probe(ObservationAspect):
+    """Records every token that passes, in the signal ``NAME@PORT`` of the results and in the log.  Event: ``seen``."""
+
+    events: ClassVar[tuple[str, ...]] = ("seen",)
+
+    def observe(self, token: Any, point: JoinPoint) -> None:
+        point.record(token)
+        point.act("seen", token)
+
+
+class Count(ObservationAspect):
+    """Counts the tokens that pass, for the summary alone: the log does not grow.
+
+    Event: ``counted``; with ``by`` also ``counted VALUE`` for each value of the expression; after the hundredth at a
+    port all further values are ``counted others``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("counted",)
+
+    by = PortFormulaParameter(
+        None,
+        given=(TOKEN,),
+        doc="expression over the passing token and ports whose values are told apart, such as token.kind or token > 3",
+    )
+
+    def observe(self, token: Any, point: JoinPoint) -> None:
+        point.count("counted")
+        if self.by is None:
+            return
+        event = f"counted {text_of(point.value_of(self.by, token=token))}"
+        point.count(event if event in point.counts or len(point.counts) <= MOST_VALUES else "counted others")
+
+
+class Assert(ObservationAspect):
+    """Checks an invariant for every token that passes.
+
+    The invariant is not checked as long as one of the ports in it has sent nothing.  Event: ``violated``.
+    At the first violation ``on_violation: stop`` ends the run, after the present tag, with what came of it;
+    ``fail`` ends it with an ``InvariantError``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("violated",)
+
+    that = PortFormulaParameter(
+        given=(TOKEN,),
+        doc="expression over the passing token and ports, such as token.speed <= 8 and main.state.position[0] < 20",
+    )
+    on_violation = Parameter(
+        str, NOTE, choices=(NOTE, STOP, FAIL), doc="what a violation leads to besides the event: nothing, or the end"
+    )
+
+    def observe(self, token: Any, point: JoinPoint) -> None:
+        assert self.that is not None
+        holds = point.value_of(self.that, token=token)
+        if holds is None or holds:
+            return
+        point.act("violated", token)
+        if self.on_violation == STOP:
+            point.stop()
+        elif self.on_violation == FAIL:
+            raise InvariantError(f"the invariant {self.that.source!r} does not hold for the token {token!r}")
