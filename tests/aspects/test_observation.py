@@ -13,7 +13,7 @@ from epicycle.runner import ActorError, ModelError
 from epicycle.runner.engine import Results
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import load, simulate
+from engine_parts import simulate
 
 PARTS = """
 actors:
@@ -73,7 +73,9 @@ def test_count_tells_a_hundred_values_apart() -> None:
 
 def test_assert() -> None:
     plain = run("")
-    results = run("small: {type: Assert, at: a.input, that: token < 4}, sure: {type: Assert, at: a.input, that: token < 9}")
+    results = run(
+        "small: {type: Assert, at: a.input, that: token < 4}, sure: {type: Assert, at: a.input, that: token < 9}"
+    )
     assert acts(results) == [("violated", "a.input", 4.0, 4), ("violated", "a.input", 5.0, 5)]
     assert sends(results) == sends(plain)
     assert results.aspects == {"small": {"violated": 2}, "sure": {"violated": 0}}
@@ -112,13 +114,17 @@ def test_assert_that_fails() -> None:
         ),
         (
             "{type: Assert, at: a.input, that: tken < 3}",
-            "aspect x.that: 'tken < 3' is not an expression over ports: the name 'tken' is unknown: "
-            "a port is written 'actor.port', and 'token' is known",
+            (
+                "aspect x.that: 'tken < 3' is not an expression over ports: the name 'tken' is unknown: "
+                "a port is written 'actor.port', and 'token' is known"
+            ),
         ),
         (
             "{type: Assert, at: a.input, that: 1 < 3}",
-            "aspect x.that: '1 < 3' is not an expression over ports: nothing is named in it: "
-            "write 'token' or a port as 'actor.port'",
+            (
+                "aspect x.that: '1 < 3' is not an expression over ports: nothing is named in it: "
+                "write 'token' or a port as 'actor.port'"
+            ),
         ),
         (
             "{type: Assert, at: a.input, that: a.outptu < 3}",
