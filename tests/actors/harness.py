@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from epicycle.actors import Actor, Tag, Wake, to_nanoseconds
+from epicycle.actors import Actor, InputPort, Tag, Wake, to_nanoseconds
 
 
 class Harness:
-    """Implements ``Context`` for one actor and keeps what it sends, by port, as (seconds, token) pairs."""
+    """Implements ``Context`` for one actor and keeps what it sends, by port, as (seconds, token) pairs.
+
+    Ports that need not be connected are not, unless ``widths`` or a token says so.
+    """
 
     def __init__(self, actor: Actor, *, seed: int = 1, widths: dict[str, int] | None = None) -> None:
         self.actor = actor
@@ -19,7 +22,8 @@ class Harness:
         self.sent: dict[str, list[tuple[float, Any]]] = {name: [] for name in actor.outputs}
         self.channels: dict[str, list[int | None]] = {name: [] for name in actor.outputs}
         for name, port in [*actor.inputs.items(), *actor.outputs.items()]:
-            port.width = (widths or {}).get(name, 1)
+            is_left_out = isinstance(port, InputPort) and not port.required
+            port.width = (widths or {}).get(name, 0 if is_left_out else 1)
         for name, port in actor.outputs.items():
             port.connect(lambda token, channel, name=name: self._keep(name, token, channel))
         actor.enter(self)
@@ -39,8 +43,7 @@ class Harness:
         self.tag = Tag(to_nanoseconds(seconds), microstep)
         for name, token in tokens.items():
             port = self.actor.inputs[name]
-            if port.multi:
-                port.width = max(port.width, len(token))
+            port.width = max(port.width, len(token) if port.multi else 1)
             for channel, each in enumerate(token if port.multi else [token]):
                 if each is not None:
                     port.put(each, channel)
