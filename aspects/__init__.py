@@ -13,6 +13,7 @@ from .measurement import (
     Saturate,
     StuckAt,
 )
+from .media import Medium
 from .observation import Assert, Count, InvariantError, Probe
 from .tokens import FieldError
 
@@ -33,6 +34,7 @@ __all__ = [
     "Latency",
     "MeasurementAspect",
     "MeasurementFailure",
+    "Medium",
     "Noise",
     "ObservationAspect",
     "Outlier",

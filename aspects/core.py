@@ -64,6 +64,7 @@ class JoinPoint:
     ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for what it must remember
     about this port between tokens; ``shared`` is one for all its ports.  ``place`` is the connection, for an aspect
     that stands on one connection to the port alone.  ``readings`` are what the aspect's expressions over ports ask for.
+    ``source`` is the port that tokens come from over the connection, at an output the port itself.
     """
 
     def __init__(
@@ -75,9 +76,11 @@ class JoinPoint:
         shared: dict[Any, Any] | None = None,
         place: str = "",
         readings: Mapping[PortFormula, Sequence[Reading]] | None = None,
+        source: str = "",
     ) -> None:
         self.aspect = aspect
         self.port = port
+        self.source = source or port
         self.counts: dict[str, int] = {}
         self.memory: dict[Any, Any] = {}
         self.shared: dict[Any, Any] = {} if shared is None else shared
@@ -125,6 +128,10 @@ class JoinPoint:
         else:
             self._weaver.later(to_nanoseconds(delay), self._forward, token)
 
+    def later(self, delay: float, call: Callable[[Any], None], what: Any) -> None:
+        """Call ``call(what)`` after ``delay`` seconds (0 is the next microstep): for what is decided only then."""
+        self._weaver.later(to_nanoseconds(delay), call, what)
+
     def count(self, event: str) -> None:
         """Count an event for the summary, and leave no trace in the log."""
         self.counts[event] = self.counts.get(event, 0) + 1
@@ -150,12 +157,14 @@ class Aspect(Configurable):
     """Base of all aspects: declare parameters in the class, write ``pass_token``.
 
     ``stands_at`` says which ports it can be woven around: inputs (communication), outputs (measurement), or both.
-    ``events`` names what it may note, so that summaries show a zero where nothing happened.
+    ``events`` names what it may note, so that summaries show a zero where nothing happened; ``reports`` names the
+    figures that it tells at the end of a run, with their units.
     """
 
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled"})
     stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
     events: ClassVar[tuple[str, ...]] = ()
+    reports: ClassVar[dict[str, str]] = {}
 
     from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")
     until: Parameter[float | None] = Parameter(float, None, min=0.0, unit="s", doc="active before this time alone")
@@ -194,6 +203,13 @@ class Aspect(Configurable):
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         """Decide what becomes of a token at a join point."""
         raise NotImplementedError(f"{type(self).__name__} has no pass_token()")
+
+    def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
+        """The figures that it ``reports``, from ``point.shared`` and the time (ns) at which the run ended.
+
+        None is for a figure of which there is nothing to say, such as the mean of nothing.
+        """
+        return {}
 
 
 class CommunicationAspect(Aspect):

@@ -1,4 +1,4 @@
-"""Changing the numbers inside a token, whatever its kind: for aspects that alter what a port carries."""
+"""What is inside a token, whatever its kind: for aspects that alter it, or need to know it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Change = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 class FieldError(EpicycleError):
-    """A token without the field, or without the numbers, that an aspect is to alter."""
+    """A token without the field, or without the numbers, that an aspect needs."""
 
 
 def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
@@ -26,18 +26,24 @@ def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
     """
     if not fields:
         return _changed(token, change)
+    for name in fields:
+        field_of(token, name, "leave out 'fields' to alter all of it")
+    if isinstance(token, dict):
+        return {name: _changed(value, change) if name in fields else value for name, value in token.items()}
+    return dataclasses.replace(token, **{name: _changed(getattr(token, name), change) for name in fields})
+
+
+def field_of(token: Any, name: str, advice: str = "") -> Any:
+    """A field of a token that is a dataclass or a dict; raises ``FieldError``, with advice where it has no fields."""
     if isinstance(token, dict):
         names = list(token)
     elif dataclasses.is_dataclass(token) and not isinstance(token, type):
         names = [each.name for each in dataclasses.fields(token)]
     else:
-        raise FieldError(f"a token of type {type(token).__name__} has no fields; leave out 'fields' to alter all of it")
-    for name in fields:
-        if name not in names:
-            raise FieldError(f"{type(token).__name__} has no field {name!r}; its fields: {', '.join(map(str, names))}")
-    if isinstance(token, dict):
-        return {name: _changed(value, change) if name in fields else value for name, value in token.items()}
-    return dataclasses.replace(token, **{name: _changed(getattr(token, name), change) for name in fields})
+        raise FieldError(f"a token of type {type(token).__name__} has no fields{advice and f'; {advice}'}")
+    if name not in names:
+        raise FieldError(f"{type(token).__name__} has no field {name!r}; its fields: {', '.join(map(str, names))}")
+    return token[name] if isinstance(token, dict) else getattr(token, name)
 
 
 def _changed(value: Any, change: Change) -> Any:

@@ -61,7 +61,8 @@ def _nan_or(choose: Callable[..., Any], first: Any, second: Any) -> Any:
 
 @dataclass(repr=False)
 class Results:
-    """The outcome of one run: ``metrics``, recorded ``signals``, counts of ``aspects``, the ``log`` and its ``digest``.
+    """The outcome of one run: ``metrics``, recorded ``signals``, counts and figures of ``aspects``, the ``log``
+    and its ``digest``.
 
     >>> results = Simulation(model, seed=7).run()
     >>> results.metrics["mean_wait"], results["server.output"].values
@@ -71,7 +72,7 @@ class Results:
     seed: int
     parameters: dict[str, object]
     metrics: dict[str, Any]
-    aspects: dict[str, dict[str, int]]
+    aspects: dict[str, dict[str, float | None]]  # counts of events, and what aspects report
     signals: dict[str, Signal]
     log: EventLog
     end: float  # s, the last tag
@@ -143,8 +144,10 @@ class Results:
         return f"{self.model}, seed {self.seed}: {self.end:g} s of model time, ended by {self.stopped}"
 
     def _tables(self) -> list[Table]:
-        counts = [
-            (name, event, f"{count:,}") for name, events in self.aspects.items() for event, count in events.items()
+        figures = [
+            (name, what, "-" if figure is None else f"{figure:,}" if isinstance(figure, int) else short(figure))
+            for name, found in self.aspects.items()
+            for what, figure in found.items()
         ]
         run = [
             ("events", f"{self.events:,}"),
@@ -160,7 +163,7 @@ class Results:
                     for name, value in self.metrics.items()
                 ],
             ),
-            Table(("aspect", "event", "count"), counts),
+            Table(("aspect", "figure", "value"), figures),
             Table(("signal", "tokens"), [(name, f"{len(signal):,}") for name, signal in self.signals.items()]),
             Table(("run", ""), run),
         ]

@@ -128,7 +128,7 @@ class Simulation:
             seed=self.seed,
             parameters=dict(self.model.parameters),
             metrics={metric.name: reduction.value for metric, reduction in self._reductions},
-            aspects=self._counts(),
+            aspects=self._figures(),
             signals=self.signals,
             log=self.log,
             end=to_seconds(self.director.last.time),
@@ -160,13 +160,16 @@ class Simulation:
         where = f"{position.file}:{position.line}:{position.column}" if position else ""
         return ActorError(error.path, error.tag, error.doing, error.reason, where)
 
-    def _counts(self) -> dict[str, dict[str, int]]:
-        """How often each event of each aspect happened, over all its ports."""
-        counts: dict[str, dict[str, int]] = {}
+    def _figures(self) -> dict[str, dict[str, float | None]]:
+        """How often each event of each aspect happened, over all its ports, and what the aspect reports."""
+        figures: dict[str, dict[str, float | None]] = {}
         for woven in self.model.aspects:
             total = dict.fromkeys(woven.aspect.events, 0)
             for point in self._wiring.points[woven.name]:
                 for event, number in point.counts.items():
                     total[event] = total.get(event, 0) + number
-            counts[woven.name] = total
-        return counts
+            figures[woven.name] = {
+                **total,
+                **woven.aspect.report(self._wiring.shared(woven), self.director.last.time),
+            }
+        return figures

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag
-from epicycle.aspects import JoinPoint
+from epicycle.aspects import JoinPoint, Medium
 
 from ..model import Hop, Model, WovenAspect
 from .director import ActorError, Director, LoopError, describe
@@ -42,7 +42,7 @@ class Wiring:
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
         self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
-        self._shared: dict[str, dict[Any, Any]] = {woven.name: {} for woven in model.aspects}
+        self._shared: dict[object, dict[Any, Any]] = {}
         self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
         for woven in model.aspects:
             for path in woven.ports:
@@ -115,7 +115,7 @@ class Wiring:
             entry = entries.get(channel)
             if entry is None:
                 # The channel of a send travels past the aspects in this closure, for they may forward it later.
-                entry = entries[channel] = self._woven(port.path, lambda passed: emit_one(passed, channel))
+                entry = entries[channel] = self._woven(port.path, port.path, lambda passed: emit_one(passed, channel))
             entry(token)
 
         return emit_woven
@@ -144,15 +144,17 @@ class Wiring:
         """One connection: its delay, and the aspects and the passage at its far end."""
         far = hop.destination
         passage = self._passages.get(far)
+        is_output = self.graph.direction(far) == "output"
+        source = far if is_output else hop.source
         # Aspects at a port of a composite stand outside of it.
-        if passage is not None and self.graph.direction(far) == "input":
-            onward = self._woven(far, passage.lane(channel, onward))
+        if passage is not None and not is_output:
+            onward = self._woven(far, source, passage.lane(channel, onward))
         elif passage is not None:
-            onward = passage.lane(channel, self._woven(far, onward))
+            onward = passage.lane(channel, self._woven(far, source, onward))
         else:
-            onward = self._woven(far, onward)
+            onward = self._woven(far, source, onward)
         for woven in reversed(self._woven_on.get((hop.source, far), [])):
-            onward = self._through(woven, far, onward, f"{hop.source} -> {far}")
+            onward = self._through(woven, far, source, onward, f"{hop.source} -> {far}")
         return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
 
     def _put(self, port: InputPort[Any], channel: int) -> Deliver:
@@ -163,15 +165,15 @@ class Wiring:
         later = self._directors[self.graph.director_over(hop)].later
         return lambda token: later(delay, onward, token)
 
-    def _woven(self, path: str, onward: Deliver) -> Deliver:
+    def _woven(self, path: str, source: str, onward: Deliver) -> Deliver:
         """``onward`` with the aspects that stand at a port before it, the first declared outermost."""
         for woven in reversed(self._woven_at.get(path, [])):
-            onward = self._through(woven, path, onward)
+            onward = self._through(woven, path, source, onward)
         return onward
 
-    def _through(self, woven: WovenAspect, path: str, onward: Deliver, place: str = "") -> Deliver:
+    def _through(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str = "") -> Deliver:
         """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
-        point, pass_token = self._point(woven, path, onward, place or path), woven.aspect.pass_token
+        point, pass_token = self._point(woven, path, source, onward, place or path), woven.aspect.pass_token
 
         def through(token: Any) -> None:
             try:
@@ -204,10 +206,19 @@ class Wiring:
     def _error(self, woven: WovenAspect, doing: str, error: Exception) -> ActorError:
         return ActorError(f"aspect {woven.name}", self.director.tag, doing, describe(error))
 
-    def _point(self, woven: WovenAspect, path: str, onward: Deliver, place: str) -> JoinPoint:
-        name = woven.name
-        loom = Loom(self.director_of(self.graph.owner(path)), self.director, self.log, self._latest, self._signals)
-        point = JoinPoint(name, path, loom, onward, self._shared[name], place, woven.readings)
+    def shared(self, woven: WovenAspect) -> dict[Any, Any]:
+        """What an aspect remembers for all its ports; one for all declarations of a medium."""
+        key: object = woven.name
+        if isinstance(woven.aspect, Medium) and woven.aspect.medium is not None:
+            key = (type(woven.aspect), woven.name.rpartition(".")[0], woven.aspect.medium)
+        return self._shared.setdefault(key, {})
+
+    def _point(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str) -> JoinPoint:
+        name, is_medium = woven.name, isinstance(woven.aspect, Medium)
+        local = self.director if is_medium else self.director_of(self.graph.owner(path))
+        blame = partial(self._error, woven, f"later() at {path}")
+        loom = Loom(local, self.director, self.log, self._latest, self._signals, blame)
+        point = JoinPoint(name, path, loom, onward, self.shared(woven), place, woven.readings, source)
         first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)
@@ -226,11 +237,12 @@ class Loom:
         log: EventLog,
         latest: dict[str, Any],
         signals: dict[str, Signal],
+        blame: Callable[[Exception], ActorError],
     ) -> None:
         self.seed = director.seed
         self.latest = latest.get
-        self.later = local.later
         self.stop = director.stop
+        self._blame = blame
         self._local = local
         self._director = director
         self._log = log
@@ -240,6 +252,18 @@ class Loom:
     def tag(self) -> Tag:
         """The present tag."""
         return self._local.tag
+
+    def later(self, delay: int, deliver: Deliver, token: Any) -> None:
+        """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
+        self._local.later(delay, partial(self._deliver, deliver), token)
+
+    def _deliver(self, deliver: Deliver, token: Any) -> None:
+        try:
+            deliver(token)
+        except (ActorError, LoopError):  # of what comes behind it
+            raise
+        except Exception as error:
+            raise self._blame(error) from error
 
     def note(self, aspect: str, port: str, event: str, token: Any) -> None:
         """Write an act of an aspect into the log."""

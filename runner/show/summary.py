@@ -56,11 +56,11 @@ def summary_table(model: Model, results: Results) -> Group:
     table.add_column("", style="dim")
     for metric in model.metrics:
         table.add_row(metric.name, shown(results.metrics[metric.name]), metric.unit, metric.doc)
-    for name, counts in results.aspects.items():
+    for name, figures in results.aspects.items():
         woven = next(each for each in model.aspects if each.name == name)
-        for event, count in counts.items():
+        for what, figure in figures.items():
             where = f"by {type(woven.aspect).__name__} at {len(woven.ports)} ports"
-            table.add_row(f"{name}: {event}", str(count), "", where)
+            table.add_row(f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where)
     table.add_row("events", f"{results.events}", "", "sends and acts of aspects in the event log")
     table.add_row("firings", f"{results.firings}", "", "of actors")
     table.add_row("wall time", f"{results.wall_time:.3f}", "s", "of initialisation and run")
