@@ -11,7 +11,7 @@ from .core import JoinPoint, ObservationAspect
 
 TOKEN = "token"
 NOTE, STOP, FAIL = "note", "stop", "fail"
-MOST_VALUES = 100  # that Count tells apart at a port: the summary is for people
+MOST_VALUES = 100  # that Count tells apart: the summary is for people
 
 
 class InvariantError(EpicycleError):
@@ -31,8 +31,8 @@ class Probe(ObservationAspect):
 class Count(ObservationAspect):
     """Counts the tokens that pass, for the summary alone: the log does not grow.
 
-    Event: ``counted``; with ``by`` also ``counted VALUE`` for each value of the expression; after the hundredth at a
-    port all further values are ``counted others``.
+    Event: ``counted``; with ``by`` also ``counted VALUE`` for each value of the expression; after the hundredth all
+    further values are ``counted others``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("counted",)
@@ -48,7 +48,10 @@ class Count(ObservationAspect):
         if self.by is None:
             return
         event = f"counted {text_of(point.value_of(self.by, token=token))}"
-        point.count(event if event in point.counts or len(point.counts) <= MOST_VALUES else "counted others")
+        known = point.shared.setdefault("values", set())
+        if len(known) < MOST_VALUES:
+            known.add(event)
+        point.count(event if event in known else "counted others")
 
 
 class Assert(ObservationAspect):

@@ -47,6 +47,14 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--log", metavar="FILE", type=Path, help="write the event log to FILE (.parquet, .csv or .jsonl)"
     )
+    command.add_argument(
+        "--log-where",
+        metavar="COLUMN=PATTERN",
+        action="append",
+        default=[],
+        help="write only what fits, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
+        "actor='observer[*].**' or port=plan; of several for one column one must fit, and each column",
+    )
     command.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
 
 
@@ -66,17 +74,20 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Run the model, report and write what was asked for."""
     from epicycle.actors import EpicycleError
 
-    from ..engine import ActorError, LoopError, Pace, Simulation, check_log_path, write_log
+    from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation, check_log_path, write_log
     from ..show import summary_object, summary_table, write_folder
 
     if options.log is not None:
         check_log_path(options.log)
+    elif options.log_where:
+        raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, to which the log is written")
+    log_filter = LogFilter.of(options.log_where)
     until = seconds("--until", options.until) if options.until is not None else None
     model, figures = load(options)
     folder = options.out or (None if options.json else Path("results") / model.name)
     if folder is not None and folder.exists() and not folder.is_dir():
         raise EpicycleError(f"--out {folder} is a file, not a folder")
-    simulation = Simulation(model, seed=options.seed, keep_log=options.log is not None)
+    simulation = Simulation(model, seed=options.seed, keep_log=log_filter if options.log is not None else False)
     pace = Pace(options.realtime) if options.realtime is not None else None
     with progress(model, until) as report:
         try:

@@ -3,6 +3,7 @@
 from .director import ActorError, Director, LoopError
 from .encoding import canonical, plain, scalars
 from .log import EventLog, LogError, Record, check_log_path, write_log
+from .log_filter import LogFilter
 from .pace import Pace
 from .results import Results
 from .signal import Signal, SignalError
@@ -16,6 +17,7 @@ __all__ = [
     "EventLog",
     "Firing",
     "LogError",
+    "LogFilter",
     "LoopError",
     "Pace",
     "Record",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,30 +54,33 @@ class Record:
 
 
 class EventLog:
-    """Counts and digests every record, and keeps them if asked to."""
+    """Counts and digests every record, and keeps those that ``keeps(event, actor, port, aspect)`` says."""
 
-    def __init__(self, keep: bool = False) -> None:
+    def __init__(self, keeps: Callable[[str, str, str, str], bool] | None = None) -> None:
         self.records: list[Record] = []
         self.count = 0
-        self._keep = keep
+        self._keeps = keeps
         self._hash = hashlib.sha256()
-        self._heads: dict[tuple[str, str, str, str, int | None], bytes] = {}
+        self._heads: dict[tuple[str, str, str, str, int | None], tuple[bytes, bool]] = {}
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
         names = (event, actor, port, aspect, channel)
         head = self._heads.get(names)
         if head is None:
-            head = self._heads[names] = b"".join(map(canonical, names))
+            is_kept = self._keeps is not None and self._keeps(event, actor, port, aspect)
+            head = self._heads[names] = b"".join(map(canonical, names)), is_kept
+        encoded, is_kept = head
         time, microstep = tag
-        self._hash.update(_TAG(b"i", time, b"i", microstep) + head + canonical(value))  # raises what cannot be logged
+        # This raises what cannot be logged.
+        self._hash.update(_TAG(b"i", time, b"i", microstep) + encoded + canonical(value))
         self.count += 1
-        if self._keep:
+        if is_kept:
             self.records.append(Record(tag, event, actor, port, channel, aspect, value))
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each record, with the columns of a log file; raises ``LogError`` if the records were not kept."""
-        if not self._keep:
+        if self._keeps is None:
             raise LogError("the event log was not kept: make the run with Simulation(model, keep_log=True)")
         rows = [(*record.row()[:-1], record.value) for record in self.records]
         frame: pandas.DataFrame = pandas_module().DataFrame(rows, columns=list(COLUMNS))

@@ -13,6 +13,7 @@ from ..model import Metric, Model, firing_order
 from .director import ActorError, Director, describe
 from .local import Deliver
 from .log import EventLog
+from .log_filter import LogFilter
 from .pace import Pace
 from .results import Reduction, Results
 from .signal import Signal
@@ -23,22 +24,33 @@ from .wiring import Wiring
 class Simulation:
     """One run of a model, which is checked first and may not be changed between this and ``run``.
 
-    A model can be run any number of times, each time by a Simulation of its own.
+    A model can be run any number of times, each time by a Simulation of its own.  ``keep_log`` keeps the records of the
+    event log, all or those that a ``LogFilter`` lets pass.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
 
     def __init__(
-        self, model: Model, *, seed: int | None = None, keep_log: bool = False, tracer: Tracer | None = None
+        self,
+        model: Model,
+        *,
+        seed: int | None = None,
+        keep_log: bool | LogFilter = False,
+        tracer: Tracer | None = None,
     ) -> None:
         model.check()
+        if keep_log is True:
+            keep_log = LogFilter({})
+        if keep_log:
+            keep_log.check(model)
         self.model = model
         self.seed = model.seed if seed is None else seed
         if self.seed < 0:
             raise ValueError(f"a seed is a whole number from 0 up, not {self.seed}")
         self._tracer = tracer
         order = firing_order(model.graph)
-        self.log = EventLog(keep_log) if tracer is None else TracingLog(keep_log, tracer)
+        keeps = keep_log.keeps if keep_log else None
+        self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
         self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
         self.signals = {name: Signal(name) for name in model.recorded}
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]

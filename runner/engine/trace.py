@@ -80,8 +80,8 @@ class Tracer:
 class TracingLog(EventLog):
     """A log that a tracer reads along."""
 
-    def __init__(self, keep: bool, tracer: Tracer) -> None:
-        super().__init__(keep)
+    def __init__(self, keeps: Callable[[str, str, str, str], bool] | None, tracer: Tracer) -> None:
+        super().__init__(keeps)
         self._tracer = tracer
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:

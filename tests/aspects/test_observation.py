@@ -64,11 +64,11 @@ def test_count() -> None:
 
 
 def test_count_tells_a_hundred_values_apart() -> None:
-    text = PARTS.format("n: {type: Count, at: a.input, by: token}").replace("stop: 5 ms", "stop: 149 ms")
+    text = PARTS.format("n: {type: Count, at: [t.output, a.input], by: token}").replace("stop: 5 ms", "stop: 149 ms")
     counts = simulate(text)[1].aspects["n"]
-    assert counts.pop("counted") == 150
-    assert counts.pop("counted others") == 50
-    assert counts == {f"counted {tick}": 1 for tick in range(100)}
+    assert counts.pop("counted") == 300
+    assert counts.pop("counted others") == 100
+    assert counts == {f"counted {tick}": 2 for tick in range(100)}
 
 
 def test_assert() -> None:

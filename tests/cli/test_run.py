@@ -161,6 +161,17 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
             "error: log.txt is no log file: its name must end in .parquet, .csv, .jsonl\n",
         ),
         (
+            ("run", "collision_avoidance", "--log-where", "aspect=packet_loss"),
+            "error: --log-where aspect=packet_loss needs --log FILE, to which the log is written\n",
+        ),
+        (
+            ("run", "collision_avoidance", "--log", "log.csv", "--log-where", "aspect=packet_los"),
+            (
+                "error: aspect=packet_los fits no aspect of the model, did you mean 'packet_loss'?; "
+                "aspects: packet_loss, measurement_failure\n"
+            ),
+        ),
+        (
             ("run", "collision_avoidance", "--until", "3 m"),
             "error: '3 m' is a length, expected a time in s\n",
         ),

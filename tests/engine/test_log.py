@@ -10,6 +10,7 @@ import os
 import struct
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -20,10 +21,21 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.actors import Tag
-from epicycle.runner.engine import ActorError, LogError, Record, canonical, check_log_path, plain, scalars, write_log
+from epicycle.runner.engine import (
+    ActorError,
+    LogError,
+    LogFilter,
+    Record,
+    Simulation,
+    canonical,
+    check_log_path,
+    plain,
+    scalars,
+    write_log,
+)
 
 sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, simulate
+from engine_parts import Plan, load, simulate
 
 MODEL = """
 actors: {t: {type: Ticker, limit: 3}, s: {type: Scale, factor: 0.5}, join: {type: Join}}
@@ -162,6 +174,66 @@ def test_files_hold_what_was_recorded(ending: str, records: list[Record], tmp_pa
         assert table.column_names == names
         found = [tuple(row.values()) for row in table.to_pylist()]
     assert found == [record.row() for record in records]
+
+
+WHERE = """
+actors:
+  t: {type: Ticker, period: 1 ms}
+  a: {type: Scale}
+  b: {type: Scale}
+connections: [t.output -> a.input, t.output -> b.input]
+aspects:
+  loss: {type: PacketLoss, at: "*.input", probability: 0.5}
+  noise: {type: Noise, at: a.output, deviation: 1}
+run: {stop: 40 ms}
+"""
+
+
+@pytest.mark.parametrize(
+    ("texts", "fits"),
+    [
+        ([], lambda record: True),
+        (["aspect=loss"], lambda record: record.aspect == "loss"),
+        (["aspect=*"], lambda record: record.aspect != ""),
+        (["aspect=loss", "aspect=noise"], lambda record: record.aspect != ""),
+        (["aspect = *", "actor=a"], lambda record: record.aspect != "" and record.actor == "a"),
+        (["event=dropped", "event=send"], lambda record: record.event != "replaced"),
+        (["port=output"], lambda record: record.port == "output"),
+        (["event=send", "aspect=loss"], lambda record: False),
+    ],
+)
+def test_filter(texts: list[str], fits: Callable[[Record], bool]) -> None:
+    model = load(WHERE)
+    whole = Simulation(model, keep_log=True).run().log
+    part = Simulation(model, keep_log=LogFilter.of(texts)).run().log
+    assert part.records == [record for record in whole.records if fits(record)]
+    assert (part.digest, part.count) == (whole.digest, whole.count)
+    assert {record.event for record in whole.records} == {"send", "dropped", "replaced"}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("aspect=los", "aspect=los fits no aspect of the model, did you mean 'loss'?; aspects: loss, noise"),
+        ("actor=c[*]", "actor=c[*] fits no actor of the model; actors: t, a, b"),
+        (
+            "event=drop",
+            ("event=drop fits no event of the model, did you mean 'dropped'?; events: send, dropped, replaced"),
+        ),
+        ("port=a.output", "port=a.output fits no port of the model, did you mean 'output'?; ports: output, input"),
+        ("actor=a..b", "'a..b' is no pattern: '' is not a name, a name with an index, '*' or '**'"),
+        ("loss", "'loss' is no filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
+        ("aspect=", "'aspect=' is no filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
+        (
+            "actr=a",
+            "the log has no column 'actr' to filter by, did you mean 'actor'?; columns: event, actor, port, aspect",
+        ),
+    ],
+)
+def test_wrong_filters(text: str, message: str) -> None:
+    with pytest.raises(LogError) as caught:
+        Simulation(load(WHERE), keep_log=LogFilter.of([text]))
+    assert str(caught.value) == message
 
 
 def test_paths_of_logs(tmp_path: Path) -> None:
