@@ -60,9 +60,14 @@ def test_python_runs(name: str, code: str) -> None:
 
 @pytest.mark.parametrize(("name", "text"), snippets("yaml"), ids=[name for name, _ in snippets("yaml")])
 def test_models_run(name: str, text: str, tmp_path: Path) -> None:
-    path = tmp_path / "model.yaml"
+    path, overrides = tmp_path / "model.yaml", tmp_path / "overrides.yaml"
+    overrides.write_text("{}")
+    if text.startswith("# overrides.yaml"):  # of the model before it
+        overrides.write_text(text, encoding="utf-8")
+        yaml = snippets("yaml")
+        text = yaml[[each for each, _ in yaml].index(name) - 1][1]
     path.write_text(text, encoding="utf-8")
-    assert Simulation(load_model(path)).run().events > 0
+    assert Simulation(load_model(path, overrides=[overrides])).run().events > 0
 
 
 class Reader:

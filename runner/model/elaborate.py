@@ -300,6 +300,7 @@ class Elaborator:
             self.graph.unknown.add(path)
         elif part.count is not None and count == 0:
             self.graph.empty_arrays.add(path)
+            self.graph.absent |= self._kinds(part)
         before, was_muted = len(self.problems), self.problems.muted
         for index in range(count or 0):
             self._enlist(path, part)
@@ -326,6 +327,18 @@ class Elaborator:
             self.problems.muted = False
             self.problems.add(f"{path}: the model has more than {MAX_INSTANCES:,} actors and composites", part.position)
             raise TooLargeError
+
+    def _kinds(self, part: PartText) -> set[str]:
+        """The types and tags that an instance of this part and what is in it would have."""
+        found: set[str] = set()
+        waiting, seen = [part], set[str]()
+        while waiting:
+            each = waiting.pop()
+            found |= {each.type.text, *(tag.text for tag in each.tags)}
+            if (inner := self.composites.get(each.type.text)) is not None and inner.name not in seen:
+                seen.add(inner.name)
+                waiting += inner.actors.values()
+        return found
 
     def _count(self, path: str, composite: str, part: PartText, names: dict[str, object]) -> int | None:
         """How many instances there are; None if that is not known."""

@@ -62,6 +62,7 @@ class ModelGraph:
         self.tags: dict[str, tuple[str, ...]] = {}  # what the model's author put on actors and composites
         self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
         self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
+        self.absent: set[str] = set()  # types and tags of what would stand in empty arrays, and of unmade actors
         self.is_wired = True  # whether every connection that the model declares has been made
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
@@ -90,6 +91,7 @@ class ModelGraph:
         """Add the ports of an actor that could not be made, so that what names them is not wrong as well."""
         for name, port in declared_ports(actor_type).items():
             self.ports.add_node(f"{path}.{name}", port=None, direction=port.direction, unmade=True)
+        self.absent.add(actor_type.__name__)
         if has_own_ports(actor_type):
             self.unknown.add(path)
 

@@ -59,6 +59,8 @@ class Weaving:
         self.cls = cls
         self.scope = scope
         self.problems = problems
+        self._left_out: set[str] = set()  # ports, which counts for the connections to them, too
+        self._is_excused = False  # whether a pointcut selects nothing because there is nothing now
 
     def weave(
         self, aspect: Aspect, pointcuts: list[PointcutText], position_of: Callable[[str], Position | None]
@@ -67,8 +69,13 @@ class Weaving:
 
         ``position_of`` tells where a parameter is set in the model file.
         """
+        before = len(self.problems)
         woven = WovenAspect(self.name, aspect, self.select(pointcuts))
         woven.connections = self._select_connections(pointcuts)
+        if pointcuts and not woven.places and not self._is_excused and len(self.problems) == before:
+            only_out = all(pointcut.exclude for pointcut in pointcuts)
+            nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
+            self._problem(nowhere, pointcuts[0])
         for name in declared_parameters(type(aspect)):
             formula = getattr(aspect, name)
             if isinstance(formula, PortFormula):
@@ -82,8 +89,8 @@ class Weaving:
         """The ports that the pointcuts select."""
         of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
-        chosen -= {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
-        return self.ports.in_order(chosen)
+        self._left_out = {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
+        return self.ports.in_order(chosen - self._left_out)
 
     def _of(self, pointcut: PointcutText) -> list[str]:
         """The ports at which the aspect can stand, of those that one pointcut selects."""
@@ -92,6 +99,8 @@ class Weaving:
             found = self._matching(pointcut)
         elif pointcut.type is not None or pointcut.tag is not None:
             found = self._chosen(pointcut)
+        else:
+            self._is_excused = self._is_excused or not pointcut.exclude  # it is misshapen, and has been told so
         if found is None:
             return []
         fitting = [port for port in found if self.graph.direction(port) in self.cls.stands_at]
@@ -109,9 +118,10 @@ class Weaving:
         try:
             found = self.ports.select(full)
         except PatternError as error:
-            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
+            several = ("for several pointcuts, write a list: [a.in, b.in]",) if "," in pointcut.text else ()
+            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut, *several)
             return None
-        if not found and not self.graph.is_excused(full):
+        if not found and not self._excuses(full):
             close = nearest(full, [path for path in self.ports if self.graph.direction(path) in self.cls.stands_at])
             near = f", did you mean {close!r}?" if close else ""
             self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, _valid_ends(full, self.ports))
@@ -132,17 +142,25 @@ class Weaving:
             owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
             asked = f"actor with the tag {wanted.text!r}"
             known = {tag for path in inside for tag in graph.tags.get(path, ())}
+        unknown = [path for path in graph.unknown if not self.scope or path.startswith(f"{self.scope}.")]
+        if not owners and (unknown or wanted.text in graph.absent):
+            self._is_excused = True
+            return None
         if not owners:
             what = "types" if pointcut.type is not None else "tags"
             self._problem(
-                f"there is no {asked}{did_you_mean(wanted.text, sorted(known))}",
+                f"there is no {asked}{did_you_mean(wanted.text, sorted(known | graph.absent))}",
                 wanted,
                 f"{what} in it: {', '.join(sorted(known)) or 'none'}",
             )
             return None
         ports = [path for path in self.ports if graph.owner(path) in owners]
         if pointcut.port is None:
-            return [path for path in ports if graph.direction(path) in self.cls.stands_at]
+            found = [path for path in ports if graph.direction(path) in self.cls.stands_at]
+            if not found and not any(path in graph.unknown for path in owners):
+                wanting = " or ".join(sorted(self.cls.stands_at))
+                self._problem(f"{self.cls.__name__} stands at {wanting} ports, but no {asked} has one", wanted)
+            return found
         found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
         if not found:
             names = sorted({path.rpartition(".")[2] for path in ports})
@@ -173,19 +191,30 @@ class Weaving:
             except PatternError as error:
                 self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
                 continue
-            if not found and not (self.graph.is_excused(self._full(left)) or self.graph.is_excused(self._full(right))):
+            if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
                 known = [f"{hop.source} -> {hop.destination}" for *_, hop in self.graph.ports.edges(data="hop")]
                 self._problem(
                     f"{pointcut.text!r} matches no connection"
                     f"{did_you_mean(f'{self._full(left)} -> {self._full(right)}', known)}",
                     pointcut,
                 )
-            for connection in found:
-                if pointcut.exclude:
-                    chosen.pop(connection, None)
-                else:
-                    chosen[connection] = None
-        return list(chosen)
+            if not pointcut.exclude:
+                chosen |= dict.fromkeys(found)
+            elif found and not chosen.keys() & found:
+                self._problem(
+                    f"'!{pointcut.text}' leaves out no connection that is selected",
+                    pointcut,
+                    "ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'",
+                )
+            else:
+                chosen = {each: None for each in chosen if each not in found}
+        return [each for each in chosen if each[1] not in self._left_out]
+
+    def _excuses(self, pattern: str) -> bool:
+        """Whether a pattern that matches nothing is right."""
+        is_excused = self.graph.is_excused(pattern)
+        self._is_excused = self._is_excused or is_excused
+        return is_excused
 
     def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
         """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
@@ -197,6 +226,8 @@ class Weaving:
                 fields = tuple(parts[length:])
                 self._check_fields(name, reference, port, fields, position)
                 return port, fields
+        if self.graph.is_excused(self._full(reference)):
+            return reference, ()  # nothing can send there now, and the condition never holds
         if self._full(reference) in self.ports:
             self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
         else:

@@ -85,6 +85,26 @@ def test_an_aspect_on_one_connection() -> None:
     assert dropped(aspect) == {"b.input": list(range(10))}
     several = "type: PacketLoss, probability: 1, at: ['*.output -> *.input', '!t.output -> a.input']"
     assert woven(several).connections == [("t.output", "b.input")]
+    port_left_out = "type: PacketLoss, probability: 1, at: ['*.output -> *.input', '!a.input']"
+    assert woven(port_left_out).connections == [("t.output", "b.input")]
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "at: {type: Twin}",
+        "at: {type: Difference, port: input}",
+        "at: {tag: third}",
+        "at: 'twin[*].go'",
+        "at: ['a.input', '!twin[*].go']",
+        "at: 't.output -> twin[*].go'",
+        "at: a.input, when: 'twin[0].gone > 3'",
+    ],
+)
+def test_an_empty_array_is_no_mistake(place: str) -> None:
+    text = PARTS.format(f"type: PacketLoss, probability: 1, {place}").replace("count: 3", "count: 0")
+    text = text.replace("first: {type: Scale}", "first: {type: Difference, tags: third}")
+    assert load(text).aspects[0].places == (["a.input"] if "a.input" in place else [])
 
 
 def test_connections_have_streams_of_their_own() -> None:
@@ -168,6 +188,29 @@ def test_windows_can_be_set_from_outside() -> None:
             ),
         ),
         (
+            "type: PacketLoss, probability: 1, at: '!a.input'",
+            "m.yaml:16:48: error: aspect loss: 'at' says only where it does not stand",
+        ),
+        (
+            "type: PacketLoss, probability: 1, at: ['a.input', '!*.input']",
+            "m.yaml:16:49: error: aspect loss: all that 'at' selects is left out",
+        ),
+        (
+            "type: PacketLoss, probability: 1, at: ['*.input', '!t.output -> a.input']",
+            (
+                "m.yaml:16:60: error: aspect loss: '!t.output -> a.input' leaves out no connection that is selected\n"
+                "   help: ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'"
+            ),
+        ),
+        (
+            "type: PacketLoss, probability: 1, at: 'a.input, b.input'",
+            (
+                "m.yaml:16:48: error: aspect loss: 'a.input, b.input' is no pointcut: 'input, b' is not a name, "
+                "a name with an index, '*' or '**'\n"
+                "   help: for several pointcuts, write a list: [a.in, b.in]"
+            ),
+        ),
+        (
             "type: PacketLoss, probability: 1, at: a.input, when: b.outpt > 3",
             "m.yaml:16:63: error: aspect loss: when: 'b.outpt' names no output port, did you mean 'b.output'?",
         ),
@@ -198,6 +241,14 @@ def test_windows_can_be_set_from_outside() -> None:
 )
 def test_wrong_places_and_times(aspect: str, message: str) -> None:
     assert problem(aspect) == message
+
+
+def test_no_port_of_the_kind() -> None:
+    with pytest.raises(ModelError) as caught:
+        load(PARTS.replace("a: {{type: Scale", "a: {{type: Recorder").format("type: Bias, by: 1, at: {type: Recorder}"))
+    assert str(caught.value).partition("\n")[0].partition("error: ")[2] == (
+        "aspect loss: Bias stands at output ports, but no actor of type 'Recorder' has one"
+    )
 
 
 def test_a_condition_that_cannot_be_evaluated() -> None:
