@@ -67,7 +67,10 @@ def test_models_run(name: str, text: str, tmp_path: Path) -> None:
         yaml = snippets("yaml")
         text = yaml[[each for each, _ in yaml].index(name) - 1][1]
     path.write_text(text, encoding="utf-8")
-    assert Simulation(load_model(path, overrides=[overrides])).run().events > 0
+    if text.startswith("disturbance:"):
+        assert Simulation(load_model("collision_avoidance", disturb=path)).run(until=0.5).events > 0
+    else:
+        assert Simulation(load_model(path, overrides=[overrides])).run().events > 0
 
 
 class Reader:

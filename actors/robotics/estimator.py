@@ -15,8 +15,9 @@ EXPECTED, PREDICTED = "expected", "predicted"
 class _Estimator(Actor):
     """What all estimators share: the model of eq. (1), and one prediction and fusion at each trigger.
 
-    A measurement that arrives at a tag without a trigger is not used.  One that is not finite is ignored, and
-    so is an update whose result would not be.
+    A measurement that arrives between two triggers is fused at the next one as if it were made then, unless its robot
+    has sent a later one by that time.  One that is not finite is ignored, and so is an update whose result would not
+    be.
     """
 
     trigger = InputPort(object, doc="predict to the present time, fuse, and send the estimate")
@@ -47,16 +48,22 @@ class _Estimator(Actor):
 
         compile_kernels()
         self._predicted_at: int | None = None
+        self._late: dict[tuple[str, str], Measurement] = {}  # what came since the last trigger
         self._process_noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
 
     def fire(self) -> None:
         if not self.trigger.present:
+            self._late.update({(each.robot, each.kind): each for each in self.measurements.tokens if each.finite})
             return
         if self._predicted_at is not None and self.tag.time > self._predicted_at:
             self._predict((self.tag.time - self._predicted_at) / 1e9)
         self._predicted_at = self.tag.time
+        present = [each for each in self.measurements.tokens if each.finite]
+        known = {(each.robot, each.kind) for each in present}
+        present += [late for source, late in self._late.items() if source not in known]
+        self._late.clear()
         # Sorted, so that the order of arrival decides nothing, not even the last bit.
-        usable = sorted((each for each in self.measurements.tokens if each.finite), key=_order)
+        usable = sorted(present, key=_order)
         fused = bool(usable) and self._update(usable)
         sources = sorted({each.robot for each in usable}) if fused else ()
         self.estimate.send(Estimate(*self._state(), tuple(sources)))

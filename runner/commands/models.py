@@ -1,4 +1,4 @@
-"""list the packaged models"""
+"""list the packaged models and disturbances"""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 
 from .options import DONE
 
-DESCRIPTION = "List the models that come with Epicycle."
+DESCRIPTION = "List the models that come with Epicycle, and the disturbances for the option --disturb."
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -14,11 +14,22 @@ def add(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
-    """Print every packaged model with the first sentence of its doc."""
-    from ..model import load_model, packaged_models
+    """Print every packaged model and disturbance with the first sentence of its doc."""
+    from ..model import Problems, load_model, packaged_disturbances, packaged_models
+    from ..model.disturbance import load_disturbance
 
     for name, path in packaged_models().items():
-        doc = load_model(path).doc
-        first, _, _ = doc.partition(". ")
-        print(f"{name}: {first}" if doc else name)
+        print_line(name, load_model(path).doc)
+    print("\ndisturbances, to be added with --disturb:")
+    problems = Problems()
+    for name in packaged_disturbances():
+        disturbance = load_disturbance(name, problems)
+        problems.raise_if_any()
+        print_line(name, disturbance.text.doc if disturbance is not None else "")
     return DONE
+
+
+def print_line(name: str, doc: str) -> None:
+    """A name with the first sentence of what is said of it."""
+    first, _, _ = doc.partition(". ")
+    print(f"{name}: {first}" if doc else name)

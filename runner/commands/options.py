@@ -37,6 +37,14 @@ def add_changes(command: argparse.ArgumentParser) -> None:
         help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
     )
     command.add_argument(
+        "--disturb",
+        metavar="NAME or FILE",
+        action="append",
+        default=[],
+        help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
+        "--aspect and --without count after it",
+    )
+    command.add_argument(
         "--aspect",
         metavar="NAME=TYPE,KEY=VALUE,...",
         action="append",
@@ -94,6 +102,7 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, d
         options.model,
         set=options.set,
         overrides=options.overrides,
+        disturb=options.disturb,
         aspects=options.aspect,
         without_aspects=options.without,
         types=own_types(options),

@@ -3,9 +3,10 @@
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
 from .graph import Hop, ModelGraph, Wire
-from .load import load_model, packaged_models
+from .load import load_model
 from .model import Model
 from .observation import Metric
+from .packaged import packaged_disturbances, packaged_models
 from .patterns import PatternError, select
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
@@ -33,6 +34,7 @@ __all__ = [
     "firing_order",
     "load_composite",
     "load_model",
+    "packaged_disturbances",
     "packaged_models",
     "select",
 ]

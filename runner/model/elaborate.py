@@ -110,6 +110,17 @@ class Elaborator:
             model.figures[name] = (part.type.text, values, part.type.position)
         return model
 
+    def woven(self, graph: ModelGraph) -> list[WovenAspect]:
+        """The aspects that the text declares, woven around a graph that is there."""
+        self.graph = graph
+        names = self._parameters("", self.text.root, {}, {}, None)
+        ports = PathIndex(graph.ports.nodes)
+        for name, part in self.text.root.aspects.items():
+            self._aspect(name, "", part, names, ports)
+        for setting in self.settings.unused():
+            self._add_unused(setting)
+        return self.aspects
+
     def instance(self, path: str, part: PartText) -> list[WovenAspect]:
         """Unfold one instance of a composite class into the graph; the aspects that come with it."""
         _, bracket, index = path.rpartition("[")

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from importlib import import_module
 from pathlib import Path
 
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
+from .disturbance import add_disturbance
 from .document import Mapping as MappingNode
 from .document import read
 from .elaborate import Elaborator
 from .inheritance import inherit
 from .model import Model
+from .packaged import is_path, model_folders, packaged_models
 from .problems import Problems, did_you_mean
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
 from .site import call_site, node_of
@@ -20,29 +21,6 @@ from .trial import try_classes
 from .usage import check_usage
 
 MAX_INCLUDES = 200
-
-
-def model_folders() -> list[Path]:
-    """The folders of packaged models.
-
-    A namespace package's ``__path__`` is read, because ``importlib.resources`` fails on it in an editable install.
-    """
-    package = import_module("epicycle.models")
-    return [Path(entry) for entry in package.__path__ if Path(entry).is_dir()]
-
-
-def packaged_models() -> dict[str, Path]:
-    """The packaged models by name."""
-    found = {}
-    for folder in model_folders():
-        for path in sorted(folder.glob("*.yaml")):
-            found[path.stem] = path
-    return found
-
-
-def is_path(name: str) -> bool:
-    """Whether the name of a model is a path, and not that of a packaged model."""
-    return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
 
 
 def find_model(name: str, problems: Problems) -> Path | None:
@@ -73,18 +51,20 @@ def load_model(
     overrides: str | Path | Iterable[str | Path] = (),
     aspects: Iterable[str] = (),
     without_aspects: Iterable[str] = (),
+    disturb: str | Path | Iterable[str | Path] = (),
     types: Iterable[type] = (),
 ) -> Model:
     """Read, change and check a model; raises ``ModelError`` with all that is wrong.
 
     ``set`` gives parameters their values, as texts like ``"observer[*].sensor.range=5 m"`` or as a mapping
     ``{"observer[*].sensor.range": 5}``; ``overrides`` names a YAML file of such settings, or several; of all that fit
-    a parameter the last one wins, and ``set`` wins over files.  ``types`` are actor and aspect
-    classes of your own that the model may name beside the installed ones.  What is odd but not wrong is in
-    ``Model.warnings``.
+    a parameter the last one wins, and ``set`` wins over files.  ``disturb`` names packaged disturbances, or files of
+    aspects, which are added to the model's one after the other; ``without_aspects`` and ``aspects`` count after that,
+    and all settings win over what a disturbance sets.  ``types`` are actor and aspect classes of your own that the
+    model may name beside the installed ones.  What is odd but not wrong is in ``Model.warnings``.
     """
     problems = Problems()
-    settings = [each for file in _files(overrides) for each in read_overrides(file, problems)]
+    settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += _settings(set, problems)
     path = find_model(str(name), problems)
     if path is None:
@@ -94,6 +74,9 @@ def load_model(
     if node is None:
         problems.raise_if_any()
         raise AssertionError("a file that cannot be read is a problem")
+    if isinstance(node, MappingNode) and "disturbance" in node.entries and "model" not in node.entries:
+        problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
+        problems.raise_if_any()
     reader = DeclarationReader(problems)
     text = reader.model(node)
     if text is None:
@@ -103,6 +86,8 @@ def load_model(
     catalogue = installed().with_types(types)
     composites, broken = inherit(declared, catalogue.actors, problems)
     check_usage(text, declared, composites, catalogue.actors, problems)
+    # What disturbances set comes first, for the last one wins.
+    settings = [each for given in _several(disturb) for each in add_disturbance(text, str(given), problems)] + settings
     for change in without_aspects:
         without(text, change, problems)
     for change in aspects:
@@ -115,8 +100,8 @@ def load_model(
     return model
 
 
-def _files(given: str | Path | Iterable[str | Path]) -> list[Path]:
-    return [Path(each) for each in ((given,) if isinstance(given, (str, Path)) else given)]
+def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:
+    return [given] if isinstance(given, (str, Path)) else list(given)
 
 
 def _settings(given: Iterable[str] | Mapping[str, object], problems: Problems) -> list[Setting]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 
 from epicycle.actors import Tag, declared_parameters
 
@@ -74,6 +75,23 @@ class Model(Scope):
     def local_tag(self, actor: str, tag: Tag) -> Tag:
         """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
         return self.graph.clocks[self.graph.director_of(actor)].tag(tag)
+
+    # -- what disturbs it -----------------------------------------------------------------------------------------
+
+    def disturb(
+        self, disturbance: str | Path, *, set: Mapping[str, object] | None = None, types: Iterable[type] = ()
+    ) -> list[WovenAspect]:
+        """Weave the aspects of a packaged disturbance, or of a YAML file, around the model.
+
+        ``set`` gives the disturbance's own parameters their values; ``types`` are aspect classes of your own that it
+        may name.  A disturbance that sets parameters of the model must be loaded together with it:
+        ``load_model(..., disturb=...)``.  Raises ``ModelError``.
+        """
+        from .disturbance import disturb
+
+        found = disturb(self, str(disturbance), set or {}, types, call_site())
+        self.aspects += found
+        return found
 
     # -- what is watched ------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""A JSON Schema of model files, made from what is declared: the language's keys and the types of a catalogue.
+"""A JSON Schema of model files and disturbances, made from what is declared: the language's keys, a catalogue's types.
 
 An editor's YAML language server completes, explains and checks with it while somebody types.  It knows one file at a
 time: what it refuses, ``epicycle validate`` refuses too, but not the other way round.  Wherever a value may be
@@ -45,7 +45,7 @@ TEXT: Schema = {"type": ["string", "number", "boolean", "null"]}
 
 
 def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]]) -> Schema:
-    """The schema of model files and of files of composites that are included."""
+    """The schema of model files, of files of composites that are included, and of disturbances."""
     actors, aspects = dict(sorted(catalogue.actors.items())), dict(sorted(catalogue.aspects.items()))
     parts = parts_of([*actors.values(), *aspects.values(), *figures.values()])
     definitions: Schema = {
@@ -74,6 +74,7 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "changed_aspect": _changed("aspect", Aspect.reserved),
         "actor": _typed(actors, "actor", Actor.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
         "aspect": _typed(aspects, "aspect", Aspect.reserved, ("type", "at")),
+        "added_aspect": _typed(aspects, "aspect", Aspect.reserved),
         "figure": _typed(figures, "figure", frozenset({"type"})),
     }
     for kind, types, reserved in (
@@ -91,12 +92,16 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Epicycle model",
-        "description": "A model, or a file of composite classes that models include.",
-        **_mapping(language.MODEL_KEYS, _BODY, None),
+        "description": "A model, a file of composite classes that models include, or a disturbance.",
         "type": "object",
         "minProperties": 1,
-        # Without a name it is a file to be included, which has composites only.
-        "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
+        "if": {"required": ["disturbance"]},
+        "then": _disturbance(),
+        "else": {
+            **_mapping(language.MODEL_KEYS, _BODY, None),
+            # Without a name it is a file to be included, which has composites only.
+            "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
+        },
         "$defs": definitions,
     }
 
@@ -152,7 +157,9 @@ _POINTCUT_TEXT: Schema = {
 _FLAG: Schema = {"type": ["boolean", "string"], **_text(EXPRESSION, "expected true or false")}
 _BODY: dict[str, tuple[Schema, str]] = {
     "model": (_ref("name"), "The name of the model."),
+    "disturbance": (_ref("name"), "The name of the disturbance."),
     "doc": (_ref("text"), "What it shows or does."),
+    "set": ({"type": ["object", "null"]}, "Values for parameters of the model: 'path: value', as for --set."),
     "include": (_one_or_more({"type": "string"}), "Files of composite classes, in or below this folder."),
     "parameters": (
         {
@@ -239,6 +246,7 @@ _BESIDE: dict[str, tuple[Schema, str]] = {
 RULES = {
     "MODEL_KEYS": _BODY,
     "COMPOSITE_KEYS": _BODY,
+    "DISTURBANCE_KEYS": _BODY,
     "LIBRARY_KEYS": _BODY,
     "RUN_KEYS": _RUN,
     "DIRECTOR_KEYS": _DIRECTOR,
@@ -281,6 +289,13 @@ def _composite() -> Schema:
         "then": {"properties": {"actors": _named("changed_actor"), "aspects": _named("changed_aspect")}},
         "else": {"properties": {"actors": _named("actor"), "aspects": _named("aspect")}},
     }
+
+
+def _disturbance() -> Schema:
+    """Its aspects may take over the ports of those whose places they take."""
+    found = _mapping(language.DISTURBANCE_KEYS, _BODY, "Aspects in a file of their own, to be added to a model.")
+    found["properties"]["aspects"] = {**_named("added_aspect"), "description": _BODY["aspects"][1]}
+    return found
 
 
 def _changed(kind: str, reserved: frozenset[str]) -> Schema:

@@ -148,8 +148,7 @@ def without(text: ModelText, name: str, problems: Problems) -> None:
 def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
     """``name=Type,key=value,...``: add an aspect, or put another in the place of one that is there.
 
-    An aspect that is replaced leaves its ports to the new one unless ``at`` is given; if the type stays the same, it
-    leaves the parameters that are not given, too.
+    What an aspect that is replaced leaves to the new one, ``put_aspect`` says.
     """
     option = f"--aspect {change}"
     position = Position("command line", 1, 10, max(1, len(change)), option)
@@ -179,13 +178,20 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
     if not NAME.match(name):
         problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
         return
-    old = text.root.aspects.get(name)
     enabled = values.pop("enabled").value if "enabled" in values else None
-    if at is None:
-        at = old.at if old is not None else []
-    if old is not None and old.type.text == parts[0]:
-        values = {**old.values, **values}
-    text.root.aspects[name] = PartText(name, position, Text(parts[0], position), values, None, at, enabled)
+    put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or [], enabled))
+
+
+def put_aspect(text: ModelText, part: PartText) -> None:
+    """Add an aspect to a model, or put it in the place of the one of its name.
+
+    The one that goes leaves its ports unless the new one has its own, and its parameters if the type stays the same.
+    """
+    old = text.root.aspects.get(part.name)
+    if old is not None:
+        values = {**old.values, **part.values} if old.type.text == part.type.text else part.values
+        part = replace(part, at=part.at or old.at, values=values)
+    text.root.aspects[part.name] = part
 
 
 def _pointcuts(value: str, option: str, offset: int) -> list[PointcutText]:

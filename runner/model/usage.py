@@ -43,6 +43,11 @@ def check_usage(
         _add_unused(text.root, text.root.parameters, names, composites, actor_types, problems)
 
 
+def check_own_usage(composite: CompositeText, problems: Problems) -> None:
+    """Add a problem for every parameter that nothing in the same text asks for."""
+    _add_unused(composite, composite.parameters, _names(_nodes(composite)), {}, {}, problems)
+
+
 def _add_unused(
     composite: CompositeText,
     parameters: Iterable[str],

@@ -167,14 +167,30 @@ def test_estimator_predicts_over_the_time_that_passed() -> None:
     assert often.last("estimate").covariance == pytest.approx(seldom.last("estimate").covariance)
 
 
-def test_estimator_starts_from_its_prior_and_acts_on_triggers_only() -> None:
+def test_estimator_starts_from_its_prior() -> None:
     harness = Harness(UnscentedEstimator("main.estimator"))
-    measurement = Measurement("a", np.zeros(2), "relative_position", np.ones(2), 0.2, 2.0)
-    harness.fire(0.0, measurements=[measurement])
-    assert harness.tokens("estimate") == []
     harness.fire(0.1, trigger=0)
     assert harness.last("estimate").mean.tolist() == [10.0, 0.0, 0.0, 0.0]
     assert np.diag(harness.last("estimate").covariance).tolist() == [400.0, 400.0, 4.0, 4.0]
+
+
+@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
+def test_a_late_measurement_is_fused_at_the_next_trigger_once(make: type) -> None:
+    def measured(robot: str, x: float) -> Measurement:
+        return Measurement(robot, np.zeros(2), "relative_position", np.array([x, 1.0]), 0.2, 2.0)
+
+    late, in_time = Harness(make("e")), Harness(make("e"))
+    late.fire(0.02, measurements=[measured("a", 7.0)])  # by another one from the same robot it is replaced
+    late.fire(0.03, measurements=[measured("a", 8.0), measured("b", 9.0)])
+    assert late.tokens("estimate") == []
+    late.fire(0.1, trigger=0, measurements=[measured("b", 8.5), measured("c", 8.2)])
+    in_time.fire(0.1, trigger=0, measurements=[measured("a", 8.0), measured("b", 8.5), measured("c", 8.2)])
+    for harness in (late, in_time):
+        assert harness.last("estimate").sources == ("a", "b", "c")
+        harness.fire(0.2, trigger=1)
+    for ours, theirs in zip(late.tokens("estimate"), in_time.tokens("estimate"), strict=True):
+        assert ours.mean.tolist() == theirs.mean.tolist()
+        assert ours.covariance.tolist() == theirs.covariance.tolist()
 
 
 @pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])

@@ -161,7 +161,7 @@ def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None
         ),
         (
             ("aspects", "PacketLoss", "--set", "x=1"),
-            "error: --set, --overrides, --aspect and --without change a model: name one\n",
+            "error: --set, --overrides, --disturb, --aspect and --without change a model: name one\n",
         ),
         (("aspects", "nowhere/m.yaml"), "error: there is no file nowhere/m.yaml: there is no folder nowhere\n"),
         (("schema", "-o", "nowhere/s.json"), "error: [Errno 2] No such file or directory: 'nowhere/s.json'\n"),

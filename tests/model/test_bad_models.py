@@ -39,7 +39,7 @@ def message(options: str, model: str, folder: Path) -> str:
     for name, text in zip(["m.yaml", *files[1::2]], files[::2], strict=True):
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
-    given: dict[str, list[str]] = {"set": [], "aspects": [], "without_aspects": [], "overrides": []}
+    given: dict[str, list[str]] = {"set": [], "disturb": [], "aspects": [], "without_aspects": [], "overrides": []}
     name = "./m.yaml"
     for option in options.splitlines():
         key, _, value = option.removeprefix("$ ").partition(" ")

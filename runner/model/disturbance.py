@@ -1,0 +1,161 @@
+"""Disturbances: aspects in files of their own, which are added to a model from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Mapping as AnyMapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .catalogue import installed
+from .declarations import DISTURBANCE_KEYS, CompositeText, DeclarationReader, ModelText, ParameterText
+from .document import Mapping, Node, Scalar, read
+from .elaborate import Elaborator
+from .packaged import is_path, packaged_disturbances
+from .problems import Position, Problems, did_you_mean
+from .settings import Setting, Settings, put_aspect, settings_in
+from .site import node_of
+from .usage import check_own_usage
+from .weave import WovenAspect
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+@dataclass
+class Disturbance:
+    """A file of aspects, with parameters of their own and values for those of the model."""
+
+    text: CompositeText
+    settings: list[Setting] = field(default_factory=list)
+
+
+def find_disturbance(name: str, problems: Problems) -> Path | None:
+    """The file of a disturbance: a path if it looks like one, otherwise a packaged disturbance's name."""
+    if is_path(name):
+        return Path(name)
+    known = packaged_disturbances()
+    if name not in known:
+        problems.add(
+            f"there is no packaged disturbance {name!r}{did_you_mean(name, list(known))}",
+            None,
+            f"packaged disturbances: {', '.join(known) or 'none'}; a path to a file ends in .yaml",
+        )
+        return None
+    return known[name]
+
+
+def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
+    """A disturbance by its name or path; None if it cannot be read at all."""
+    path = find_disturbance(name, problems)
+    node = None if path is None else read(path, problems)
+    return None if node is None else _declared(node, problems)
+
+
+def _declared(node: Node, problems: Problems) -> Disturbance | None:
+    """What a file declares; whatever is misshapen is a problem and left out."""
+    if isinstance(node, Mapping) and "model" in node.entries and "disturbance" not in node.entries:
+        problems.add(
+            f"{node.position.file} is a model, not a disturbance",
+            node.entries["model"].key.position,
+            "a disturbance begins with a line like 'disturbance: my_disturbance'",
+        )
+        return None
+    reader = DeclarationReader(problems)
+    entries = reader.entries(node, "the disturbance", DISTURBANCE_KEYS)
+    if entries is None:
+        return None
+    before = len(problems)
+    text = CompositeText("disturbance", node.position)
+    if "disturbance" in entries:
+        text.name = reader.name(entries["disturbance"].value, "the disturbance's name") or text.name
+    else:
+        problems.add(
+            "the disturbance has no name",
+            node.position,
+            "begin the file with a line like 'disturbance: my_disturbance'",
+        )
+    if "doc" in entries:
+        text.doc = reader.text(entries["doc"].value, "doc") or ""
+    settings = _settings(entries["set"].value, problems) if "set" in entries else []
+    for key, entry in reader.named(entries, "parameters"):
+        text.parameters[key] = reader.parameter(key, entry)
+    for key, entry in reader.named(entries, "aspects"):
+        if (part := reader.part(key, entry, "aspect")) is not None:
+            text.aspects[key] = part
+    if len(problems) == before:
+        check_own_usage(text, problems)
+    return Disturbance(text, settings)
+
+
+def _settings(node: Node, problems: Problems) -> list[Setting]:
+    """Values for parameters of the model, as ``--set`` gives them."""
+    if isinstance(node, Mapping):
+        return settings_in(node, problems)
+    if not (isinstance(node, Scalar) and node.value is None):
+        problems.add(
+            "set is not a mapping from parameters to values",
+            node.position,
+            "write lines like 'observer[*].sensor.max_range: 5 m'",
+        )
+    return []
+
+
+def add_disturbance(text: ModelText, name: str, problems: Problems) -> list[Setting]:
+    """Add what a disturbance holds to a model; what it sets of the model's own parameters is returned.
+
+    Its parameters join the model's, so that ``--set`` and expressions know them by their names.  Its aspects come after
+    the model's own, but one that has the name of another stands in its place.
+    """
+    disturbance = load_disturbance(name, problems)
+    if disturbance is None:
+        return []
+    _add_parameters(disturbance.text, text.root, problems)
+    for part in disturbance.text.aspects.values():
+        put_aspect(text, part)
+    return disturbance.settings
+
+
+def _add_parameters(disturbance: CompositeText, root: CompositeText, problems: Problems) -> None:
+    for key, parameter in disturbance.parameters.items():
+        if (first := root.parameters.get(key)) is not None:
+            problems.add(
+                f"the model has a parameter {key!r} already",
+                parameter.position,
+                f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
+            )
+        root.parameters.setdefault(key, parameter)
+
+
+def disturb(
+    model: Model, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
+) -> list[WovenAspect]:
+    """Weave the aspects of a disturbance around a model that is made; raises ``ModelError``."""
+    problems = Problems()
+    disturbance = load_disturbance(name, problems)
+    problems.raise_if_any()
+    assert disturbance is not None, "what cannot be read is a problem"
+    root = CompositeText(model.name, position)
+    for key, value in model.parameters.items():
+        root.parameters[key] = ParameterText(key, position, node_of(value, position))
+    _add_parameters(disturbance.text, root, problems)
+    for setting in disturbance.settings:
+        problems.add(
+            f"{setting.path!r} cannot be set any more: the model is made",
+            setting.position,
+            f"load the model together with the disturbance: load_model(..., disturb={name!r})",
+        )
+    for key in sorted(values.keys() & model.parameters.keys() - disturbance.text.parameters.keys()):
+        problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
+    taken = {woven.name for woven in model.aspects}
+    for part in disturbance.text.aspects.values():
+        root.aspects[part.name] = part
+        if part.name in taken:
+            problems.add(f"there is an aspect {part.name!r} already", part.position, "unweave it before")
+    problems.raise_if_any()
+    node = node_of(values, position)
+    settings = Settings(settings_in(node, problems) if isinstance(node, Mapping) else [])
+    found = Elaborator(ModelText(root), {}, settings, problems, installed().with_types(types)).woven(model.graph)
+    problems.raise_if_any()
+    return found

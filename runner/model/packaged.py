@@ -1,0 +1,34 @@
+"""What comes with Epicycle in YAML: models, and disturbances to be added to them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+
+def model_folders() -> list[Path]:
+    """The folders of packaged models.
+
+    A namespace package's ``__path__`` is read, because ``importlib.resources`` fails on it in an editable install.
+    """
+    package = import_module("epicycle.models")
+    return [Path(entry) for entry in package.__path__ if Path(entry).is_dir()]
+
+
+def packaged_models() -> dict[str, Path]:
+    """The packaged models by name."""
+    return _yaml_files(model_folders())
+
+
+def packaged_disturbances() -> dict[str, Path]:
+    """The packaged disturbances by name."""
+    return _yaml_files([folder / "disturbances" for folder in model_folders()])
+
+
+def _yaml_files(folders: list[Path]) -> dict[str, Path]:
+    return {path.stem: path for folder in folders for path in sorted(folder.glob("*.yaml"))}
+
+
+def is_path(name: str) -> bool:
+    """Whether the name of a model or disturbance is a path, and not that of a packaged one."""
+    return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
