@@ -10,15 +10,18 @@ _MAX_NAME = 200  # comparing names takes quadratic time; nobody mistypes a name 
 _MAX_CANDIDATES = 2_000
 
 
-def nearest(name: str, candidates: Iterable[str]) -> str | None:
-    """Return the candidate that `name` was probably meant to be, or None if no one is near."""
+def nearest(name: str, candidates: Iterable[str], likeness: float = 0.6) -> str | None:
+    """Return the candidate that `name` was probably meant to be, or None if no one is near.
+
+    `likeness`, from 0 to 1, is how near is near.
+    """
     if len(name) > _MAX_NAME:
         return None
     by_folded: dict[str, str] = {}
     for candidate in itertools.islice(candidates, _MAX_CANDIDATES):
         if candidate != name and len(candidate) <= _MAX_NAME:
             by_folded.setdefault(candidate.casefold(), candidate)
-    found = difflib.get_close_matches(name.casefold(), by_folded, n=1)
+    found = difflib.get_close_matches(name.casefold(), by_folded, n=1, cutoff=likeness)
     return by_folded[found[0]] if found else None
 
 

@@ -144,11 +144,11 @@ class Parameter(Generic[T]):
         if self.unit and self.unit != "1":
             text += f" in {self.unit}"
         if self.min is not None and self.max is not None:
-            text += f" from {self.min:g} to {self.max:g}"
+            text += f" from {_digits(self.min)} to {_digits(self.max)}"
         elif self.min is not None:
-            text += f" >= {self.min:g}"
+            text += f" >= {_digits(self.min)}"
         elif self.max is not None:
-            text += f" <= {self.max:g}"
+            text += f" <= {_digits(self.max)}"
         return text
 
     def _scalar(self, value: object) -> object:
@@ -193,7 +193,7 @@ class Parameter(Generic[T]):
         if math.isnan(value):
             raise ParameterError(f"nan is not {self._expected()}")
         if (self.min is not None and value < self.min) or (self.max is not None and value > self.max):
-            raise ParameterError(f"{value:g} is out of bounds, expected {self._expected()}")
+            raise ParameterError(f"{_digits(value)} is out of bounds, expected {self._expected()}")
         return value
 
     def _array(self, value: object) -> NDArray[np.float64]:
@@ -247,7 +247,9 @@ class Configurable:
         declared = declared_parameters(type(self))
         for name in values:
             if name not in declared:
-                raise ParameterError(unknown_parameter(type(self), name))
+                message = unknown_parameter(type(self), name)
+                comma = "" if message.endswith("?") else ","
+                raise ParameterError(f"{message}{comma} valid parameters: {', '.join(declared) or 'none'}")
         for name, parameter in declared.items():
             if name in values:
                 try:
@@ -312,12 +314,20 @@ def build_variant(base: type, value: object) -> object:
         return value
     known = variants(base)
     valid = ", ".join(sorted(known))
-    if not isinstance(value, Mapping) or "type" not in value:
-        raise ParameterError(f"{_shown(value)} is not a mapping with a 'type', one of {valid}")
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{_shown(value)} is not a mapping like {{type: ...}}, with one of {valid}")
+    if "type" not in value:
+        raise ParameterError(f"{_shown(value)} has no 'type', which is one of {valid}")
     name = value["type"]
     if not isinstance(name, str) or name not in known:
         raise ParameterError(f"{_shown(name)} is not one of {valid}{did_you_mean(str(name), known)}")
     return known[name](**{key: item for key, item in value.items() if key != "type"})
+
+
+def _digits(number: float) -> str:
+    """A number as people write it: whole ones without an exponent, unless they get too long to be read."""
+    in_full = float(number).is_integer() and abs(number) < (10**20 if type(number) is int else 1e15)
+    return str(int(number)) if in_full else f"{float(number):g}"
 
 
 def _shown(value: object) -> str:

@@ -32,7 +32,7 @@ def to_nanoseconds(seconds: float) -> int:
     # Compared first as floats: the product may be infinite, which has no whole number.
     nanoseconds = seconds * NANOSECONDS_PER_SECOND
     if abs(nanoseconds) > LATEST:
-        raise ValueError(f"{seconds!r} s is out of range, the latest time is {to_seconds(LATEST):g} s")
+        raise ValueError(f"{float(seconds):g} s is out of range, the latest time is {to_seconds(LATEST):g} s")
     return round(nanoseconds)
 
 

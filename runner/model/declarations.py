@@ -313,7 +313,11 @@ class DeclarationReader(NodeReader):
                     self.problems.add(f"{key} of parameter {name!r}: {error}", node.position)
                     result.spoilt = True
         if "choices" in inner:
+            before = len(self.problems)
             result.choices = tuple(text.text for text in self.texts(inner["choices"].value, "choices"))
+            if not result.choices and len(self.problems) == before:
+                self.problems.add(f"parameter {name!r} has no choices to choose from", inner["choices"].value.position)
+                result.spoilt = True
         if result.min is not None and result.max is not None and result.min > result.max:
             self.problems.add(f"parameter {name!r}: min is greater than max", inner["min"].value.position)
             result.spoilt = True
@@ -324,15 +328,17 @@ class DeclarationReader(NodeReader):
         if derived and _is_empty(entry.value):
             return PartText(name, entry.key.position, Text("", entry.key.position), removes=True)
         if not isinstance(entry.value, Mapping):
+            said = entry.value.value if isinstance(entry.value, Scalar) else None
+            type_said = said if isinstance(said, str) and NAME.match(said) else "..."
             self.problems.add(
                 f"{kind} {name!r} is not a mapping",
                 entry.value.position,
-                f"write '{name}: {{type: ...}}' with the {kind}'s type and parameters",
+                f"write '{name}: {{type: {type_said}}}' with the {kind}'s type and parameters",
             )
             return None
         values = dict(entry.value.entries)
         kind_entry = values.pop("type", None)
-        if kind_entry is None and not derived:
+        if (kind_entry is None and not derived) or (kind_entry is not None and _is_empty(kind_entry.value)):
             self.problems.add(f"{kind} {name!r} has no type", entry.key.position, "add 'type: ...'")
             return None
         named = entry.key if kind_entry is None else kind_entry.value

@@ -191,6 +191,7 @@ _SCALAR_TAGS: dict[str, tuple[type, ...]] = {
 _LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
 _INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
+_ARROW = re.compile(r"\s*[-=]>")
 _PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
 
 _HELP_FOR_SYNTAX: Final = (
@@ -201,6 +202,7 @@ _HELP_FOR_SYNTAX: Final = (
     ("did not find expected alphabetic", "quote a text that has [*] or * in it"),
     ("did not find expected '-' indicator", "check the indentation: all '-' of a list stand in one column"),
     ("could not find expected ':'", "each key needs a ':' and a space after it"),
+    ("did not find expected node content", "a bracket is not closed, or a value is missing"),
 )
 
 
@@ -348,6 +350,7 @@ class _Builder:
                 value = _resolve(text)
         except ValueError as error:
             self._problems.add(str(error), position)
+            self._problems.spoil(position)
         return Scalar(value, text, is_plain, position)
 
     def _tagged(self, tag: str, text: str, position: Position) -> Value:
@@ -450,6 +453,8 @@ class _Builder:
         position = None if mark is None else self._at(mark.line, mark.column)
         if position is not None and message.startswith("did not find expected ','") and "${" in position.source:
             hints = ['within { } and [ ], quote an expression: "${...}"']
+        elif position is not None and hints and _ARROW.match(position.source, position.column - 1):
+            hints = ["write the ports on the left without brackets, or quote the whole connection"]
         elif position is not None and hints and _INDEXED.search(position.source):
             hints.append('within { } and [ ], quote a text that has an index: "a[0].port"')
         if position is not None and message.startswith("found character"):

@@ -42,6 +42,7 @@ _INDEX = re.compile(r"\[\d+\]")
 MAX_COUNT = 100_000
 MAX_INSTANCES = 200_000  # of actors and composites together
 MAX_DEPTH = 50
+MAX_SHOWN = 12  # types in one message
 
 
 class TooLargeError(Exception):
@@ -86,6 +87,7 @@ class Elaborator:
                 self.composites[name].position,
                 "give it another name",
             )
+        self.values.of_model = root.parameters
         names = self._parameters("", root, {}, {}, None)
         try:
             self._body("", root, names, ())
@@ -249,6 +251,20 @@ class Elaborator:
                 self.problems.add(f"{label}.{name}: {error}", node.position, scope=composite)
         return result if complete and len(self.problems) == before else None
 
+    def _valid_types(self, kind: str, asked: str) -> str:
+        """Which types there are: their names, or how to see them if they are too many for a message."""
+        is_actor = kind == "actor"
+        types: Collection[str] = self.catalogue.actors if is_actor else self.catalogue.aspects
+        others: Collection[str] = self.catalogue.aspects if is_actor else self.catalogue.actors
+        if asked in others:
+            other = "aspect" if is_actor else "actor"
+            return f"{asked} is an {other}: it belongs under '{other}s'"
+        composites = sorted(self.composites) if is_actor else []
+        if len(composites) + len(types) <= MAX_SHOWN:
+            return f"valid types: {', '.join(sorted([*composites, *types]))}"
+        own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
+        return f"valid types: {f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+
     # -- the inside of a composite --------------------------------------------------------------------------------
 
     def _body(self, path: str, composite: CompositeText, names: dict[str, object], within: tuple[str, ...]) -> None:
@@ -290,7 +306,7 @@ class Elaborator:
             self.problems.add(
                 f"{path}: there is no actor type {part.type.text!r}{did_you_mean(part.type.text, known)}",
                 part.type.position,
-                f"valid types: {', '.join(sorted(known))}",
+                self._valid_types("actor", part.type.text),
                 scope=composite,
             )
             return None
@@ -485,7 +501,7 @@ class Elaborator:
             self.problems.add(
                 f"aspect {name}: there is no aspect type {part.type.text!r}{did_you_mean(part.type.text, known)}",
                 part.type.position,
-                f"valid types: {', '.join(sorted(known))}",
+                self._valid_types("aspect", part.type.text),
                 scope=scope,
             )
             return

@@ -29,7 +29,9 @@ def data_file(name: Path, position: Position) -> Path:
             return target
         if target.is_dir():
             raise ParameterError(f"{str(name)!r} is a folder, not a file")
-        beside = sorted(each.name for each in target.parent.iterdir()) if target.parent.is_dir() else []
+        beside = (
+            sorted(str(name.parent / each.name) for each in target.parent.iterdir()) if target.parent.is_dir() else []
+        )
     except (OSError, RuntimeError, ValueError) as error:  # endless links, too long a name
         raise ParameterError(f"{str(name)!r} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    raise ParameterError(f"there is no file {str(name)!r}{did_you_mean(name.name, beside)}")
+    raise ParameterError(f"there is no file {str(name)!r}{did_you_mean(str(name), beside)}")

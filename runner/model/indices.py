@@ -15,6 +15,9 @@ _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _EXPRESSION = re.compile(r"\$\{.*\}", re.DOTALL)
 
 
+MAX_INDICES = 1_000_000
+
+
 class BadIndexError(Exception):
     """Text that names no instances; the message says why."""
 
@@ -27,6 +30,8 @@ def resolve(text: str, array: str, count: int, value: Callable[[str], object]) -
     """
     items = [text[start:end].strip() for start, end in split(text, ",")]
     found: list[int] = []
+    if len(items) * count > MAX_INDICES:
+        raise BadIndexError(f"too many instances: {len(items):,} times up to {count:,}")
     several = len(items) > 1
     for item in items:
         ends = [item[start:end].strip() for start, end in split(item, "..")]

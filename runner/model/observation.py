@@ -9,7 +9,7 @@ from epicycle.actors import Parameter, ParameterError, accepts, to_nanoseconds, 
 
 from .declarations import DeclarationReader, MetricText, ModelText
 from .patterns import PathIndex, PatternError
-from .problems import Problems, nearest
+from .problems import Problems
 from .reading import Text
 from .values import Values
 
@@ -112,8 +112,7 @@ class Observation:
             return []
         if found or self.graph.is_excused(text.text):
             return found
-        close = nearest(text.text, self._outputs)
-        guess = f", did you mean {close!r}?" if close else ""
+        guess = self._outputs.did_you_mean(text.text)
         if text.text in self.graph.ports.nodes:
             self.problems.add(
                 f"{what}: {text.text} is an input port, but an output port is needed{guess}", text.position
@@ -122,15 +121,9 @@ class Observation:
             self.problems.add(
                 f"{what}: {text.text!r} matches no output port{guess}",
                 text.position,
-                *self._hint(text.text),
+                *self._outputs.advice(text.text),
             )
         return []
-
-    def _hint(self, pattern: str) -> tuple[str, ...]:
-        """The output ports of the actor that the pattern names, if there is one."""
-        owner = pattern.rpartition(".")[0]
-        ports = [path for path in self._outputs if path.rpartition(".")[0] == owner]
-        return (f"output ports of {owner}: {', '.join(p.rpartition('.')[2] for p in ports)}",) if ports else ()
 
 
 def nanoseconds(duration: object) -> int:

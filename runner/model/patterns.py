@@ -7,10 +7,14 @@ segments.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
 
+from epicycle.actors import did_you_mean
+
 _SEGMENT = re.compile(r"(\*\*(?!\[)|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?\Z")
+
+_INDEX = re.compile(r"\[\d+\]")
 
 
 class PatternError(ValueError):
@@ -72,6 +76,10 @@ def select(pattern: str, paths: Iterable[str]) -> list[str]:
     return PathIndex(paths).select(pattern)
 
 
+def _always(_: str) -> bool:
+    return True
+
+
 class PathIndex:
     """Paths, for patterns to choose from without a look at each of them: a model may have many of both."""
 
@@ -98,6 +106,33 @@ class PathIndex:
     def in_order(self, paths: Iterable[str]) -> list[str]:
         """The given paths in their order here."""
         return sorted(paths, key=self._place.__getitem__)
+
+    def did_you_mean(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> str:
+        """Of the paths that fit, the one that was probably meant by a pattern that selects none, to end a message."""
+        near: Iterable[str] = (path for path in self.inside(scope) if fits(path))
+        start = f"{scope}." if scope else ""
+        near = (path.removeprefix(start) for path in near)
+        if "[*]" in pattern:
+            near = dict.fromkeys(_INDEX.sub("[*]", path) for path in near)
+        return did_you_mean(pattern, near)
+
+    def advice(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, ...]:
+        """What could be written in place of a pattern that selects none: which ports there are where it points to."""
+        start = f"{scope}." if scope else ""
+        owner = pattern.rpartition(".")[0]
+        for holder in (pattern, owner):
+            ports = [path for path in self.select(f"{start}{holder}.*") if fits(path)] if holder else []
+            names = list(dict.fromkeys(path.rpartition(".")[2] for path in ports))
+            if names and holder == pattern:
+                written = ", ".join(f"{pattern}.{name}" for name in names)
+                return (f"that is an actor, not a port: write {written}",)
+            if names:
+                return (f"valid ports of {holder}: {', '.join(names)}",)
+        return ()
+
+    def inside(self, scope: str) -> Iterable[str]:
+        """The paths within a composite; all of them if it is the model."""
+        return self._within.get(scope, ()) if scope else self._place
 
     @cached_property
     def _within(self) -> dict[str, list[str]]:

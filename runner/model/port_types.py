@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import types
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from operator import or_
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -86,7 +87,8 @@ def token_types(catalogue: Catalogue) -> dict[str, type]:
         for port in declared_ports(actor).values():
             for each in _classes(port.type):
                 found.setdefault(each.__name__, each)
-    return {name: each for name, each in found.items() if each not in (object, *BUILT_IN.values())}
+    no_token = (object, types.UnionType, Annotated, *BUILT_IN.values())
+    return {name: each for name, each in found.items() if each not in no_token}
 
 
 def _classes(declared: Any) -> Iterator[type]:

@@ -78,6 +78,7 @@ class Problems:
         self._left_out: set[int] = set()  # hashes will do: this is only a count
         self._warnings: dict[tuple[str, Position | None], Problem] = {}
         self._unsaid = 0
+        self._spoilt: set[Position] = set()
         self.muted = False  # while true, problems count for len() alone: they repeat what has been said
 
     def __len__(self) -> int:
@@ -108,7 +109,7 @@ class Problems:
 
         ``scope`` is the path, within the message, of the instance of a composite class that stands for them all.
         """
-        if self.muted:
+        if self.muted or position in self._spoilt:
             self._unsaid += 1
             return
         key = (_INDEX.sub("[]", message.replace(f"{scope}.", "") if scope else message), position)
@@ -118,6 +119,10 @@ class Problems:
             self._kept[key] = Problem(message, position, hints)
         else:
             self._left_out.add(hash(key))
+
+    def spoil(self, position: Position) -> None:
+        """Let nothing more be said of what stands there: it would only be a consequence of what has been said."""
+        self._spoilt.add(position)
 
     def raise_if_any(self) -> None:
         """Raise all problems as one ModelError, if there are any."""

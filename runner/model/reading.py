@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import Position, Problems, did_you_mean, nearest
 
+SURE = 0.75  # how like a key must be to the one that it is taken for
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
@@ -42,8 +43,9 @@ class NodeReader:
                     entry.key.position,
                     f"valid keys: {', '.join(valid)}",
                 )
-                # Read on as if it had been written right, or else it would seem to be missing as well.
-                if (meant := nearest(key, valid)) is not None and meant not in node.entries:
+                # Read on as if it had been written right, or else it would seem to be missing as well; but only if
+                # there is no doubt, or else what follows would be judged by what it is not.
+                if (meant := nearest(key, valid, SURE)) is not None and meant not in node.entries:
                     known.setdefault(meant, entry)
         return known
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 
 from epicycle.actors import Actor, declared_parameters
 from epicycle.actors.expression import ExpressionError, names_in
@@ -12,6 +12,9 @@ from .catalogue import CatalogueError
 from .declarations import CompositeText, ModelText, PartText
 from .document import Entry, Node, Scalar, Sequence
 from .problems import Problems, nearest
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_MAX_STRANGE = 50  # comparing names takes time
 
 
 def check_usage(
@@ -56,10 +59,12 @@ def _add_unused(
     actor_types: Mapping[str, type[Actor]],
     problems: Problems,
 ) -> None:
-    strange = used - composite.parameters.keys()
-    for name in parameters:
-        if name in used or any(nearest(each, [name]) for each in strange):
-            continue  # it is used, or the misspelled name is told where it stands
+    unused = [name for name in parameters if name not in used]
+    strange = sorted(used - composite.parameters.keys())[:_MAX_STRANGE]
+    misspelled = {nearest(each, unused) for each in strange}  # which is told where they stand
+    for name in unused:
+        if name in misspelled:
+            continue
         meant = [
             actor
             for actor, part in composite.actors.items()
@@ -113,8 +118,10 @@ def _names(nodes: Iterable[Node]) -> frozenset[str]:
         node = waiting.pop()
         if isinstance(node, Scalar):
             if isinstance(node.value, str) and "${" in node.value:
-                with suppress(ExpressionError):
+                try:
                     found |= names_in(node.value)
+                except ExpressionError:
+                    found |= set(_WORD.findall(node.value))  # what it would ask for, were it right
         else:
             waiting += node.items if isinstance(node, Sequence) else _values(node.entries)
     return frozenset(found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Container
 from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, Quantity, plain
@@ -24,6 +24,7 @@ class Values:
 
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
+        self.of_model: Container[str] = ()  # the model's own parameters, which composites do not see
 
     def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Collection[str] = ()) -> Any:
         """The value of a node, or ``missing``.
@@ -42,7 +43,7 @@ class Values:
         try:
             asked = names_in(node.value)
             if any(name not in names and name not in later for name in asked):
-                check_names(node.value, {*names, *later})
+                check_names(node.value, {*names, *(name for name in asked if name in later)})
             if any(names.get(name) is self.missing for name in asked):
                 return self.missing  # what is wrong with that name has been told
             if early := sorted(name for name in asked if name in later and name not in names):
@@ -55,8 +56,20 @@ class Values:
                 return self.missing
             return interpolate(node.value, {k: v for k, v in names.items() if v is not self.missing})
         except ExpressionError as error:
-            self.problems.add(f"{label}: {error.message}", _inside(node, error), scope=scope)
+            self.problems.add(
+                f"{label}: {error.message}", _inside(node, error), *self._unseen(node.value, names), scope=scope
+            )
             return self.missing
+
+    def _unseen(self, text: str, names: Container[str]) -> tuple[str, ...]:
+        """What to do about a name of the model's that is not known inside a composite."""
+        try:
+            unseen = sorted(name for name in names_in(text) if name not in names and name in self.of_model)
+        except ExpressionError:
+            return ()
+        if not unseen:
+            return ()
+        return (f"a composite knows its own parameters only: declare {unseen[0]!r} there, and hand it down",)
 
     def declared(self, full: str, parameter: ParameterText, value: Any, position: Position, scope: str = "") -> Any:
         """A value for a parameter that a model or composite declares, converted to its unit and checked."""

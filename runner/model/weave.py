@@ -18,7 +18,7 @@ from epicycle.aspects import Aspect, Reading
 from .declarations import PointcutText
 from .graph import ModelGraph
 from .patterns import PathIndex, PatternError, matches
-from .problems import Position, Problems, did_you_mean, nearest
+from .problems import Position, Problems, did_you_mean
 from .reading import Text
 
 
@@ -103,7 +103,7 @@ class Weaving:
             self._is_excused = self._is_excused or not pointcut.exclude  # it is misshapen, and has been told so
         if found is None:
             return []
-        fitting = [port for port in found if self.graph.direction(port) in self.cls.stands_at]
+        fitting = [port for port in found if self._fits(port)]
         if found and not fitting:
             self._problem(
                 f"{self.cls.__name__} stands at {' or '.join(sorted(self.cls.stands_at))} ports, "
@@ -122,9 +122,9 @@ class Weaving:
             self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut, *several)
             return None
         if not found and not self._excuses(full):
-            close = nearest(full, [path for path in self.ports if self.graph.direction(path) in self.cls.stands_at])
-            near = f", did you mean {close!r}?" if close else ""
-            self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, _valid_ends(full, self.ports))
+            near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
+            advice = self.ports.advice(pointcut.text, self.scope, self._fits)
+            self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, *advice)
         return found
 
     def _chosen(self, pointcut: PointcutText) -> list[str] | None:
@@ -156,7 +156,7 @@ class Weaving:
             return None
         ports = [path for path in self.ports if graph.owner(path) in owners]
         if pointcut.port is None:
-            found = [path for path in ports if graph.direction(path) in self.cls.stands_at]
+            found = [path for path in ports if self._fits(path)]
             if not found and not any(path in graph.unknown for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 self._problem(f"{self.cls.__name__} stands at {wanting} ports, but no {asked} has one", wanted)
@@ -219,7 +219,6 @@ class Weaving:
     def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
         """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
         parts = self._full(reference).split(".")
-        outputs = [path for path in self.ports if self.graph.direction(path) == "output"]
         for length in range(len(parts), 1, -1):
             port = ".".join(parts[:length])
             if port in self.ports and self.graph.direction(port) == "output":
@@ -231,8 +230,7 @@ class Weaving:
         if self._full(reference) in self.ports:
             self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
         else:
-            close = nearest(self._full(reference), outputs)
-            near = f", did you mean {close!r}?" if close else ""
+            near = self.ports.did_you_mean(reference, self.scope, self._sends)
             self._problem(f"{name}: {reference!r} names no output port{near}", position)
         return reference, ()
 
@@ -252,16 +250,16 @@ class Weaving:
                     )
                 return
 
+    def _fits(self, port: str) -> bool:
+        """Whether the aspect can stand there."""
+        return self.graph.direction(port) in self.cls.stands_at
+
+    def _sends(self, port: str) -> bool:
+        return self.graph.direction(port) == "output"
+
     def _full(self, text: str) -> str:
         return f"{self.scope}.{text}" if self.scope else text
 
     def _problem(self, message: str, where: PointcutText | Text | Position | None, *hints: str) -> None:
         position = where.position if isinstance(where, (PointcutText, Text)) else where
         self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
-
-
-def _valid_ends(pattern: str, ports: PathIndex) -> str:
-    """Port names that exist at the pattern's depth, to choose from."""
-    depth = pattern.count(".")
-    ends = sorted({path.rpartition(".")[2] for path in ports if path.count(".") == depth})
-    return f"ports at this depth: {', '.join(ends)}" if ends else "no port has so many dots"

@@ -53,7 +53,7 @@ OUTSIDE = "cannot be read: a file named in a model lies in or below the folder o
         ("link.csv", f"'link.csv' {OUTSIDE}"),
         ("/etc/passwd", f"'/etc/passwd' {OUTSIDE}"),
         ("data", "'data' is a folder, not a file"),
-        ("data/b.csv", "there is no file 'data/b.csv', did you mean 'a.csv'?"),
+        ("data/b.csv", "there is no file 'data/b.csv', did you mean 'data/a.csv'?"),
         ("a" * 300, f"{'a' * 300!r} cannot be read: File name too long"),
     ],
 )
