@@ -13,8 +13,9 @@ from .measurement import (
     Saturate,
     StuckAt,
 )
-from .media import Medium
+from .media import Bus, Medium
 from .observation import Assert, Count, InvariantError, Probe
+from .radio import RadioMedium
 from .tokens import FieldError
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Aspect",
     "Assert",
     "Bias",
+    "Bus",
     "CommunicationAspect",
     "Corrupt",
     "Count",
@@ -41,6 +43,7 @@ __all__ = [
     "PacketLoss",
     "Probe",
     "Quantise",
+    "RadioMedium",
     "Reading",
     "Reorder",
     "Saturate",

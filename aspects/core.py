@@ -45,6 +45,9 @@ class Weaver(Protocol):
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
 
+    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
+        """``deliver(token)``, to be called later."""
+
     def latest(self, port: str) -> Any:
         """What an output port has sent last; None if it has sent nothing yet."""
 
@@ -127,6 +130,10 @@ class JoinPoint:
             self._forward(token)
         else:
             self._weaver.later(to_nanoseconds(delay), self._forward, token)
+
+    def hold(self, token: Any) -> Callable[[], None]:
+        """What lets a token pass when it is called: ``forward`` for a token that came at another time."""
+        return self._weaver.hold(self._forward, token)
 
     def later(self, delay: float, call: Callable[[Any], None], what: Any) -> None:
         """Call ``call(what)`` after ``delay`` seconds (0 is the next microstep): for what is decided only then."""

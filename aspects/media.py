@@ -2,30 +2,51 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 from abc import ABC, abstractmethod
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Generic, TypeVar
 
-from epicycle.actors import Parameter
+from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
 from .core import CommunicationAspect, JoinPoint
-from .tokens import FieldError, field_of
+from .tokens import FieldError, field_of, numbers_in
+
+NEWEST, OLDEST = "newest", "oldest"
 
 
 class Medium(CommunicationAspect, ABC):
     """Base of media: what takes place at one port changes what takes place at the others.
 
+    Each message that passes a join point is one transmission.  At an output port, or at the input of a channel that
+    copies to many, a broadcast is therefore carried once for all who hear it; at the inputs of n receivers, n times.
+
     All ports of a declaration share one medium.  Several declarations of one type (in one composite) share it, too, if
-    they give it the same name: that is how messages to different ports get different lengths.  A medium goes by the
-    time of the model, for its ports may stand under different clocks.
+    they give it the same name: that is how different messages get different lengths and priorities.  A medium goes by
+    the time of the model, for its ports may stand under different clocks.  Messages that wait go by priority, and in
+    the order in which they came among equals.
     """
+
+    stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
 
     medium: Parameter[str | None] = Parameter(
         str, None, doc="name of the medium, which declarations of the same type share; none: one of its own"
     )
-    message_length = Parameter(float, 1.0, min=0.0, doc="length of a message, in the unit of the medium's speed")
+    message_length = Parameter(float, 1.0, min=0.0, doc="length of a message")
+    number_length = Parameter(float, 0.0, min=0.0, doc="what each number in the message adds to its length")
     length_field: Parameter[str | None] = Parameter(
-        str, None, doc="field of the message that holds its length, in place of message_length"
+        str, None, doc="field of the message that holds its length, in place of both"
+    )
+    priority = Parameter(float, 0.0, doc="of the messages that wait, those with the smallest number go first")
+    priority_field: Parameter[str | None] = Parameter(
+        str, None, doc="field of the message that holds its priority, in place of priority"
+    )
+    capacity: Parameter[int | None] = Parameter(
+        int, None, min=0, doc="how many messages can wait when one comes, the carried one not counted; none: any number"
+    )
+    overflow = Parameter(
+        str, NEWEST, choices=(NEWEST, OLDEST), doc="which of the least urgent is dropped where there is no place"
     )
 
     @abstractmethod
@@ -35,11 +56,167 @@ class Medium(CommunicationAspect, ABC):
     def length_of(self, token: Any) -> float:
         """The length of a message; raises ``FieldError``."""
         if self.length_field is None:
-            return self.message_length
-        length = field_of(token, self.length_field)
-        if isinstance(length, bool) or not isinstance(length, (int, float)) or not 0.0 <= length < math.inf:
-            raise FieldError(
-                f"{type(token).__name__}.{self.length_field} is {length!r}, but the length of a message is a finite "
-                f"number >= 0"
-            )
-        return float(length)
+            return self.message_length + (self.number_length * numbers_in(token) if self.number_length else 0.0)
+        length = _number(token, self.length_field, "length")
+        if length < 0.0:
+            raise FieldError(f"{type(token).__name__}.{self.length_field} is {length:g}, but a length is >= 0")
+        return length
+
+    def priority_of(self, token: Any) -> float:
+        """The priority of a message; raises ``FieldError``."""
+        return self.priority if self.priority_field is None else _number(token, self.priority_field, "priority")
+
+
+def _number(token: Any, name: str, role: str) -> float:
+    value = field_of(token, name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise FieldError(f"{type(token).__name__}.{name} is {value!r}, but the {role} of a message is a finite number")
+    return float(value)
+
+
+@dataclass(order=True)
+class Message:
+    """A message that waits for a medium, or is carried by it; times in ns."""
+
+    priority: float
+    number: int  # which of all that have come
+    token: Any = field(compare=False)
+    point: JoinPoint = field(compare=False)
+    duration: int = field(compare=False)  # of its carriage
+
+    def __post_init__(self) -> None:
+        self.came = self.point.tag.time
+        self._release = self.point.hold(self.token)
+
+    def arrive(self) -> None:
+        """Pass it on, and note how long it took."""
+        taken = self.point.tag.time - self.came
+        if taken > 0:
+            self.point.act("delayed", self.token, to_seconds(taken))
+        self._release()
+
+
+M = TypeVar("M", bound=Message)
+
+
+class WaitingLine(Generic[M]):
+    """Messages that wait, the most urgent first, and in the order in which they came among equals."""
+
+    def __init__(self) -> None:
+        self._heap: list[M] = []
+        self._area = 0  # the integral of the number of messages over time (ns)
+        self._since = 0
+
+    def __len__(self) -> int:
+        return len(self._heap)
+
+    def area(self, now: int) -> int:
+        """The integral of the number of messages from time 0 to the present, in ns."""
+        self._area += len(self._heap) * (now - self._since)
+        self._since = now
+        return self._area
+
+    def add(self, message: M, capacity: int | None, overflow: str) -> M | None:
+        """Let a message wait; returns the one that is dropped for it, which can be itself."""
+        self.area(message.came)
+        heapq.heappush(self._heap, message)
+        if capacity is None or len(self._heap) <= capacity:
+            return None
+        least = max(each.priority for each in self._heap)
+        choose = max if overflow == NEWEST else min
+        dropped = choose((each for each in self._heap if each.priority == least), key=lambda each: each.number)
+        self._heap.remove(dropped)
+        heapq.heapify(self._heap)
+        return dropped
+
+    def pop(self, now: int) -> M:
+        """The message whose turn it is."""
+        self.area(now)
+        return heapq.heappop(self._heap)
+
+
+class Bus(Medium):
+    """Carries one message at a time, whatever its port: a server with one queue, by priority and not preemptive.
+
+    The carriage of a message takes ``factor`` * length.  It arrives when that is over, and when that is at once it
+    leaves no trace.  At the output of its sender a broadcast is carried once, at the inputs of its receivers once for
+    each.  Events: ``delayed``, when it arrives, with the seconds since it came; ``dropped``, for want of a
+    place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share in which the bus carries;
+    ``mean_wait``, the mean time from coming to the begin of carriage; ``mean_queue``, the mean number that wait.
+
+    With Poisson arrivals at rate a and a constant carriage s it is M/D/1: utilisation r = a s and
+    mean_wait = r s / (2 (1 - r)) (Pollaczek-Khinchine); with priorities, mean_wait of class k is
+    r s / (2 (1 - r_1 - ... - r_k-1) (1 - r_1 - ... - r_k)) (Cobham, Operations Research 2, 1954); with ``capacity: 0``
+    the share r / (1 + r) is dropped (Erlang).  Ptolemy: ``Bus``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("delayed", "dropped")
+    reports: ClassVar[dict[str, str]] = {"utilisation": "1", "mean_wait": "s", "mean_queue": "1"}
+
+    factor = Parameter(float, min=0.0, unit="s", doc="time that it takes to carry a message of length 1")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        bus: _Server = point.shared.setdefault("bus", _Server())
+        now = point.tag.time
+        duration = to_nanoseconds(self.factor * self.length_of(token))
+        message = Message(self.priority_of(token), bus.come, token, point, duration)
+        bus.come += 1
+        if bus.carried is not None and bus.begun + bus.carried.duration <= now:
+            bus.finish(bus.carried)  # which is over by now, though the director has not called yet
+        if bus.is_idle and not bus.line:
+            bus.begin(message)
+        elif dropped := bus.line.add(message, self.capacity, self.overflow):
+            dropped.point.act("dropped", dropped.token)
+
+    def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
+        bus: _Server = shared.get("bus", _Server())
+        return {
+            "utilisation": bus.busy_until(end) / end if end else None,
+            "mean_wait": to_seconds(bus.waited) / bus.begins if bus.begins else None,
+            "mean_queue": bus.line.area(end) / end if end else None,
+        }
+
+
+class _Server:
+    """What is on a bus, and what has been; times in ns."""
+
+    def __init__(self) -> None:
+        self.line: WaitingLine[Message] = WaitingLine()
+        self.carried: Message | None = None
+        self.begun = 0  # when the carriage of the carried one began
+        self.come = 0  # messages
+        self.begins = 0  # carriages
+        self.waited = 0  # by all whose carriage has begun
+        self._busy = 0  # by all whose carriage is over
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether it carries nothing."""
+        return self.carried is None
+
+    def begin(self, message: Message) -> None:
+        """Carry a message, now."""
+        now = message.point.tag.time
+        self.carried, self.begun = message, now
+        self.begins += 1
+        self.waited += now - message.came
+        if message.duration > 0:
+            message.point.later(to_seconds(message.duration), self.finish, message)
+        else:
+            self._deliver(message)
+
+    def finish(self, message: Message) -> None:
+        """Deliver the carried message, if it still is this one, and go on with the next."""
+        if message is self.carried:
+            self._deliver(message)
+            while self.is_idle and self.line:
+                self.begin(self.line.pop(message.point.tag.time))
+
+    def _deliver(self, message: Message) -> None:
+        self._busy += message.duration
+        self.carried = None
+        message.arrive()
+
+    def busy_until(self, end: int) -> int:
+        """How long it was busy before ``end``, which is not before the present."""
+        return self._busy + (end - self.begun if self.carried is not None else 0)

@@ -46,6 +46,23 @@ def field_of(token: Any, name: str, advice: str = "") -> Any:
     return token[name] if isinstance(token, dict) else getattr(token, name)
 
 
+def numbers_in(token: Any) -> int:
+    """How many numbers a token holds, however deep; texts and truth values are none.  Raises ``FieldError``."""
+    if isinstance(token, (bool, np.bool_, str)) or token is None:
+        return 0
+    if isinstance(token, (int, float, np.number)):
+        return 1
+    if isinstance(token, np.ndarray) and token.dtype.kind in "biufc":
+        return token.size
+    if isinstance(token, (list, tuple)):
+        return sum(map(numbers_in, token))
+    if isinstance(token, dict):
+        return sum(map(numbers_in, token.values()))
+    if dataclasses.is_dataclass(token) and not isinstance(token, type):
+        return sum(numbers_in(getattr(token, each.name)) for each in dataclasses.fields(token))
+    raise FieldError(f"a token of type {type(token).__name__} holds no numbers to count")
+
+
 def _changed(value: Any, change: Change) -> Any:
     if isinstance(value, (bool, np.bool_, str)) or value is None:
         return value

@@ -242,6 +242,7 @@ class Loom:
         self.seed = director.seed
         self.latest = latest.get
         self.stop = director.stop
+        self.hold = director.hold
         self._blame = blame
         self._local = local
         self._director = director

@@ -185,6 +185,9 @@ def facts(reference: TypeReference) -> list[str]:
         found.append(f"Stands at {' and '.join(reference.stands_at)} ports.")
     if reference.events:
         found.append(f"Events: {', '.join(reference.events)}.")
+    if reference.reports:
+        figures = (name if unit == "1" else f"{name} ({unit})" for name, unit in reference.reports.items())
+        found.append(f"Reports: {', '.join(figures)}.")
     return found
 
 

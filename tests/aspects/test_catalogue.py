@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from epicycle.actors import EpicycleError, ParameterError, Tag
 from epicycle.aspects import (
     Aspect,
     Bias,
+    Bus,
     Corrupt,
     Drift,
     Duplicate,
@@ -30,6 +32,7 @@ from epicycle.aspects import (
     Outlier,
     PacketLoss,
     Quantise,
+    RadioMedium,
     Reorder,
     Saturate,
     StuckAt,
@@ -70,6 +73,9 @@ class Bench:
 
     def latest(self, port: str) -> Any:
         raise AssertionError("nothing is read")
+
+    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
+        return partial(deliver, token)
 
     def note(self, aspect: str, port: str, event: str, token: Any) -> None:
         self.acts.append((event, token))
@@ -349,6 +355,8 @@ AT_ZERO: list[Aspect] = [
     Corrupt(probability=0),
     Corrupt(probability=0, kind="bit_flip"),
     Throttle(rate=1e9),
+    Bus(factor=0),
+    RadioMedium(message_length=0, rate=1),
     Noise(deviation=0),
     Bias(by=0),
     Drift(),

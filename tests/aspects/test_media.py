@@ -10,11 +10,12 @@ import pytest
 
 from epicycle.aspects import JoinPoint, Medium
 from epicycle.runner import ActorError, Results, Simulation
+from epicycle.runner.engine import Firing, Tracer
 from epicycle.runner.model import load_model
 from epicycle.runner.show.summary import summary_object
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import TYPES
+from engine_parts import TYPES, load, seen, simulate
 
 
 class Relay(Medium):
@@ -94,3 +95,102 @@ def test_an_error_in_what_is_decided_later_names_the_aspect(tmp_path: Path) -> N
     assert str(caught.value).splitlines()[0] == (
         "aspect one failed in later() at a.input at (1 s, 1): a token of type int has no fields"
     )
+
+
+TEAM = """
+parameters: {{robots: 3}}
+composites:
+  Robot:
+    inputs: [tick, heard]
+    outputs: [plan]
+    actors: {{planner: {{type: Scale}}, ear: {{type: Probe}}}}
+    connections: [tick -> planner.input, planner.output -> plan, heard -> ear.input]
+actors:
+  t: {{type: Ticker, period: 1 s}}
+  robot: {{type: Robot, count: "${{robots}}"}}
+  air: {{type: BroadcastChannel}}
+connections:
+  - t.output -> robot[*].tick
+  - robot[*].plan -> air.input
+  - air.output -> robot[*].heard
+aspects:
+  radio: {{type: RadioMedium, message_length: 10 kbit, rate: 1 Mbit/s, window: 1024, at: "{}"}}
+run: {{stop: 99.9 s}}
+"""
+
+
+@pytest.mark.parametrize("at", ["robot[*].plan", "air.input", "robot[*].planner.output"])
+@pytest.mark.parametrize("robots", [2, 8])
+def test_a_broadcast_occupies_the_medium_once(at: str, robots: int) -> None:
+    _, results = simulate(TEAM.format(at), set=[f"robots={robots}"])
+    figures = results.aspects["radio"]
+    # Within a second all come through; what collides costs an airtime once for two or more of them.
+    assert figures["delayed"] == 100 * robots
+    assert figures["dropped"] == 0
+    sent = 100 * robots * 0.01
+    assert figures["throughput"] == pytest.approx(sent / results.end)
+    assert figures["utilisation"] <= (sent + 0.01 * figures["collided"] / 2) / results.end
+    assert figures["utilisation"] >= figures["throughput"]
+    stations = {record.value[0] for record in results.log.records if record.event == "delayed"}
+    assert len(stations) == 100
+
+
+def test_at_its_receivers_a_message_is_a_transmission_to_each() -> None:
+    once, each = (simulate(TEAM.format(f"robot[*].{port}"))[1].aspects["radio"] for port in ("plan", "heard"))
+    assert (once["delayed"], each["delayed"]) == (300, 600)
+    assert each["throughput"] > 1.95 * once["throughput"]
+    assert each["collided"] == 0  # all come from the channel, which is one station here
+
+
+LINE = """
+actors:
+  t: {{type: Ticker, period: {period}}}
+  a: {{type: Probe}}
+connections: [t.output -> a.input]
+aspects:
+  {first}
+  {second}
+run: {{stop: 4 s}}
+"""
+DROP = "drop: {{type: PacketLoss, probability: {}, at: a.input}}"
+BUS = "bus: {type: Bus, factor: 250 ms, at: a.input}"
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_order_shows(seed: int) -> None:
+    def arrivals(first: str, second: str, period: str) -> tuple[list[tuple[float, int, Any]], float | None]:
+        model, results = simulate(LINE.format(first=first, second=second, period=period), seed=seed)
+        tokens = [(time, microstep, token) for time, microstep, tokens in seen(model, "a") for token in tokens]
+        return tokens, results.aspects["bus"]["utilisation"]
+
+    # What is dropped before the bus does not occupy it; what is dropped behind it does.  The same ones are dropped.
+    before, busy_before = arrivals(DROP.format(0.5), BUS, "200 ms")
+    behind, busy_behind = arrivals(BUS, DROP.format(0.5), "200 ms")
+    assert busy_behind == pytest.approx(1.0)
+    assert busy_before is not None
+    assert busy_before < 0.8
+    assert {token for _, _, token in behind} < {token for _, _, token in before}
+    times = {token: time for time, _, token in behind}
+    assert all(time == pytest.approx(0.25 * (token + 1)) for token, time in times.items())
+    assert any(time < times[token] for time, _, token in before if token in times)
+    # What drops nothing is not felt, wherever it stands: both arrive at (0.25, 1).
+    for order in ((DROP.format(0), BUS), (BUS, DROP.format(0))):
+        assert arrivals(*order, "10 s")[0] == [(0.25, 1, 0)]
+
+
+def test_a_trace_tells_who_sent_what_has_waited() -> None:
+    text = """
+actors:
+  t: {type: Ticker, period: 1 s, limit: 1}
+  a: {type: Scale}
+  b: {type: Scale}
+  join: {type: Join}
+connections: [t.output -> a.input, t.output -> b.input, "[a.output, b.output] -> join.input"]
+aspects: {bus: {type: Bus, factor: 250 ms, at: join.input}}
+run: {stop: 4 s}
+"""
+    model = load(text)
+    firings: list[Firing] = []
+    Simulation(model, tracer=Tracer(dict(model.graph.actors), firings.append)).run()
+    found = [(arrival.source, f.tag.seconds) for f in firings if f.actor == "join" for arrival in f.arrivals]
+    assert found == [("a.output", 0.25), ("b.output", 0.5)]
