@@ -1,7 +1,16 @@
 """What can be woven around a model: aspects, and the join points that they act at."""
 
 from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
-from .core import Aspect, CommunicationAspect, JoinPoint, MeasurementAspect, ObservationAspect, Reading, Weaver
+from .core import (
+    Aspect,
+    CommunicationAspect,
+    JoinPoint,
+    MeasurementAspect,
+    ObservationAspect,
+    Reading,
+    Selection,
+    Weaver,
+)
 from .measurement import (
     Alteration,
     Bias,
@@ -16,6 +25,8 @@ from .measurement import (
 from .media import Bus, Medium
 from .observation import Assert, Count, InvariantError, Probe
 from .radio import RadioMedium
+from .selection import GroupsParameter, PortsParameter, SelectionParameter
+from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
 from .tokens import FieldError
 
 __all__ = [
@@ -31,6 +42,7 @@ __all__ = [
     "Duplicate",
     "FieldError",
     "GilbertElliott",
+    "GroupsParameter",
     "InvariantError",
     "JoinPoint",
     "Latency",
@@ -39,14 +51,22 @@ __all__ = [
     "Medium",
     "Noise",
     "ObservationAspect",
+    "Occlusion",
+    "OutOfRange",
+    "Outage",
     "Outlier",
     "PacketLoss",
+    "PortsParameter",
     "Probe",
     "Quantise",
     "RadioMedium",
+    "RangeLoss",
     "Reading",
     "Reorder",
     "Saturate",
+    "Selection",
+    "SelectionParameter",
+    "SituationError",
     "StuckAt",
     "Throttle",
     "Weaver",

@@ -10,7 +10,7 @@ calling ``point.act(...)``.  Doing exactly ``point.forward(token)`` leaves no tr
 Aspects at the same port apply in the order of their declaration, the first one outermost (nearest to the sender).
 An aspect acts while it is *active*: from ``from`` until ``until`` (again every ``every``), and ``when`` a condition
 over ports holds.  At other times tokens pass it untouched, and it does not learn of them.  It may look at what ports
-have sent last (``reads``, ``point.latest``), and changes nothing but what passes where it is woven.
+have sent last (``PortsParameter``, ``reads``, ``point.latest``), and changes nothing but what passes where it is woven.
 
 Each join point has a random stream of its own, keyed by the names of aspect and port: adding, removing or re-aiming
 an aspect moves no stream of an actor, of another aspect, or of the same aspect at another port.  An aspect should
@@ -29,6 +29,7 @@ from epicycle.actors import Configurable, EpicycleError, Parameter, Tag, random_
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand, value_at
 
 Reading = tuple[str, tuple[str, ...]]  # an output port, and the fields that lead to a part of its token
+Selection = Mapping[str, Sequence[str]]  # patterns, and the full paths that they select
 
 
 class Weaver(Protocol):
@@ -66,7 +67,8 @@ class JoinPoint:
 
     ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for what it must remember
     about this port between tokens; ``shared`` is one for all its ports.  ``place`` is the connection, for an aspect
-    that stands on one connection to the port alone.  ``readings`` are what the aspect's expressions over ports ask for.
+    that stands on one connection to the port alone.  ``readings`` are what the aspect's expressions over ports ask for,
+    ``selections`` what its parameters with patterns select.
     ``source`` is the port that tokens come from over the connection, at an output the port itself.
     """
 
@@ -80,6 +82,7 @@ class JoinPoint:
         place: str = "",
         readings: Mapping[PortFormula, Sequence[Reading]] | None = None,
         source: str = "",
+        selections: Mapping[str, Selection] | None = None,
     ) -> None:
         self.aspect = aspect
         self.port = port
@@ -91,6 +94,7 @@ class JoinPoint:
         self._weaver = weaver
         self._forward = forward
         self._readings = readings or {}
+        self._selections = selections or {}
 
     @property
     def tag(self) -> Tag:
@@ -123,6 +127,10 @@ class JoinPoint:
                 return None
             values.append(operand(value_at(latest, fields)))
         return formula(values, **given)
+
+    def selected(self, parameter: str) -> Selection:
+        """The full paths that each pattern in a ``SelectionParameter`` of the aspect selects."""
+        return self._selections.get(parameter, {})
 
     def forward(self, token: Any, delay: float | None = None) -> None:
         """Let a token pass, at once or after ``delay`` seconds (0 is the next microstep)."""

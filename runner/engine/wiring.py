@@ -218,7 +218,7 @@ class Wiring:
         local = self.director if is_medium else self.director_of(self.graph.owner(path))
         blame = partial(self._error, woven, f"later() at {path}")
         loom = Loom(local, self.director, self.log, self._latest, self._signals, blame)
-        point = JoinPoint(name, path, loom, onward, self.shared(woven), place, woven.readings, source)
+        point = JoinPoint(name, path, loom, onward, self.shared(woven), place, woven.readings, source, woven.selections)
         first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)

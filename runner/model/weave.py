@@ -10,10 +10,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from epicycle.actors import declared_parameters
 from epicycle.actors.expression import PortFormula
-from epicycle.aspects import Aspect, Reading
+from epicycle.aspects import Aspect, PortsParameter, Reading, Selection, SelectionParameter
 
 from .declarations import PointcutText
 from .graph import ModelGraph
@@ -26,7 +27,8 @@ from .reading import Text
 class WovenAspect:
     """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
 
-    ``readings`` are what its expressions over ports ask for, ``reads`` the ports that it looks at otherwise.
+    ``readings`` are what its expressions over ports ask for, ``selections`` what its parameters with patterns select,
+    ``reads`` the ports that it looks at otherwise.
     """
 
     name: str
@@ -34,6 +36,7 @@ class WovenAspect:
     ports: list[str]
     connections: list[tuple[str, str]] = field(default_factory=list)
     readings: dict[PortFormula, list[Reading]] = field(default_factory=dict)
+    selections: dict[str, Selection] = field(default_factory=dict)
     reads: list[str] = field(default_factory=list)
 
     @property
@@ -76,13 +79,20 @@ class Weaving:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
             self._problem(nowhere, pointcuts[0])
-        for name in declared_parameters(type(aspect)):
+        for name, parameter in declared_parameters(type(aspect)).items():
+            if isinstance(parameter, SelectionParameter):
+                patterns = parameter.patterns(getattr(aspect, name))
+                found = {each: self._selected(name, each, parameter, position_of(name)) for each in patterns}
+                woven.selections[name] = found
+                if isinstance(parameter, PortsParameter):
+                    woven.reads += [port for ports in found.values() for port in ports]
+                continue
             formula = getattr(aspect, name)
             if isinstance(formula, PortFormula):
                 position = position_of(name)
                 woven.readings[formula] = [self._reading(name, each, position) for each in formula.references]
         chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
-        woven.reads = self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
+        woven.reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return woven
 
     def select(self, pointcuts: list[PointcutText]) -> list[str]:
@@ -215,6 +225,27 @@ class Weaving:
         is_excused = self.graph.is_excused(pattern)
         self._is_excused = self._is_excused or is_excused
         return is_excused
+
+    def _selected(
+        self, name: str, pattern: str, parameter: SelectionParameter[Any], position: Position | None
+    ) -> list[str]:
+        """What a pattern in the parameter ``name`` selects."""
+        of_ports = isinstance(parameter, PortsParameter)
+        paths = self.ports if of_ports else PathIndex([*self.graph.actors, *self.graph.composites])
+        try:
+            found = paths.select(self._full(pattern))
+        except PatternError as error:
+            self._problem(f"{name}: {pattern!r} is no pattern: {error}", position)
+            return []
+        fitting = [path for path in found if not of_ports or self._sends(path)]
+        if found and not fitting:
+            self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
+        elif not found and not self.graph.is_excused(self._full(pattern)):
+            near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
+            self._problem(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
+        elif len(fitting) > 1 and parameter.is_single:
+            self._problem(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
+        return fitting
 
     def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
         """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""

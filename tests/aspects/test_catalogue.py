@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epicycle.actors import EpicycleError, ParameterError, Tag
+from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters
 from epicycle.aspects import (
     Aspect,
     Bias,
@@ -29,12 +29,17 @@ from epicycle.aspects import (
     MeasurementFailure,
     Noise,
     ObservationAspect,
+    Occlusion,
+    Outage,
     Outlier,
+    OutOfRange,
     PacketLoss,
     Quantise,
     RadioMedium,
+    RangeLoss,
     Reorder,
     Saturate,
+    SelectionParameter,
     StuckAt,
     Throttle,
 )
@@ -53,9 +58,13 @@ class Reading:
 
 
 class Bench:
-    """Sends tokens through one join point and keeps what comes out: (time in ms, token)."""
+    """Sends tokens through one join point and keeps what comes out: (time in ms, token).
 
-    def __init__(self, aspect: Aspect, seed: int = 1) -> None:
+    ``world`` is what ports have sent last; patterns in parameters of the aspect select what they spell.
+    """
+
+    def __init__(self, aspect: Aspect, seed: int = 1, world: dict[str, Any] | None = None) -> None:
+        self.world = world
         self.seed = seed
         self.tag = Tag(0, 1)
         self.out: list[tuple[float, Any]] = []
@@ -63,7 +72,15 @@ class Bench:
         self._later: list[tuple[int, int, int, Callable[[Any], None], Any]] = []
         self._count = itertools.count()
         self.point = JoinPoint(
-            "it", "a.port", self, lambda token: self.out.append((self.tag.time / MILLISECOND, token))
+            "it",
+            "a.port",
+            self,
+            lambda token: self.out.append((self.tag.time / MILLISECOND, token)),
+            selections={
+                name: {each: [each] for each in parameter.patterns(getattr(aspect, name))}
+                for name, parameter in declared_parameters(type(aspect)).items()
+                if isinstance(parameter, SelectionParameter)
+            },
         )
         self.aspect = aspect
 
@@ -72,7 +89,8 @@ class Bench:
         heapq.heappush(self._later, (*at, next(self._count), deliver, token))
 
     def latest(self, port: str) -> Any:
-        raise AssertionError("nothing is read")
+        assert self.world is not None, "nothing is read"
+        return self.world.get(port)
 
     def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
         return partial(deliver, token)
@@ -357,6 +375,10 @@ AT_ZERO: list[Aspect] = [
     Throttle(rate=1e9),
     Bus(factor=0),
     RadioMedium(message_length=0, rate=1),
+    RangeLoss(positions=["a.at", "b.at"], range=math.inf),
+    OutOfRange(positions="a.at", target="b.at", range=math.inf),
+    Occlusion(positions=["a.at", "b.at"], target="b.at", radius=0),
+    Outage(groups={}),
     Noise(deviation=0),
     Bias(by=0),
     Drift(),
@@ -371,7 +393,7 @@ AT_ZERO: list[Aspect] = [
 @pytest.mark.parametrize("aspect", AT_ZERO, ids=repr)
 def test_strength_zero_hands_on_the_very_tokens_and_leaves_no_trace(aspect: Aspect) -> None:
     sent = [1.5, 3, np.array([1.0, 2.0]), Reading("a", (1.0, [2.0])), {"x": 1.0}, -0.0, math.nan]
-    bench = Bench(aspect).play(sent, period=10)
+    bench = Bench(aspect, world={"a.at": [0.0, 0.0], "b.at": {"position": [3.0, 4.0]}}).play(sent, period=10)
     assert len(bench.tokens) == len(sent)
     assert all(out is token for out, token in zip(bench.tokens, sent, strict=True))
     assert [time for time, _ in bench.out] == [10.0 * index for index in range(len(sent))]

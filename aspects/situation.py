@@ -1,0 +1,238 @@
+"""Disturbances that depend on where bodies are and who they are: distance, range, line of sight, partition.
+
+A body is known by the output port that sends where it is: ``main.state`` stands for whatever belongs to ``main``.  Such
+a port sends positions in m, as arrays, lists or (on a line) numbers, or tokens with such a field ``position``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.actors import EpicycleError, Parameter
+from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand
+
+from .core import Aspect, CommunicationAspect, JoinPoint, MeasurementAspect
+from .observation import TOKEN
+from .selection import GroupsParameter, PortsParameter
+
+Position = NDArray[np.float64]
+SENDER = "expression for the path of who sent the message, such as token.robot; none: whose port the connection leaves"
+
+
+class SituationError(EpicycleError):
+    """Something of which cannot be told where or who it is."""
+
+
+class _Situated(Aspect):
+    """An aspect that knows where bodies are."""
+
+    positions = PortsParameter(doc="output ports that send where the bodies are, one for each")
+
+    def body(self, path: str, point: JoinPoint) -> str:
+        """The port of the body to which a path belongs: the one whose own path has most of its segments in common."""
+        known: dict[str, str] = point.memory.setdefault("bodies", {})
+        if path not in known:
+            ports = _ports(point, "positions")
+            common = {port: _common(path, port) for port in ports}
+            most = max(common.values(), default=0)
+            nearest = [port for port in ports if common[port] == most > 0]
+            if len(nearest) != 1:
+                several = f"several ports tell where it may be: {', '.join(nearest)}"
+                none = f"no port tells where it is; 'positions' selects {', '.join(ports) or 'none'}"
+                raise SituationError(f"{path}: {several if nearest else none}")
+            known[path] = nearest[0]
+        return known[path]
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        raise NotImplementedError(f"{type(self).__name__} has no pass_token()")
+
+
+class RangeLoss(_Situated, CommunicationAspect):
+    """Drops messages that come from afar: log-distance path loss with log-normal shadowing.
+
+    At the distance d from sender to receiver the received power is 10 * exponent * log10(range / d) + X dB above what
+    the receiver needs, with X ~ N(0, shadowing^2); below 0 dB the message is lost.  So the loss at d is
+    Phi(10 * exponent * log10(d / range) / shadowing): half of the messages at ``range``, and a sharp edge there without
+    shadowing.  X is new for every message, or with ``correlation`` changes as the two ends move: from one message to
+    the next over this way by rho = exp(-moved / correlation), moved being the metres that both moved together.
+    Before the places of both are known, messages pass.  Event: ``dropped``.  Source: Rappaport, Wireless
+    Communications, 2nd ed., section 4.9; correlation: Gudmundson, Electronics Letters 27, 1991.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("dropped",)
+
+    sender = PortFormulaParameter(None, given=(TOKEN,), doc=SENDER)
+    range = Parameter(float, min=1e-9, unit="m", doc="distance at which half of the messages are lost")
+    exponent = Parameter(
+        float, 3.0, min=0.0, unit="1", doc="path-loss exponent: 2 in free space, 3 to 5 around obstacles"
+    )
+    shadowing = Parameter(float, 4.0, min=0.0, unit="1", doc="standard deviation of the received power, in dB")
+    correlation: Parameter[float | None] = Parameter(
+        float, None, min=1e-9, unit="m", doc="way over which shadowing changes; none: from message to message"
+    )
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        draw = point.random.standard_normal()
+        sender = self.body(_sender(self.sender, token, point), point)
+        here, there = _latest(sender, point), _latest(self.body(point.owner, point), point)
+        if here is None or there is None:
+            point.forward(token)
+            return
+        if self.correlation is not None:
+            draw = self._correlated(draw, np.concatenate((here, there)), point.memory.setdefault("links", {}), sender)
+        distance = math.dist(here, there)
+        margin = math.inf if distance == 0.0 else 10.0 * self.exponent * math.log10(self.range / distance)
+        if margin + self.shadowing * draw < 0.0:
+            point.act("dropped", token)
+        else:
+            point.forward(token)
+
+    def _correlated(self, draw: float, ends: Position, links: dict[str, tuple[float, Position]], sender: str) -> float:
+        """A standard normal number that has to do with the last one of this link."""
+        assert self.correlation is not None
+        if sender in links:
+            last, before = links[sender]
+            half = len(ends) // 2
+            moved = math.dist(ends[:half], before[:half]) + math.dist(ends[half:], before[half:])
+            rho = math.exp(-moved / self.correlation)
+            draw = rho * last + math.sqrt(1.0 - rho * rho) * draw
+        links[sender] = draw, ends
+        return draw
+
+
+class OutOfRange(_Situated, MeasurementAspect):
+    """Lets measurements fail while the target is farther away than the sensor sees.
+
+    The sensor is where the body is to which it belongs.  Before both places are known, measurements pass.
+    Event: ``failed``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("failed",)
+
+    target = PortsParameter(single=True, doc="output port that sends where the target is")
+    range = Parameter(float, min=0.0, unit="m", doc="greatest distance that can be measured")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        sensor, target = _latest(self.body(point.owner, point), point), _target(point)
+        if sensor is not None and target is not None and math.dist(sensor, target) > self.range:
+            point.act("failed", token)
+        else:
+            point.forward(token)
+
+
+class Occlusion(_Situated, MeasurementAspect):
+    """Lets measurements fail while another body stands in the line of sight.
+
+    Every body that ``positions`` names but the sensor's own and the target is opaque within ``radius``: it occludes
+    what it is nearer to than that, of the straight line from sensor to target.  Event: ``occluded``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("occluded",)
+
+    target = PortsParameter(single=True, doc="output port that sends where the target is")
+    radius = Parameter(float, min=0.0, unit="m", doc="radius of the bodies; 0 occludes nothing")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        own = self.body(point.owner, point)
+        sensor, target = _latest(own, point), _target(point)
+        if sensor is None or target is None:
+            point.forward(token)
+            return
+        others = (port for port in _ports(point, "positions") if port not in (own, *_ports(point, "target")))
+        places = (place for port in others if (place := _latest(port, point)) is not None)
+        if any(_distance(place, sensor, target) < self.radius for place in places):
+            point.act("occluded", token)
+        else:
+            point.forward(token)
+
+
+class Outage(CommunicationAspect):
+    """Cuts a network in parts: drops every message from a member of one group to a member of another alone.
+
+    Who is in several groups talks with all of them; who is in none hears, and is heard by, everybody.  ``from``,
+    ``until`` and ``every`` say when.  Event: ``dropped``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("dropped",)
+
+    sender = PortFormulaParameter(None, given=(TOKEN,), doc=SENDER)
+    groups = GroupsParameter(doc="the parts: {name: [actors or composites, as patterns], ...}")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        sender = self._groups_of(_sender(self.sender, token, point), point)
+        receiver = self._groups_of(point.owner, point)
+        if sender and receiver and not sender & receiver:
+            point.act("dropped", token)
+        else:
+            point.forward(token)
+
+    def _groups_of(self, path: str, point: JoinPoint) -> frozenset[str]:
+        """The groups that an actor or composite, or what it stands in, belongs to."""
+        known: dict[str, frozenset[str]] = point.memory.setdefault("groups", {})
+        if path not in known:
+            segments = path.split(".")
+            around = {".".join(segments[:length]) for length in range(1, len(segments) + 1)}
+            selected = point.selected("groups")
+            known[path] = frozenset(
+                name
+                for name, patterns in self.groups.items()
+                if any(not around.isdisjoint(selected[pattern]) for pattern in patterns)
+            )
+        return known[path]
+
+
+def _sender(formula: PortFormula | None, token: Any, point: JoinPoint) -> str:
+    """The path of who sent a token."""
+    if formula is None:
+        return point.source.rpartition(".")[0]
+    path = point.value_of(formula, token=token)
+    if not isinstance(path, str) or not path:
+        raise SituationError(f"sender: {formula.source} is {path!r}, but the path of the sender is needed")
+    return path
+
+
+def _ports(point: JoinPoint, parameter: str) -> list[str]:
+    """All ports that the patterns in a parameter select, once each."""
+    return list(dict.fromkeys(port for ports in point.selected(parameter).values() for port in ports))
+
+
+def _target(point: JoinPoint) -> Position | None:
+    return next((_latest(port, point) for port in _ports(point, "target")), None)
+
+
+def _latest(port: str, point: JoinPoint) -> Position | None:
+    """Where a body is, by what its port has sent last; None before that."""
+    token = operand(point.latest(port))
+    if token is None:
+        return None
+    position = token.get("position") if isinstance(token, dict) else token
+    position = [position] if _is_number(position) else position
+    if not (isinstance(position, list) and position and all(_is_number(each) for each in position)):
+        raise SituationError(f"{port} sends no position: numbers, or a token with such a field 'position'")
+    return np.array(position, dtype=float)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _common(path: str, other: str) -> int:
+    """How many segments two paths begin with in common."""
+    count = 0
+    for one, two in zip(path.split("."), other.split("."), strict=False):
+        if one != two:
+            break
+        count += 1
+    return count
+
+
+def _distance(place: Position, start: Position, end: Position) -> float:
+    """From a place to the segment between two others."""
+    along = end - start
+    length = float(along @ along)
+    share = 0.0 if length == 0.0 else min(1.0, max(0.0, float((place - start) @ along) / length))
+    return math.dist(place, start + share * along)
