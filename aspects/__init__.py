@@ -11,6 +11,8 @@ from .core import (
     Selection,
     Weaver,
 )
+from .execution import ActorPoint, ExecutionAspect, Job
+from .firing import ExecutionTime, SkipFiring
 from .measurement import (
     Alteration,
     Bias,
@@ -30,6 +32,7 @@ from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
 from .tokens import FieldError
 
 __all__ = [
+    "ActorPoint",
     "Alteration",
     "Aspect",
     "Assert",
@@ -40,10 +43,13 @@ __all__ = [
     "Count",
     "Drift",
     "Duplicate",
+    "ExecutionAspect",
+    "ExecutionTime",
     "FieldError",
     "GilbertElliott",
     "GroupsParameter",
     "InvariantError",
+    "Job",
     "JoinPoint",
     "Latency",
     "MeasurementAspect",
@@ -67,6 +73,7 @@ __all__ = [
     "Selection",
     "SelectionParameter",
     "SituationError",
+    "SkipFiring",
     "StuckAt",
     "Throttle",
     "Weaver",

@@ -173,13 +173,15 @@ class Aspect(Configurable):
 
     ``stands_at`` says which ports it can be woven around: inputs (communication), outputs (measurement), or both.
     ``events`` names what it may note, so that summaries show a zero where nothing happened; ``reports`` names the
-    figures that it tells at the end of a run, with their units.
+    figures that it tells at the end of a run, with their units.  ``in_model_time``: it goes by the time of the model,
+    and not by the clocks of the composites in which it stands.
     """
 
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled"})
     stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
     events: ClassVar[tuple[str, ...]] = ()
     reports: ClassVar[dict[str, str]] = {}
+    in_model_time: ClassVar[bool] = False
 
     from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")
     until: Parameter[float | None] = Parameter(float, None, min=0.0, unit="s", doc="active before this time alone")
@@ -218,6 +220,10 @@ class Aspect(Configurable):
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         """Decide what becomes of a token at a join point."""
         raise NotImplementedError(f"{type(self).__name__} has no pass_token()")
+
+    def pass_by(self, token: Any, point: JoinPoint) -> None:
+        """What becomes of a token while the aspect is not active: it goes on, untouched."""
+        point.forward(token)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
         """The figures that it ``reports``, from ``point.shared`` and the time (ns) at which the run ended.

@@ -29,6 +29,7 @@ class Medium(CommunicationAspect, ABC):
     """
 
     stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
+    in_model_time: ClassVar[bool] = True
 
     medium: Parameter[str | None] = Parameter(
         str, None, doc="name of the medium, which declarations of the same type share; none: one of its own"

@@ -20,10 +20,21 @@ class ParameterPort(InputPort[T]):
         self._parameter = parameter
         self._received: Any = _NOTHING
         self._current: Any = _NOTHING
+        self._before: Any = _NOTHING  # what had been received, and not been read, before the present tag
 
     def put(self, token: T, channel: int) -> None:
+        if not self._arriving[0]:
+            self._before = self._received
         super().put(token, channel)
         self._received = token
+
+    def take(self) -> tuple[list[T], list[int]]:
+        self._received = self._before
+        return super().take()
+
+    def give(self, taken: tuple[list[T], list[int]]) -> None:
+        super().give(taken)
+        self._received = taken[0][-1]
 
     def reset(self) -> None:
         """Forget what came: the declared value counts again."""

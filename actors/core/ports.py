@@ -130,6 +130,17 @@ class InputPort(_Port[T]):
         self._tokens.clear()
         self._channels.clear()
 
+    def take(self) -> tuple[list[T], list[int]]:
+        """Engine: take the tokens out, as if they had not come yet."""
+        taken, self._arriving = self._arriving, ([], [])
+        self.release()
+        return taken
+
+    def give(self, taken: tuple[list[T], list[int]]) -> None:
+        """Engine: show tokens that were taken out."""
+        self._arriving = taken
+        self.release()
+
     def hold(self) -> None:
         """Engine: until ``release`` show nothing, and keep what is there and what comes."""
         self._tokens, self._channels = [], []

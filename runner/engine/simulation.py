@@ -10,14 +10,15 @@ from typing import Any
 from epicycle.actors import Actor, to_nanoseconds, to_seconds
 
 from ..model import Metric, Model, firing_order
-from .director import ActorError, Director, describe
+from .director import ActorError, describe
+from .execution import director_for
 from .local import Deliver
 from .log import EventLog
 from .log_filter import LogFilter
 from .pace import Pace
 from .results import Reduction, Results
 from .signal import Signal
-from .trace import Tracer, TracingDirector, TracingLog
+from .trace import Tracer, TracingLog
 from .wiring import Wiring
 
 
@@ -51,7 +52,8 @@ class Simulation:
         order = firing_order(model.graph)
         keeps = keep_log.keeps if keep_log else None
         self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
-        self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
+        executing = any(woven.actors for woven in model.aspects)
+        self.director = director_for(order, self.seed, tracer, executing=executing)
         self.signals = {name: Signal(name) for name in model.recorded}
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
         self._has_run = False

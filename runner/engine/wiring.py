@@ -7,10 +7,11 @@ from functools import partial
 from typing import Any
 
 from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag
-from epicycle.aspects import JoinPoint, Medium
+from epicycle.aspects import ActorPoint, JoinPoint, Medium
 
 from ..model import Hop, Model, WovenAspect
 from .director import ActorError, Director, LoopError, describe
+from .execution import ExecutingDirector
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog
 from .signal import Signal
@@ -45,7 +46,7 @@ class Wiring:
         self._shared: dict[object, dict[Any, Any]] = {}
         self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
         for woven in model.aspects:
-            for path in woven.ports:
+            for path in (*woven.ports, *woven.actors):
                 self._woven_at.setdefault(path, []).append(woven)
             for connection in woven.connections:
                 self._woven_on.setdefault(connection, []).append(woven)
@@ -58,6 +59,10 @@ class Wiring:
             for paths in self.graph.borders(composite):
                 self._passages.update({path: Passage(path, director) for path in paths})
         self._emits = self._find()
+        if isinstance(director, ExecutingDirector):
+            for path, actor in self.graph.actors.items():
+                if path in self._woven_at:
+                    director.weave(actor, self._woven(path, path, director.execute))
 
     def director_of(self, path: str) -> Director | LocalDirector:
         """The director that an actor or composite stands under, with its time."""
@@ -190,7 +195,7 @@ class Wiring:
             if woven.aspect.is_due(point.tag.time) and self._holds(woven, point):
                 through(token)
             else:
-                onward(token)
+                woven.aspect.pass_by(token, point)
 
         return through_if_active
 
@@ -214,11 +219,17 @@ class Wiring:
         return self._shared.setdefault(key, {})
 
     def _point(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str) -> JoinPoint:
-        name, is_medium = woven.name, isinstance(woven.aspect, Medium)
-        local = self.director if is_medium else self.director_of(self.graph.owner(path))
+        name, is_actor = woven.name, path in self.graph.actors
+        owner = path if is_actor else self.graph.owner(path)
+        local = self.director if woven.aspect.in_model_time else self.director_of(owner)
         blame = partial(self._error, woven, f"later() at {path}")
-        loom = Loom(local, self.director, self.log, self._latest, self._signals, blame)
-        point = JoinPoint(name, path, loom, onward, self.shared(woven), place, woven.readings, source, woven.selections)
+        weaver = (ActorLoom if is_actor else Loom)(local, self.director, self.log, self._latest, self._signals, blame)
+        kind = ActorPoint if is_actor else JoinPoint
+        point = kind(
+            name, path, weaver, onward, self.shared(woven), place, woven.readings, source, woven.selections
+        )
+        if isinstance(point, ActorPoint):
+            point.unit = woven.actors[path]
         first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)
@@ -274,6 +285,13 @@ class Loom:
     def record(self, signal: str, token: Any) -> None:
         """Append a token to a signal of the results."""
         self._signals.setdefault(signal, Signal(signal)).add(self._director.tag, token)
+
+
+class ActorLoom(Loom):
+    """The same for the join point of an actor."""
+
+    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
+        self._log.add(self._director.tag, event, port, "", None, aspect, token)
 
 
 def _all(ways: list[Deliver]) -> Deliver:

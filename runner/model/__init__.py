@@ -11,7 +11,7 @@ from .patterns import PatternError, select
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
 from .scope import Composite, CompositePort, Instance
-from .weave import WovenAspect
+from .weave import WovenAspect, extent
 
 __all__ = [
     "Clock",
@@ -31,6 +31,7 @@ __all__ = [
     "Wire",
     "WovenAspect",
     "did_you_mean",
+    "extent",
     "firing_order",
     "load_composite",
     "load_model",

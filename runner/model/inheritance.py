@@ -222,7 +222,7 @@ def _pairs(connection: ConnectionText) -> list[tuple[str, str]]:
 def _head(text: Text | PointcutText) -> str:
     """The actor that an endpoint or pointcut names first; nothing for an own port."""
     first, dot, _ = text.text.partition(".")
-    return first.partition("[")[0] if dot else ""
+    return first.partition("[")[0] if dot or isinstance(text, PointcutText) else ""
 
 
 def _at(position: Position) -> str:

@@ -162,6 +162,7 @@ class Model(Scope):
         self.scopes.remove(path)
         for woven in self.aspects:
             woven.ports = [port for port in woven.ports if not is_within(port, path)]
+            woven.actors = {actor: unit for actor, unit in woven.actors.items() if not is_within(actor, path)}
             woven.connections = [ends for ends in woven.connections if not any(is_within(end, path) for end in ends)]
         self.aspects = [woven for woven in self.aspects if not is_within(woven.name, path)]
         self.recorded = [port for port in self.recorded if not is_within(port, path)]

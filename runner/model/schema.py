@@ -152,7 +152,7 @@ _PATTERN: Schema = {
 }
 _POINTCUT_TEXT: Schema = {
     "type": "string",
-    **_text(POINTCUT, "expected ports as a pattern, a connection 'a.out -> b.in', or one of these after a !"),
+    **_text(POINTCUT, "expected ports or actors as a pattern, a connection 'a.out -> b.in', or one of these after a !"),
 }
 _FLAG: Schema = {"type": ["boolean", "string"], **_text(EXPRESSION, "expected true or false")}
 _BODY: dict[str, tuple[Schema, str]] = {
@@ -218,8 +218,8 @@ _PORT: dict[str, tuple[Schema, str]] = {
     "doc": (_ref("text"), "What it is."),
 }
 _POINTCUT: dict[str, tuple[Schema, str]] = {
-    "type": (_ref("text"), "The type of the actors and composites at whose ports it stands."),
-    "tag": (_ref("text"), "A tag of the actors and composites at whose ports it stands."),
+    "type": (_ref("text"), "The type of the actors and composites at which, or at whose ports, it stands."),
+    "tag": (_ref("text"), "A tag of the actors and composites at which, or at whose ports, it stands."),
     "port": (_ref("text"), "The name of the port; none: all ports where it can stand."),
 }
 _METRIC: dict[str, tuple[Schema, str]] = {
@@ -237,7 +237,7 @@ _BESIDE: dict[str, tuple[Schema, str]] = {
     ),
     "at": (
         _ref("pointcuts"),
-        "Where it stands: patterns of ports, 'a.out -> b.in', {type, port} or {tag, port}; !pattern leaves out.",
+        "Where it stands: patterns of ports or actors, 'a.out -> b.in', {type, port} or {tag, port}; not at !pattern.",
     ),
     "tags": (_one_or_more(_ref("text")), "Names by which aspects can choose it: 'at: {tag: ...}'."),
     "enabled": (_FLAG, "Whether it does anything (default: true)."),

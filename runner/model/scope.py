@@ -59,6 +59,8 @@ class CompositePort:
 
 Port: TypeAlias = "InputPort[Any] | OutputPort[Any] | CompositePort"
 Ends: TypeAlias = "str | Port | Iterable[str | Port]"
+Place: TypeAlias = "str | Port | Actor | Composite"
+Places: TypeAlias = "Place | Iterable[Place]"
 
 
 class Instance(Protocol):
@@ -387,10 +389,10 @@ class Scope:
 
     # -- aspects --------------------------------------------------------------------------------------------------
 
-    def weave(self, name: str, aspect: Aspect, *, at: Ends) -> WovenAspect:
-        """Let an aspect stand at ports, given as such or as patterns over the ports that are there now.
+    def weave(self, name: str, aspect: Aspect, *, at: Places) -> WovenAspect:
+        """Let an aspect stand at ports or actors, given as such or as patterns over those that are there now.
 
-        Aspects at one port apply in the order in which they are woven.  Raises ``ModelError``.
+        Aspects at one port or actor apply in the order in which they are woven.  Raises ``ModelError``.
         """
         position = call_site()
         full = self._full(name)
@@ -401,7 +403,7 @@ class Scope:
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
             pointcuts = []
             for end in _each(at):
-                path = end if isinstance(end, str) else self._known(end, position, problems)
+                path = end if isinstance(end, str) else self._place(end, aspect, position, problems)
                 if path is not None:
                     name_here = path if path is end else path.removeprefix(self._full(""))
                     pointcuts.append(PointcutText.of(Text(name_here, within(Text(name_here, position), name_here))))
@@ -410,6 +412,15 @@ class Scope:
             woven = weaving.weave(aspect, pointcuts, lambda _: position)
         self._model.aspects.append(woven)
         return woven
+
+    def _place(self, place: object, aspect: Aspect, position: Position, problems: Problems) -> str | None:
+        """The path of a port, or of an actor or composite for an aspect that stands at such."""
+        if "actor" not in aspect.stands_at or not isinstance(place, (Actor, Composite)):
+            return self._known(place, position, problems)
+        if isinstance(place, Actor) and self._model.graph.actors.get(place.path) is not place:
+            problems.add(f"{place.path} is not part of this model", position, "add it to the model first")
+            return None
+        return place.path
 
     def unweave(self, name: str) -> None:
         """Take an aspect out."""
@@ -488,7 +499,7 @@ def _clock(path: str, start: object, drift: object, position: Position, problems
     return begin, speed
 
 
-def _each(ends: Ends) -> list[Any]:
+def _each(ends: Ends | Places) -> list[Any]:
     """One or several ends as a list; what is no end is found out later."""
     return list(ends) if isinstance(ends, Iterable) and not isinstance(ends, str) else [ends]
 

@@ -2,13 +2,14 @@
 
 A pointcut is a pattern of ports (``observer[*].plan_in``), of a connection (``a.out -> b.in``), or a choice by the
 type of an actor or composite, or by a tag that the model's author put on it, with the name of a port.  What a pattern
-with a ``!`` before it selects is left out again.
+with a ``!`` before it selects is left out again.  An aspect that stands at actors is aimed at these by their paths, or
+at a composite for all the actors in it.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,14 +28,16 @@ from .reading import Text
 class WovenAspect:
     """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
 
-    ``readings`` are what its expressions over ports ask for, ``selections`` what its parameters with patterns select,
-    ``reads`` the ports that it looks at otherwise.
+    ``actors`` are those at which it stands, and what was aimed at: the actor, or a composite around it.  ``readings``
+    are what its expressions over ports ask for, ``selections`` what its parameters with patterns select, ``reads`` the
+    ports that it looks at otherwise.
     """
 
     name: str
     aspect: Aspect
     ports: list[str]
     connections: list[tuple[str, str]] = field(default_factory=list)
+    actors: dict[str, str] = field(default_factory=dict)
     readings: dict[PortFormula, list[Reading]] = field(default_factory=dict)
     selections: dict[str, Selection] = field(default_factory=dict)
     reads: list[str] = field(default_factory=list)
@@ -42,12 +45,21 @@ class WovenAspect:
     @property
     def places(self) -> list[str]:
         """Where it stands, in words."""
-        return [*self.ports, *(f"{source} -> {destination}" for source, destination in self.connections)]
+        connections = (f"{source} -> {destination}" for source, destination in self.connections)
+        return [*self.ports, *connections, *self.actors]
 
     @property
     def looks_at(self) -> list[str]:
         """All ports whose latest tokens it needs to know."""
         return [*self.reads, *(port for readings in self.readings.values() for port, _ in readings)]
+
+
+def extent(aspects: Iterable[WovenAspect]) -> str:
+    """At how many ports and actors some aspects stand, in words."""
+    places = [(place, "actor" if place in woven.actors else "port") for woven in aspects for place in woven.places]
+    numbers = [(sum(kind == word for _, kind in places), word) for word in ("port", "actor")]
+    said = [f"{number} {word}{'' if number == 1 else 's'}" for number, word in numbers if number]
+    return " and ".join(said) or "no place"
 
 
 class Weaving:
@@ -73,8 +85,7 @@ class Weaving:
         ``position_of`` tells where a parameter is set in the model file.
         """
         before = len(self.problems)
-        woven = WovenAspect(self.name, aspect, self.select(pointcuts))
-        woven.connections = self._select_connections(pointcuts)
+        woven = WovenAspect(self.name, aspect, *self.select(pointcuts))
         if pointcuts and not woven.places and not self._is_excused and len(self.problems) == before:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
@@ -95,7 +106,13 @@ class Weaving:
         woven.reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return woven
 
-    def select(self, pointcuts: list[PointcutText]) -> list[str]:
+    def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+        """The ports, connections and actors that the pointcuts select."""
+        if "actor" in self.cls.stands_at:
+            return [], [], self._select_actors(pointcuts)
+        return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
+
+    def _select_ports(self, pointcuts: list[PointcutText]) -> list[str]:
         """The ports that the pointcuts select."""
         of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
@@ -139,18 +156,42 @@ class Weaving:
 
     def _chosen(self, pointcut: PointcutText) -> list[str] | None:
         """The ports of the actors and composites of a type, or with a tag."""
+        graph, owners = self.graph, self._chosen_owners(pointcut)
+        if owners is None:
+            return None
+        ports = [path for path in self.ports if graph.owner(path) in owners]
+        if pointcut.port is None:
+            found = [path for path in ports if self._fits(path)]
+            if not found and not any(path in graph.unknown for path in owners):
+                wanting = " or ".join(sorted(self.cls.stands_at))
+                where = pointcut.type or pointcut.tag
+                self._problem(
+                    f"{self.cls.__name__} stands at {wanting} ports, but no {_asked(pointcut)} has one", where
+                )
+            return found
+        found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
+        if not found:
+            names = sorted({path.rpartition(".")[2] for path in ports})
+            self._problem(
+                f"no {_asked(pointcut)} has a port {pointcut.port.text!r}{did_you_mean(pointcut.port.text, names)}",
+                pointcut.port,
+                f"their ports: {', '.join(names) or 'none'}",
+            )
+            return None
+        return found
+
+    def _chosen_owners(self, pointcut: PointcutText) -> set[str] | None:
+        """The actors and composites of a type, or with a tag."""
         graph = self.graph
         kinds = {path: type(actor).__name__ for path, actor in graph.actors.items()} | graph.composites
         inside = [path for path in kinds if not self.scope or path.startswith(f"{self.scope}.")]
         if pointcut.type is not None:
             owners = {path for path in inside if kinds[path] == pointcut.type.text}
-            asked, known = f"actor of type {pointcut.type.text!r}", {kinds[path] for path in inside}
-            wanted = pointcut.type
+            wanted, known = pointcut.type, {kinds[path] for path in inside}
         else:
             assert pointcut.tag is not None
             wanted = pointcut.tag
             owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
-            asked = f"actor with the tag {wanted.text!r}"
             known = {tag for path in inside for tag in graph.tags.get(path, ())}
         unknown = [path for path in graph.unknown if not self.scope or path.startswith(f"{self.scope}.")]
         if not owners and (unknown or wanted.text in graph.absent):
@@ -159,27 +200,73 @@ class Weaving:
         if not owners:
             what = "types" if pointcut.type is not None else "tags"
             self._problem(
-                f"there is no {asked}{did_you_mean(wanted.text, sorted(known | graph.absent))}",
+                f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | graph.absent))}",
                 wanted,
                 f"{what} in it: {', '.join(sorted(known)) or 'none'}",
             )
             return None
-        ports = [path for path in self.ports if graph.owner(path) in owners]
-        if pointcut.port is None:
-            found = [path for path in ports if self._fits(path)]
-            if not found and not any(path in graph.unknown for path in owners):
-                wanting = " or ".join(sorted(self.cls.stands_at))
-                self._problem(f"{self.cls.__name__} stands at {wanting} ports, but no {asked} has one", wanted)
-            return found
-        found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
-        if not found:
-            names = sorted({path.rpartition(".")[2] for path in ports})
+        return owners
+
+    def _select_actors(self, pointcuts: list[PointcutText]) -> dict[str, str]:
+        """The actors that the pointcuts select, as such or with a composite around them, and what was aimed at."""
+        index = self._owners_index()
+        aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
+        spared = {path for pointcut in pointcuts if pointcut.exclude for path in self._aimed_at(pointcut, index)}
+        found = {}
+        for actor in self.graph.actors:
+            parts = actor.split(".")
+            around = [".".join(parts[:length]) for length in range(1, len(parts) + 1)]
+            unit = next((path for path in around if path in aimed), None)
+            if unit is not None and not spared.intersection(around):
+                found[actor] = unit
+        return found
+
+    def _owners_index(self) -> PathIndex:
+        """All actors and composites, those that could not be made included."""
+        unmade = (self.graph.owner(path) for path, is_unmade in self.graph.ports.nodes(data="unmade") if is_unmade)
+        return PathIndex(dict.fromkeys((*self.graph.composites, *self.graph.actors, *unmade)))
+
+    def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> Iterable[str]:
+        """The actors and composites that one pointcut selects."""
+        name, text = self.cls.__name__, pointcut.text
+        if pointcut.port is not None:
+            self._problem(f"{name} stands at actors, not at their ports", pointcut.port, "leave 'port' out")
+        if not text:
+            if pointcut.type is None and pointcut.tag is None:
+                self._is_excused = self._is_excused or not pointcut.exclude  # it is misshapen, and has been told so
+                return ()
+            return self._chosen_owners(pointcut) or ()
+        if "->" in text:
+            receiver = text.rpartition("->")[2].strip().rpartition(".")[0]
             self._problem(
-                f"no {asked} has a port {pointcut.port.text!r}{did_you_mean(pointcut.port.text, names)}",
-                pointcut.port,
-                f"their ports: {', '.join(names) or 'none'}",
+                f"{name} stands at actors, not on connections",
+                pointcut,
+                f"write {receiver!r} for the one that receives",
             )
-            return None
+            return ()
+        full = self._full(text)
+        try:
+            found, ports = index.select(full), self.ports.select(full)
+        except PatternError as error:
+            several = ("for several pointcuts, write a list: [a, b]",) if "," in text else ()
+            self._problem(f"{text!r} is no pointcut: {error}", pointcut, *several)
+            return ()
+        if not found and not self._excuses(f"{full}.*"):
+            if ports and "." in text:
+                owner = text.rpartition(".")[0]
+                self._problem(
+                    f"{name} stands at actors, but {ports[0]} is a port",
+                    pointcut,
+                    f"write {owner!r}, without the port",
+                )
+            else:
+                inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
+                known = sorted(path for path in inside if path.count(".") == text.count("."))
+                self._problem(
+                    f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}",
+                    pointcut,
+                    f"actors and composites at this depth: {', '.join(known) or 'none'}",
+                )
         return found
 
     def _select_connections(self, pointcuts: list[PointcutText]) -> list[tuple[str, str]]:
@@ -294,3 +381,10 @@ class Weaving:
     def _problem(self, message: str, where: PointcutText | Text | Position | None, *hints: str) -> None:
         position = where.position if isinstance(where, (PointcutText, Text)) else where
         self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
+
+
+def _asked(pointcut: PointcutText) -> str:
+    """What a pointcut asks for that chooses by type or tag."""
+    if pointcut.type is not None:
+        return f"actor of type {pointcut.type.text!r}"
+    return f"actor with the tag {pointcut.tag.text if pointcut.tag is not None else ''!r}"

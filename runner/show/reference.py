@@ -93,30 +93,30 @@ def _tables(reference: TypeReference) -> list[RenderableType]:
 
 
 def weaving(model: Model) -> RenderableType:
-    """Which aspects stand at each port of a model, in the order in which a token meets them."""
+    """Which aspects stand at each port and actor of a model, in the order in which a token or a firing meets them."""
     if not model.aspects:
         return Text(f"{model.name} has no aspects")
     table = Table(box=None, pad_edge=False, header_style="dim")
-    for title in ("port", "", "aspect", "type", "parameters"):
-        table.add_column(title, no_wrap=title == "port")
-    for port, woven in aspects_at(model).items():
+    for title in ("at", "", "aspect", "type", "parameters"):
+        table.add_column(title, no_wrap=title == "at")
+    for path, woven in aspects_at(model).items():
         for place, (name, kind, parameters) in enumerate(woven):
             number = str(place + 1) if len(woven) > 1 else ""
-            table.add_row(*map(Text, ("" if place else port, number, name, kind, parameters)))
-    idle = [each for each in model.aspects if not each.ports]
-    return Group(table, *(Text(f"{each.name} ({type(each.aspect).__name__}) stands at no port") for each in idle))
+            table.add_row(*map(Text, ("" if place else path, number, name, kind, parameters)))
+    idle = [each for each in model.aspects if not each.places]
+    return Group(table, *(Text(f"{each.name} ({type(each.aspect).__name__}) stands nowhere") for each in idle))
 
 
 def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
-    """For each port where aspects stand, their names, types and given parameters, the first nearest to the sender."""
+    """For each port and actor where aspects stand, their names, types and given parameters, the outermost first."""
     found: dict[str, list[tuple[str, str, str]]] = {}
     for woven in model.aspects:
         written = as_written(woven.aspect)
         given = {name: value for name, value in written.items() if name != "type"} if isinstance(written, dict) else {}
         parameters = ", ".join(f"{name}: {shown(value)}" for name, value in given.items())
-        for port in woven.ports:
-            found.setdefault(port, []).append((woven.name, type(woven.aspect).__name__, parameters))
-    return {port: found[port] for port in model.graph.ports.nodes if port in found}
+        for path in (*woven.ports, *woven.actors):
+            found.setdefault(path, []).append((woven.name, type(woven.aspect).__name__, parameters))
+    return {path: found[path] for path in (*model.graph.ports.nodes, *model.graph.actors) if path in found}
 
 
 # -- as Markdown ----------------------------------------------------------------------------------------------------
@@ -182,7 +182,8 @@ def facts(reference: TypeReference) -> list[str]:
     """What else there is to say of a type."""
     found = ["Further ports follow from its parameters."] if reference.has_own_ports else []
     if reference.stands_at:
-        found.append(f"Stands at {' and '.join(reference.stands_at)} ports.")
+        where = "actors" if "actor" in reference.stands_at else f"{' and '.join(reference.stands_at)} ports"
+        found.append(f"Stands at {where}.")
     if reference.events:
         found.append(f"Events: {', '.join(reference.events)}.")
     if reference.reports:

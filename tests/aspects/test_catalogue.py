@@ -22,6 +22,7 @@ from epicycle.aspects import (
     Corrupt,
     Drift,
     Duplicate,
+    ExecutionAspect,
     FieldError,
     GilbertElliott,
     JoinPoint,
@@ -413,6 +414,7 @@ def test_every_aspect_has_a_zero() -> None:
         and each.pass_token is not Aspect.pass_token
         and not getattr(each, "__abstractmethods__", None)
         and not issubclass(each, ObservationAspect)  # which have no strength: test_observation.py
+        and not issubclass(each, ExecutionAspect)  # whose zeros are in test_execution.py
     }
     assert concrete == {type(aspect) for aspect in AT_ZERO}
 

@@ -147,7 +147,7 @@ def boxes(draw_from: st.DrawFn, path: str = "", level: int = 0) -> Box:
     if not box.is_composite:
         return box
     if path and draw_from(st.sampled_from([False, False, True])):
-        box.is_closed, box.hidden = True, draw_from(st.sampled_from([(), ("inner",), ("inner", "loss")]))
+        box.is_closed, box.aspects = True, draw_from(st.sampled_from([(), ("inner",), ("inner", "loss")]))
         return box
     box.children = [
         draw_from(boxes(f"{path}.b{n}" if path else f"b{n}", level + 1)) for n in range(draw_from(st.integers(0, 5)))

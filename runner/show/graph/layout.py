@@ -213,11 +213,11 @@ class _Scope:
             max((text.width(self.ends[pin].name, text.PORT) for pin in pins), default=0.0)
             for pins in (cell.left, cell.right)
         ]
-        hidden = max((pill_width(name) for name in child.hidden), default=0.0)
+        hidden = max((pill_width(name) for name in child.aspects), default=0.0)
         names = max(text.width(child.name, text.NAME, bold=True), text.width(child.kind, text.KIND))
         names += 16.0 if child.is_closed else 0.0  # beside the sign of a closed one
         cell.width = max(names + 16.0, sum(widths) + 12.0 + (10.0 if all(widths) else 0.0), hidden + 16.0, 44.0)
-        cell.height = HEADER + ROW * rows + 3.0 + (PILL_HEIGHT + PILL_GAP) * len(child.hidden)
+        cell.height = HEADER + ROW * rows + 3.0 + (PILL_HEIGHT + PILL_GAP) * len(child.aspects)
 
     # -- columns --------------------------------------------------------------------------------------------------
 
@@ -295,7 +295,7 @@ class _Scope:
                     drawing.words.append(_port_name(ports[-1], child.is_open))
             drawing.words += self._names(child, left, upper, cell.width)
             hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
-            for name in reversed(child.hidden):
+            for name in reversed(child.aspects):
                 wide = pill_width(name)
                 drawing.pills.append(Pill(name, name, left + (cell.width - wide) / 2, hidden, wide))
                 hidden -= PILL_HEIGHT + PILL_GAP

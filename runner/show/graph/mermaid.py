@@ -52,11 +52,11 @@ class _Writer:
                 yield from self.inside(child, indent + "    ")
                 yield f"{indent}end"
                 continue
-            aspects = "".join(f"<br/>«{name}»" for name in child.hidden)
+            aspects = "".join(f"<br/>«{name}»" for name in child.aspects)
             title = _quoted(f"{child.name}<br/>{child.kind}{own}{aspects}")
             yield f"{indent}{self.name(child.path)}" + (f"[[{title}]]" if child.is_closed else f"[{title}]")
             standing = [name for port in (*child.inputs, *child.outputs) for name in port.aspects]
-            self.mark(child.path, (*standing, *child.hidden))
+            self.mark(child.path, (*standing, *child.aspects))
         for link in box.links:
             yield indent + self.link(link)
 

@@ -50,8 +50,8 @@ class Box:
     """An actor or a composite; the model itself is the outermost box, with an empty path.
 
     ``kind`` is its type and, if it has a local clock, what that shows; ``has_director``: it fires as one actor.
-    ``count`` is how many instances of an array it stands for.  ``is_closed``: a composite whose inside is not shown;
-    ``hidden`` names the aspects that stand in there.
+    ``count`` is how many instances of an array it stands for.  ``is_closed``: a composite whose inside is not shown.
+    ``aspects`` stand at the actor itself, or in the closed composite.
     """
 
     path: str
@@ -65,7 +65,7 @@ class Box:
     is_composite: bool = False
     has_director: bool = False
     is_closed: bool = False
-    hidden: tuple[str, ...] = ()
+    aspects: tuple[str, ...] = ()
 
     @property
     def is_open(self) -> bool:
@@ -115,8 +115,8 @@ class _Outliner:
         self.graph = model.graph
         self.standing: dict[str, list[str]] = {}
         for woven in model.aspects:
-            for port in woven.ports:
-                self.standing.setdefault(port, []).append(woven.name)
+            for path in (*woven.ports, *woven.actors):
+                self.standing.setdefault(path, []).append(woven.name)
         self.children: dict[str, list[str]] = {"": []}
         self.ports: dict[str, list[str]] = {}
         for path in self.graph.ports.nodes:
@@ -200,9 +200,9 @@ class _Outliner:
         while waiting:
             path = waiting.pop()
             seen.add((inside(path), self._kind(path), len(self.children[path])))
-            for port in self.ports[path]:
-                names = [inside(n) if _is_within(n, instance) else n for n in self.standing.get(port, ())]
-                seen.add((inside(port), *names))
+            for place in (path, *self.ports[path]):
+                names = [inside(n) if _is_within(n, instance) else n for n in self.standing.get(place, ())]
+                seen.add((inside(place), *names))
             seen.update((inside(hop.source), inside(hop.destination), hop.delay) for hop in self.hops.get(path, ()))
             waiting += self.children[path]
         for hop in self.outside.get(instance, ()):
@@ -264,12 +264,16 @@ class _Outliner:
         if path and box.is_composite and depth == 0:
             box.is_closed = True
             within = [
-                woven for woven in self.model.aspects if any(_is_within(_owner(port), path) for port in woven.ports)
+                woven
+                for woven in self.model.aspects
+                if any(_is_within(owner, path) for owner in (*map(_owner, woven.ports), *woven.actors))
             ]
-            box.hidden = tuple(dict.fromkeys(short_name(woven.name) for woven in within))
+            box.aspects = tuple(dict.fromkeys(short_name(woven.name) for woven in within))
         elif box.is_composite:
             box.children = [self._box(child, depth - 1 if path else depth, n) for child, n in self._drawn(path)]
             box.links = self._links(path)
+        else:
+            box.aspects = tuple(map(short_name, self.standing.get(path, ())))
         return box
 
     def _links(self, path: str) -> list[Link]:

@@ -15,6 +15,7 @@ from typing import Any
 
 import networkx as nx
 
+from ...model import extent
 from . import text
 from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width
 from .outline import short_name
@@ -91,8 +92,7 @@ def _legend(drawing: Drawing) -> list[Row]:
     for name in _aspects(drawing):
         woven = [each for each in drawing.outline.model.aspects if short_name(each.name) == name]
         kinds = ", ".join(dict.fromkeys(type(each.aspect).__name__ for each in woven))
-        count = sum(len(each.ports) for each in woven)
-        rows.append(Row("aspect", name, f"aspect {kinds}, at {count} port{'' if count == 1 else 's'}"))
+        rows.append(Row("aspect", name, f"aspect {kinds}, at {extent(woven)}"))
     if labels := [pill.text for pill in drawing.pills if not pill.aspect]:
         delayed = [words for words in labels if words[0].isdigit()]
         if delayed:
@@ -110,7 +110,7 @@ def _legend(drawing: Drawing) -> list[Row]:
 
 def _aspects(drawing: Drawing) -> list[str]:
     """The aspects that are seen, in the order of their declaration."""
-    seen = {pill.aspect for pill in drawing.pills} | {name for placed in drawing.boxes for name in placed.box.hidden}
+    seen = {pill.aspect for pill in drawing.pills} | {name for placed in drawing.boxes for name in placed.box.aspects}
     names = dict.fromkeys(short_name(woven.name) for woven in drawing.outline.model.aspects)
     return [name for name in names if name in seen]
 
