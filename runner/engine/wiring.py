@@ -225,9 +225,7 @@ class Wiring:
         blame = partial(self._error, woven, f"later() at {path}")
         weaver = (ActorLoom if is_actor else Loom)(local, self.director, self.log, self._latest, self._signals, blame)
         kind = ActorPoint if is_actor else JoinPoint
-        point = kind(
-            name, path, weaver, onward, self.shared(woven), place, woven.readings, source, woven.selections
-        )
+        point = kind(name, path, weaver, onward, self.shared(woven), place, woven.readings, source, woven.selections)
         if isinstance(point, ActorPoint):
             point.unit = woven.actors[path]
         first = self._points_at.setdefault((name, place), point)
