@@ -70,7 +70,9 @@ class ODE(Actor):
     held = MappingParameter(Parameter(float), {}, doc="values of the inputs before their first token; 0 if left out")
 
     method = Parameter(str, "DOP853", choices=METHODS, doc="the solver; Radau and BDF are for stiff systems")
-    relative_tolerance = Parameter(float, 1e-10, min=1e-13, max=0.1, doc="error per step, relative to each state")
+    relative_tolerance = Parameter(
+        float, 1e-10, unit="1", min=1e-13, max=0.1, doc="error per step, relative to each state"
+    )
     absolute_tolerance = Parameter(float, 1e-12, min=1e-300, doc="error per step, added to the relative one")
     max_step = Parameter(
         float, 1.0, unit="s", min=1e-9, max=1e6,

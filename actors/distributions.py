@@ -13,7 +13,7 @@ from .tokens import token_type
 class Distribution(Configurable):
     """Base of the distributions: what single values are drawn from.
 
-    Parameters are bare numbers in the unit of what is drawn; a time is drawn in seconds.
+    Their parameters count in what is drawn: where that is a time, they are times.
     """
 
     token_type: Any = float
@@ -60,7 +60,7 @@ class LogNormal(Distribution):
     """A positive number whose logarithm is normally distributed."""
 
     median = Parameter(float, 1.0, min=0, doc="the median, e to the mean of the logarithm")
-    sigma = Parameter(float, 1.0, min=0, doc="standard deviation of the logarithm")
+    sigma = Parameter(float, 1.0, unit="1", min=0, doc="standard deviation of the logarithm")
 
     def draw(self, random: np.random.Generator) -> float:
         return float(self.median * np.exp(random.normal(0.0, self.sigma)))
@@ -78,7 +78,7 @@ class Exponential(Distribution):
 class Gamma(Distribution):
     """The gamma distribution; with a whole ``shape`` the Erlang distribution."""
 
-    shape = Parameter(float, 1.0, min=0, doc="the shape k; k = 1 is the exponential distribution")
+    shape = Parameter(float, 1.0, unit="1", min=0, doc="the shape k; k = 1 is the exponential distribution")
     mean = Parameter(float, 1.0, min=0, doc="the mean, shape times scale")
 
     def __init__(self, **values: object) -> None:
@@ -112,7 +112,7 @@ class Bernoulli(Distribution):
 
     token_type: Any = bool
 
-    probability = Parameter(float, 0.5, min=0, max=1, doc="of true")
+    probability = Parameter(float, 0.5, unit="1", min=0, max=1, doc="of true")
 
     def draw(self, random: np.random.Generator) -> bool:
         return bool(random.random() < self.probability)
@@ -139,7 +139,7 @@ class Choice(Distribution):
 
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is chosen from")
     weights: Parameter[Any] = array_parameter(
-        (None,), None, min=0, doc="how likely each is, relative to the others; all alike if left out"
+        (None,), None, unit="1", min=0, doc="how likely each is, relative to the others; all alike if left out"
     )
 
     def __init__(self, **values: object) -> None:

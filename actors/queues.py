@@ -66,7 +66,7 @@ class Server(Actor):
 
     service_time = PortParameter(float, 1.0, unit="s", min=0, doc="how long a service takes")
     distribution: Parameter[Distribution | None] = Parameter(
-        Distribution, None, doc="what service times in s are drawn from, in place of service_time"
+        Distribution, None, unit="s", doc="what service times are drawn from, in place of service_time"
     )
     servers: Parameter[int | None] = Parameter(
         int, 1, min=1, optional=True, doc="how many are served at a time; any number if null"

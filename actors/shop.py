@@ -25,7 +25,7 @@ class Station(Process):
     output: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="each token when its service is over")
 
     places = Parameter(int, 1, min=1, doc="how many are served at a time")
-    service_time: Parameter[Distribution] = Parameter(Distribution, doc="how long a service takes, in s")
+    service_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long a service takes")
 
     def run(self) -> Generator[Event, Any, None]:
         self.resource = simpy.PriorityResource(self.environment, self.places)
@@ -57,8 +57,8 @@ class Machine(Process):
     part = OutputPort(int, depends_on=(), doc="how many parts are made, for each that is finished")
 
     number = Parameter(int, 0, doc="the own number, which tells it from others")
-    work_time: Parameter[Distribution] = Parameter(Distribution, doc="how long a part takes, in s")
-    time_to_failure: Parameter[Distribution] = Parameter(Distribution, doc="how long it runs until it breaks, in s")
+    work_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long a part takes")
+    time_to_failure: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long it runs until it breaks")
 
     def run(self) -> Generator[Event, Any, None]:
         self._runs = True

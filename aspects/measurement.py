@@ -32,7 +32,7 @@ class MeasurementFailure(MeasurementAspect):
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a measurement fails")
     burst: Parameter[float | None] = Parameter(
-        float, None, min=1.0, doc="mean number of failures in a row; none: independent failures"
+        float, None, unit="1", min=1.0, doc="mean number of failures in a row; none: independent failures"
     )
     spare_first = Parameter(bool, False, doc="measurements of the first tag always pass")
 

@@ -18,7 +18,7 @@ from .parameter import (
 from .port_parameter import PortParameter
 from .ports import InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
-from .quantity import Quantity, plain
+from .quantity import Quantity, counted_in_si, plain
 from .random import random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
@@ -45,6 +45,7 @@ __all__ = [
     "accepts",
     "array_parameter",
     "convert",
+    "counted_in_si",
     "declared_parameters",
     "declared_ports",
     "did_you_mean",

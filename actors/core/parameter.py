@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import types
 from collections.abc import Mapping, Sequence
@@ -15,14 +16,22 @@ from numpy.typing import NDArray
 
 from .errors import EpicycleError
 from .nearest import did_you_mean
-from .quantity import Quantity, plain
-from .units import UnitError, convert
+from .quantity import Quantity, counted_in_si
+from .units import UnitError, convert, in_si, quantity
 
 T = TypeVar("T")
 
 
 class ParameterError(EpicycleError):
-    """A value that a parameter does not take; the message says what it takes."""
+    """A value that a parameter does not take; the message says what it takes.
+
+    ``keys`` lead to what is wrong within a mapping with a type; ``of_key``: it is the last key itself.
+    """
+
+    def __init__(self, message: str, keys: tuple[str, ...] = (), *, of_key: bool = False) -> None:
+        super().__init__(message)
+        self.keys = keys
+        self.of_key = of_key
 
 
 class _Required:
@@ -49,9 +58,11 @@ class Parameter(Generic[T]):
 
     ``type`` is ``float``, ``int``, ``bool``, ``str``, ``Path``, ``object`` (any value that YAML can write, for tokens)
     or a ``Configurable`` class (then the value is a mapping with a ``type`` key that names one of its subclasses).
-    A number may come as text with a unit (``"8 m/s"``); it is converted to ``unit``.  ``shape`` makes it an array of
-    floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and ``object``, ``(None,)`` a tuple.
-    ``int | float`` is a number that stays an integer if it is one.
+    A number may come as text with a unit (``"8 m/s"``); it is converted to ``unit``, which is ``"1"`` for a pure
+    number.  A parameter without one counts in whatever the tokens count in, and what has a unit is converted to SI
+    units; the ``unit`` of a ``Configurable`` class is that of the parameters in it that have none of their own.
+    ``shape`` makes it an array of floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and
+    ``object``, ``(None,)`` a tuple.  ``int | float`` is a number that stays an integer if it is one.
     """
 
     def __init__(
@@ -119,6 +130,14 @@ class Parameter(Generic[T]):
         sizes = " x ".join("n" if size is None else str(size) for size in self.shape)
         return f"list of {sizes} {word}s"
 
+    def in_unit(self, unit: str) -> Parameter[T]:
+        """The same parameter, counted in this unit if it has none of its own."""
+        if self.unit or self.type not in (float, int | float):
+            return self
+        changed = copy.copy(self)
+        changed.unit = unit
+        return changed
+
     def convert(self, value: object) -> T | None:
         """The value to be stored; raises ``ParameterError`` with a message that follows 'NAME: '."""
         if value is None:
@@ -126,7 +145,7 @@ class Parameter(Generic[T]):
                 return None
             raise ParameterError(f"a value is missing, expected {self._expected()}")
         if isinstance(self.type, type) and issubclass(self.type, Configurable):
-            return build_variant(self.type, value)  # type: ignore[return-value]
+            return build_variant(self.type, value, self.unit)  # type: ignore[return-value]
         if self.shape is not None and self.type in (str, object):
             items = [value] if self.type is str and isinstance(value, str) else self._rows(value, self.shape, value)
             return tuple(items)  # type: ignore[arg-type, return-value]
@@ -153,7 +172,7 @@ class Parameter(Generic[T]):
 
     def _scalar(self, value: object) -> object:
         if self.type is object:
-            return plain(value)
+            return counted_in_si(value)
         if self.type is Path:
             if isinstance(value, (str, Path)) and str(value) and "\0" not in str(value):
                 return Path(value)
@@ -170,13 +189,15 @@ class Parameter(Generic[T]):
         raise ParameterError(f"{_shown(value)} is not {self._expected()}")
 
     def _number(self, value: Any) -> float | int:
-        if isinstance(value, str) and not self.unit:
-            raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+        unit = self.unit or ("1" if self.type is int and isinstance(value, Quantity) else "")
         try:
             if isinstance(value, str):
-                value = convert(value, self.unit)
+                found = self._read(value)
+                if found is None:
+                    raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+                value = found
             elif isinstance(value, Quantity):
-                value = value.to(self.unit) if self.unit else float(value)
+                value = value.to(unit) if unit else value.si
         except UnitError as error:
             raise ParameterError(str(error)) from None
         try:
@@ -188,6 +209,14 @@ class Parameter(Generic[T]):
         if not number.is_integer():  # nor are nan and the infinities
             raise ParameterError(f"{_shown(value)} is not {self._expected()}")
         return int(value)
+
+    def _read(self, text: str) -> float | None:
+        """The number that a text with a unit stands for; None if it is none."""
+        if self.unit in ("", "1") and quantity(text) is None:
+            return None
+        if self.unit:
+            return convert(text, self.unit)
+        return None if self.type is int else in_si(text)
 
     def _bounded(self, value: float | int) -> float | int:
         if math.isnan(value):
@@ -249,13 +278,14 @@ class Configurable:
             if name not in declared:
                 message = unknown_parameter(type(self), name)
                 comma = "" if message.endswith("?") else ","
-                raise ParameterError(f"{message}{comma} valid parameters: {', '.join(declared) or 'none'}")
+                valid = ", ".join(declared) or "none"
+                raise ParameterError(f"{message}{comma} valid parameters: {valid}", (name,), of_key=True)
         for name, parameter in declared.items():
             if name in values:
                 try:
                     self.__dict__[name] = parameter.convert(values[name])
                 except ParameterError as error:
-                    raise ParameterError(f"{type(self).__name__}.{name}: {error}") from None
+                    raise _within(type(self), name, error) from None
             elif parameter.required:
                 raise ParameterError(f"{type(self).__name__} needs a value for {name!r}")
             else:
@@ -308,8 +338,11 @@ def variants(base: type) -> dict[str, type]:
     return found
 
 
-def build_variant(base: type, value: object) -> object:
-    """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance passes through."""
+def build_variant(base: type, value: object, unit: str = "") -> object:
+    """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance passes through.
+
+    Parameters of the variant that have no unit of their own count in ``unit``.
+    """
     if isinstance(value, base):
         return value
     known = variants(base)
@@ -320,8 +353,20 @@ def build_variant(base: type, value: object) -> object:
         raise ParameterError(f"{_shown(value)} has no 'type', which is one of {valid}")
     name = value["type"]
     if not isinstance(name, str) or name not in known:
-        raise ParameterError(f"{_shown(name)} is not one of {valid}{did_you_mean(str(name), known)}")
-    return known[name](**{key: item for key, item in value.items() if key != "type"})
+        raise ParameterError(f"{_shown(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
+    values = {key: item for key, item in value.items() if key != "type"}
+    declared = declared_parameters(known[name])
+    for key in [key for key in values if unit and key in declared]:
+        try:
+            values[key] = declared[key].in_unit(unit).convert(values[key])
+        except ParameterError as error:
+            raise _within(known[name], key, error) from None
+    return known[name](**values)
+
+
+def _within(cls: type, name: str, error: ParameterError) -> ParameterError:
+    """The error of a parameter of something that is itself a value."""
+    return ParameterError(f"{cls.__name__}.{name}: {error}", (name, *error.keys), of_key=error.of_key)
 
 
 def _digits(number: float) -> str:

@@ -12,9 +12,9 @@ from .units import UnitError, between, is_compound, parse_unit
 class Quantity(float):
     """A float that is counted in ``unit``.
 
-    Sums, differences and comparisons convert the other side, products and quotients make a new unit, a plain number
-    counts in whatever unit is beside it; all else (``**``, ``round``, ``math``) gives a plain float.  Raises
-    ``UnitError`` where units do not go together.
+    Sums, differences, remainders and comparisons convert the other side, products, quotients and whole powers make a
+    new unit, a plain number counts in whatever unit is beside it.  Where no unit is asked for, ``si`` is the number.
+    Raises ``UnitError`` where units do not go together.
     """
 
     __slots__ = ("unit",)
@@ -38,10 +38,13 @@ class Quantity(float):
         number = float(self)
         if unit == self.unit:
             return number
-        factor, pi_power = between(self.unit, unit, f"{number:g} {self.unit}")
-        if not math.isfinite(number):
-            return number
-        return float(Fraction(number) * factor * Fraction(math.pi) ** pi_power)
+        return _times(number, *between(self.unit, unit, f"{number:g} {self.unit}"))
+
+    @property
+    def si(self) -> float:
+        """The number counted in SI units."""
+        unit = parse_unit(self.unit)
+        return _times(float(self), unit.scale, unit.pi_power)
 
     def _beside(self, other: float) -> float:
         """The other side of a sum or comparison, in this unit."""
@@ -68,6 +71,30 @@ class Quantity(float):
 
     def __rtruediv__(self, other: float) -> float:
         return _in(float(other) / float(self), "1", "/", self)  # other is no Quantity here
+
+    def __mod__(self, other: float) -> Quantity:
+        return Quantity(float(self) % self._beside(other), self.unit)
+
+    def __rmod__(self, other: float) -> Quantity:
+        return Quantity(self._beside(other) % float(self), self.unit)
+
+    def __floordiv__(self, other: float) -> float:
+        if isinstance(other, Quantity):  # how often the other goes into it
+            return float(self) // self._beside(other)
+        return Quantity(float(self) // float(other), self.unit)
+
+    def __rfloordiv__(self, other: float) -> float:
+        return self._beside(other) // float(self)
+
+    def __pow__(self, exponent: float, modulus: None = None) -> Any:
+        power = exponent.to("1") if isinstance(exponent, Quantity) else exponent
+        if not float(power).is_integer():
+            return self.si**power
+        unit = f"{self.unit if self.unit.isalpha() else f'({self.unit})'}^{int(power)}"
+        return Quantity(float(self) ** int(power), unit) if _is_readable(unit) else self.si ** int(power)
+
+    def __rpow__(self, base: float, modulus: None = None) -> Any:
+        return base ** self.to("1")
 
     def __neg__(self) -> Quantity:
         return Quantity(-float(self), self.unit)
@@ -100,18 +127,29 @@ class Quantity(float):
     __hash__ = float.__hash__
 
 
+def _times(number: float, factor: Fraction, pi_power: int) -> float:
+    return float(Fraction(number) * factor * Fraction(math.pi) ** pi_power) if math.isfinite(number) else number
+
+
 def _in(number: float, unit: str, sign: str, other: float) -> float:
-    """A product or quotient with its unit; plain if that is none, or gets too long."""
+    """A product or quotient with its unit; plain if that is none, or too long, which leaves SI units."""
     if not isinstance(other, Quantity):
         return Quantity(number, unit)
     if unit == other.unit and sign == "/":
         return number
     text = f"{unit}{sign}({other.unit})" if is_compound(other.unit) else f"{unit}{sign}{other.unit}"
+    if _is_readable(text):
+        return Quantity(number, text)
+    whole = parse_unit(unit) * parse_unit(other.unit) ** (1 if sign == "*" else -1)
+    return _times(number, whole.scale, whole.pi_power)
+
+
+def _is_readable(unit: str) -> bool:
     try:
-        parse_unit(text)
+        parse_unit(unit)
     except UnitError:  # powers, or a text, without end
-        return number
-    return Quantity(number, text)
+        return False
+    return True
 
 
 def plain(value: object) -> object:
@@ -122,4 +160,15 @@ def plain(value: object) -> object:
         return [plain(item) for item in value]
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
+    return value
+
+
+def counted_in_si(value: object) -> object:
+    """The value with every ``Quantity`` in it, at any depth, as a plain float in SI units."""
+    if isinstance(value, Quantity):
+        return value.si
+    if isinstance(value, list):
+        return [counted_in_si(item) for item in value]
+    if isinstance(value, dict):
+        return {key: counted_in_si(item) for key, item in value.items()}
     return value

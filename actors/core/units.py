@@ -303,6 +303,18 @@ def convert(value: str | int | float, unit: str) -> float:
         raise UnitError(f"{_short(value)} is too large for a float") from None
 
 
+def in_si(text: str) -> float | None:
+    """Return a text with a unit of any kind counted in SI units; None if it is no number with a unit."""
+    split = _split(text)
+    if split is None or not (split[1][:1].isalpha() or split[1][:1] in ("%", "°", "(")):
+        return None
+    own = _unit_in(text, split[1])
+    try:
+        return _with_pi(split[0] * own.scale, own.pi_power)
+    except OverflowError:
+        raise UnitError(f"{_short(text)} is too large for a float") from None
+
+
 def _convert_text(text: str, unit: str, wanted: Unit) -> float:
     split = _split(text)
     if split is None:
@@ -310,13 +322,18 @@ def _convert_text(text: str, unit: str, wanted: Unit) -> float:
     number, own_text = split
     if not own_text:
         return float(number)
+    own = _unit_in(text, own_text)
+    _check_kind(text, own_text, own, unit, wanted)
+    return _with_pi(number * own.scale / wanted.scale, own.pi_power - wanted.pi_power)
+
+
+def _unit_in(text: str, unit: str) -> Unit:
+    """The unit that stands in a text."""
     try:
-        own = parse_unit(own_text)
+        return parse_unit(unit)
     except UnitError as error:
         article = "an" if str(error).startswith("unreadable") else "the"
         raise UnitError(f"{_short(text)} has {article} {error}") from None
-    _check_kind(text, own_text, own, unit, wanted)
-    return _with_pi(number * own.scale / wanted.scale, own.pi_power - wanted.pi_power)
 
 
 def between(own: str, wanted: str, shown: str) -> tuple[Fraction, int]:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import lru_cache
 from typing import ParamSpec, TypeVar
 
-from ..core import UnitError, did_you_mean
+from ..core import Quantity, UnitError, did_you_mean
 from .syntax import ExpressionError, free_names, parse, targets
 from .values import (
     BINARY,
@@ -49,11 +49,12 @@ def evaluate(source: str, names: Mapping[str, object]) -> object:
 def interpolate(text: str, names: Mapping[str, object]) -> object:
     """Return the text with its `${...}` evaluated; a text that is one `${...}` gives the value as it is.
 
-    `$${` stands for `${` itself.
+    In a longer text a quantity counts in the unit that is written behind it, or else in SI units.  `$${` stands for
+    `${` itself.
     """
     pieces = _pieces(text)
     parts: list[str] = []
-    for offset, source in pieces:
+    for number, (offset, source) in enumerate(pieces):
         if offset is None:
             parts.append(source)
             continue
@@ -61,7 +62,7 @@ def interpolate(text: str, names: Mapping[str, object]) -> object:
             value = evaluate(source, names)
             if len(pieces) == 1:
                 return value
-            parts.append(_as_text(source, value))
+            parts.append(_as_text(source, _as_read(value, pieces[number + 1 :])))
     whole = "".join(parts)
     if len(whole) > MAX_TEXT and len(pieces) > 1:
         raise ExpressionError(f"the text becomes longer than {MAX_TEXT:,} characters", 0, len(text))
@@ -102,6 +103,7 @@ def _unknown(name: str, names: Collection[str]) -> str:
 
 # --- finding expressions in a text --------------------------------------------------------------------
 
+_WORD = re.compile(r"\s*([^\s,;.)]+)")  # the unit behind a number, if it is one
 _OPENING = re.compile(r"\$\$\{|\$\{")
 _LEXEME = re.compile(
     r"""'''(?:[^\\]|\\.)*?'''|\"""(?:[^\\]|\\.)*?\"""|'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|[{}]""", re.DOTALL
@@ -155,6 +157,14 @@ def _shifted(offset: int) -> Iterator[None]:
         yield
     except ExpressionError as error:
         raise ExpressionError(error.message, error.offset + offset, error.length) from None
+
+
+def _as_read(value: object, behind: tuple[tuple[int | None, str], ...]) -> object:
+    """The value, counted in the unit that the text has behind it, if it is a quantity and there is one."""
+    if isinstance(value, Quantity) and behind and behind[0][0] is None and (unit := _WORD.match(behind[0][1])):
+        with contextlib.suppress(UnitError):
+            return value.to(unit[1])
+    return value
 
 
 def _as_text(source: str, value: object) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import REQUIRED, EpicycleError, Parameter, ParameterError, plain
+from ..core import REQUIRED, EpicycleError, Parameter, ParameterError, counted_in_si
 from .evaluation import evaluate
 from .syntax import ExpressionError, free_names, parse
 from .values import CONSTANTS, FUNCTIONS
@@ -86,7 +86,7 @@ class FormulaParameter(Parameter[Formula]):
         if isinstance(value, Formula):
             return value
         if isinstance(value, (bool, int, float)):
-            value = repr(plain(value))  # of a quantity the number alone
+            value = repr(counted_in_si(value))
         if not isinstance(value, str):
             raise ParameterError(f"{value!r} is not an expression")
         try:

@@ -6,7 +6,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, Final
 
-from ..core import did_you_mean
+from ..core import Quantity, did_you_mean
 
 MAX_STEPS = 100_000
 MAX_ELEMENTS = 100_000
@@ -128,6 +128,8 @@ def _write(value: object, parts: list[str], length: int, *, is_inner: bool) -> i
         text = "null"
     elif isinstance(value, bool):
         text = "true" if value else "false"
+    elif isinstance(value, Quantity):
+        text = repr(value.si)
     elif isinstance(value, float):
         text = float.__repr__(value)  # also for subclasses that show their type
     elif isinstance(value, str) and is_inner:
@@ -319,6 +321,33 @@ def _of_one(name: str, function: Callable[[Any], Any]) -> Callable[..., Any]:
     return call
 
 
+def _keeping_unit(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, which gives a quantity in the unit of the first number, if it has one."""
+
+    def call(first: Any, *others: Any) -> Any:
+        if not isinstance(first, Quantity):
+            return function(first, *others)
+        beside = [other.to(first.unit) if isinstance(other, Quantity) else other for other in others]
+        return Quantity(function(float(first), *beside), first.unit)
+
+    return call
+
+
+def _in_unit(unit: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function of plain numbers, given quantities in this unit; in SI units if it is empty."""
+
+    def call(*values: Any) -> Any:
+        plain = [value if not isinstance(value, Quantity) else value.to(unit) if unit else value.si for value in values]
+        return function(*plain)
+
+    return call
+
+
+def _angle(unit: str, function: Callable[[float], float]) -> Callable[[Any], float]:
+    """``radians`` or ``degrees``: of a plain number, or of an angle, which knows by itself what it counts in."""
+    return lambda value: value.to(unit) if isinstance(value, Quantity) else function(value)
+
+
 def _round(value: Any, decimals: Any = None) -> Any:
     if decimals is None:
         return round(value)
@@ -383,7 +412,7 @@ def _converted(kind: type[int] | type[float], words: str) -> Callable[[Any], Any
         if not isinstance(value, (int, float, str)):
             raise TypeError(f"{kind_of(value)} cannot become {words}")
         try:
-            result = kind(value)
+            result = kind(value.si if isinstance(value, Quantity) else value)
         except ValueError:
             raise ValueError(f"{value!r} is not {words}") from None
         return result if isinstance(value, str) and math.isinf(result) else _checked(result, value)
@@ -398,19 +427,19 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "sum": _of_one("sum", _sum),
     "len": _of_one("len", _len),
     "range": _range,
-    "round": _numeric("round", _round, 1, 2),
-    "floor": _numeric("floor", math.floor),
-    "ceil": _numeric("ceil", math.ceil),
-    "sqrt": _numeric("sqrt", math.sqrt),
-    "exp": _numeric("exp", math.exp),
-    "log": _numeric("log", math.log, 1, 2),
-    "sin": _numeric("sin", math.sin),
-    "cos": _numeric("cos", math.cos),
-    "tan": _numeric("tan", math.tan),
-    "atan2": _numeric("atan2", math.atan2, 2, 2),
-    "hypot": _numeric("hypot", math.hypot, 1, math.inf),
-    "radians": _numeric("radians", math.radians),
-    "degrees": _numeric("degrees", math.degrees),
+    "round": _numeric("round", _keeping_unit(_round), 1, 2),
+    "floor": _numeric("floor", _keeping_unit(math.floor)),
+    "ceil": _numeric("ceil", _keeping_unit(math.ceil)),
+    "sqrt": _numeric("sqrt", _in_unit("", math.sqrt)),
+    "exp": _numeric("exp", _in_unit("1", math.exp)),
+    "log": _numeric("log", _in_unit("1", math.log), 1, 2),
+    "sin": _numeric("sin", _in_unit("rad", math.sin)),
+    "cos": _numeric("cos", _in_unit("rad", math.cos)),
+    "tan": _numeric("tan", _in_unit("rad", math.tan)),
+    "atan2": _numeric("atan2", _in_unit("", math.atan2), 2, 2),
+    "hypot": _numeric("hypot", _keeping_unit(math.hypot), 1, math.inf),
+    "radians": _numeric("radians", _angle("rad", math.radians)),
+    "degrees": _numeric("degrees", _angle("deg", math.degrees)),
     "int": _of_one("int", _converted(int, "a whole number")),
     "float": _of_one("float", _converted(float, "a number")),
     "str": _of_one("str", text_of),

@@ -71,7 +71,7 @@ class RobustController(Actor):
     )
     period = Parameter(float, 0.1, unit="s", min=1e-9, doc="Delta t: time between two triggers")
     safe_distance = Parameter(float, 2.0, unit="m", min=0, doc="Dmin: to the target and to other robots")
-    margin = Parameter(float, 2.0, min=0, doc="alpha: standard deviations to add to it")
+    margin = Parameter(float, 2.0, unit="1", min=0, doc="alpha: standard deviations to add to it")
     tube_initial = Parameter(float, 0.2, unit="m", min=1e-6, doc="sigma_r0: radius of the reachability set now")
     tube_growth = Parameter(float, 0.4, unit="m", min=0, doc="beta: what it grows by, per unit of tau")
     tube_time = Parameter(str, STEPS, choices=(STEPS, SECONDS), doc="unit of tau in eq. (3)")

@@ -106,7 +106,7 @@ def _order(measurement: Measurement) -> Any:
 class UnscentedEstimator(_Estimator):
     """The unscented Kalman filter of the paper, compiled; fuses all measurements of a tag at once."""
 
-    kappa = Parameter(float, 0.0, min=0, doc="spread of the 9 sigma points; 0 gives the centre no weight")
+    kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; 0 gives the centre no weight")
 
     def initialize(self) -> None:
         super().initialize()

@@ -16,6 +16,7 @@ from epicycle.actors import (
     EpicycleError,
     Parameter,
     ParameterError,
+    counted_in_si,
     declared_parameters,
     plain,
     to_nanoseconds,
@@ -25,7 +26,7 @@ from epicycle.actors import (
 from .catalogue import Catalogue, CatalogueError
 from .checks import check
 from .declarations import CompositeText, ModelText, PartText, PortText
-from .document import Entry
+from .document import Entry, Mapping, Node
 from .files import data_file
 from .graph import ModelGraph
 from .model import Model
@@ -102,11 +103,11 @@ class Elaborator:
         model = Model(root.name, doc=root.doc)
         model.graph, model.aspects = self.graph, self.aspects
         model.warnings = self.problems.warnings
-        model.parameters = {name: plain(value) for name, value in names.items()}
+        model.parameters = {name: _shown(value, root.parameters[name].unit) for name, value in names.items()}
         Observation(model, self.values, self.problems).read(self.text, names)
         for name, part in self.text.figures.items():
             values = {
-                key: plain(self.values.of(entry.value, names, f"figure {name}.{key}"))
+                key: counted_in_si(self.values.of(entry.value, names, f"figure {name}.{key}"))
                 for key, entry in part.values.items()
             }
             model.figures[name] = (part.type.text, values, part.type.position)
@@ -248,7 +249,7 @@ class Elaborator:
                 if parameter.type is Path and result[name] is not None:
                     result[name] = data_file(Path(value), node.position)
             except ParameterError as error:
-                self.problems.add(f"{label}.{name}: {error}", node.position, scope=composite)
+                self.problems.add(f"{label}.{name}: {error}", _place(node, error), scope=composite)
         return result if complete and len(self.problems) == before else None
 
     def _valid_types(self, kind: str, asked: str) -> str:
@@ -540,6 +541,22 @@ class Elaborator:
         except ParameterError as error:
             self.problems.add(f"{label}: {error}", part.enabled.position, scope=scope)
             return True
+
+
+def _place(node: Node, error: ParameterError) -> Position:
+    """Where in a value, as far as it is written out, an error is."""
+    for number, key in enumerate(error.keys, start=1):
+        if not isinstance(node, Mapping) or key not in node.entries:
+            break
+        if error.of_key and number == len(error.keys):
+            return node.entries[key].key.position
+        node = node.entries[key].value
+    return node.position
+
+
+def _shown(value: object, unit: str) -> object:
+    """The value of a parameter of the model, as a plain number in the unit that it declares."""
+    return plain(value) if unit else counted_in_si(value)
 
 
 def _as_meant(given: dict[str, Entry], valid: Collection[str]) -> dict[str, Entry]:

@@ -137,8 +137,8 @@ def _number(kind: str, low: float | None = None, high: float | None = None, unit
     """A number within bounds, a text with a unit, or an expression."""
     article = "an" if kind == "integer" else "a"
     found: Schema = {"type": [kind, "string"], **_text(EXPRESSION, f"expected {article} {kind}")}
-    if unit:
-        where = "" if unit == "1" else f" in {unit}"
+    if unit or kind == "number":
+        where = "" if unit in ("", "1") else f" in {unit}"
         found |= _text(f"{EXPRESSION}|{QUANTITY}", f"expected {article} {kind}{where}, alone or with its unit")
     for key, bound in (("minimum", low), ("maximum", high)):
         if bound is not None and math.isfinite(bound):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Container
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, Quantity, plain
+from epicycle.actors import Parameter, ParameterError, Quantity
 from epicycle.actors.expression import ExpressionError, check_names, interpolate, names_in
 
 from .declarations import ParameterText
@@ -93,11 +93,10 @@ class Values:
         if parameter.unit:
             number = Parameter(float, unit=parameter.unit, **bounds).convert(value)
             return number if number is None or parameter.unit == "1" else Quantity(number, parameter.unit)
-        value = plain(value)
         if isinstance(default, bool):
             return Parameter(bool).convert(value)
         if isinstance(default, int):
-            return Parameter(int, **bounds).convert(value)
+            return Parameter(int, unit="1", **bounds).convert(value)
         if isinstance(default, float) or parameter.min is not None or parameter.max is not None:
             return Parameter(float, unit="1", **bounds).convert(value)
         return value

@@ -1,4 +1,4 @@
-"""``epicycle validate``: warnings, ``--strict`` and overrides files."""
+"""``epicycle validate``: warnings, ``--strict``, overrides files, and units of what is drawn."""
 
 from __future__ import annotations
 
@@ -61,3 +61,86 @@ def test_overrides(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["run", "m.yaml", "--until", "8", "--log", "log.csv", "--out", "out", *options]) == 0
         lines = (folder / "log.csv").read_text().splitlines()
         assert sum("send" in line and "clock" in line for line in lines) == times
+
+
+OF_TIMES = """model: m
+parameters:
+  length: {value: 2, unit: km}
+  wait: {value: 3, unit: min}
+  number: 4
+  half: "${wait / 2}"
+composites:
+  C:
+    parameters: {n: 3, x: {}}
+    inputs: [in]
+    actors: {s: {type: Station, places: "${n}", service_time: {type: Constant, value: "${x}"}}}
+    connections: [in -> s.input]
+actors:
+  clock: {type: Clock, period: "${half}"}
+  a: {type: Server, distribution: {type: Exponential, mean: "${length}"}}
+  b: {type: Server, distribution: {type: Exponential, mean: 5 m}}
+  c: {type: Server, distribution: {type: Gamma, mean: "${wait}", shape: "${wait}"}}
+  d: {type: Server, distribution: {type: Uniform, low: 61, high: 1 min}}
+  e: {type: Server, distribution: {type: Exponential, men: 1 min}}
+  f: {type: Random, distribution: {type: Exponentil}}
+  g: {type: C, n: "${wait}", x: 1 min}
+  h: {type: C, n: 2, x: "${length}"}
+  i: {type: Random, distribution: {type: Bernoulli, probability: 50 ms}}
+  j: {type: Server, servers: "${wait}"}
+connections:
+  - clock.output -> a.input, b.input, c.input, d.input, e.input, f.trigger, g.in, h.in, i.trigger, j.input
+  - {from: f.output, to: j.service_time, delay: "${number}"}
+run: {stop: "${wait ** 2}"}
+"""
+WRONG_TIMES = """m.yaml:11:87: error: h.s.service_time: Constant.value: '2 km' is a length, expected a time in s
+   11 |     actors: {s: {type: Station, places: "${n}", service_time: {type: Constant, value: "${x}"}}}
+      |                                                                                       ^^^^^^
+
+m.yaml:15:61: error: a.distribution: Exponential.mean: '2 km' is a length, expected a time in s
+   15 |   a: {type: Server, distribution: {type: Exponential, mean: "${length}"}}
+      |                                                             ^^^^^^^^^^^
+
+m.yaml:16:61: error: b.distribution: Exponential.mean: '5 m' is a length, expected a time in s
+   16 |   b: {type: Server, distribution: {type: Exponential, mean: 5 m}}
+      |                                                             ^^^
+
+m.yaml:17:73: error: c.distribution: Gamma.shape: '3 min' is a time, expected a number
+   17 |   c: {type: Server, distribution: {type: Gamma, mean: "${wait}", shape: "${wait}"}}
+      |                                                                         ^^^^^^^^^
+
+m.yaml:18:35: error: d.distribution: low is 61 and high is 60: low may not be above high
+   18 |   d: {type: Server, distribution: {type: Uniform, low: 61, high: 1 min}}
+      |                                   ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+
+m.yaml:19:55: error: e.distribution: Exponential has no parameter 'men', did you mean 'mean'? valid parameters: mean
+   19 |   e: {type: Server, distribution: {type: Exponential, men: 1 min}}
+      |                                                       ^^^
+
+m.yaml:20:42: error: f.distribution: 'Exponentil' is not one of Bernoulli, Choice, Constant, Exponential, Gamma, \
+LogNormal, Normal, RandomInteger, Triangular, Uniform, did you mean 'Exponential'?
+   20 |   f: {type: Random, distribution: {type: Exponentil}}
+      |                                          ^^^^^^^^^^
+
+m.yaml:21:19: error: g.n: '3 min' is a time, expected a number
+   21 |   g: {type: C, n: "${wait}", x: 1 min}
+      |                   ^^^^^^^^^
+
+m.yaml:23:66: error: i.distribution: Bernoulli.probability: '50 ms' is a time, expected a number
+   23 |   i: {type: Random, distribution: {type: Bernoulli, probability: 50 ms}}
+      |                                                                  ^^^^^
+
+m.yaml:24:30: error: j.servers: '3 min' is a time, expected a number
+   24 |   j: {type: Server, servers: "${wait}"}
+      |                              ^^^^^^^^^
+
+m.yaml:28:13: error: stop: '9 min^2' is a quantity in min^2, expected a time in s
+   28 | run: {stop: "${wait ** 2}"}
+      |             ^^^^^^^^^^^^^^
+11 errors in m.yaml
+"""
+
+
+def test_distributions_of_times(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "m.yaml").write_text(OF_TIMES)
+    assert main(["validate", "m.yaml"]) == 2
+    assert capsys.readouterr().err == WRONG_TIMES
