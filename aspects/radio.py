@@ -49,7 +49,7 @@ class RadioMedium(Medium):
         "mean_delay": "s",
     }
 
-    message_length = Parameter(float, min=0.0, unit="bit", doc="length of a message")
+    message_length = Parameter(float, 0.0, min=0.0, unit="bit", doc="length of a message")
     number_length = Parameter(float, 0.0, min=0.0, unit="bit", doc="what each number in the message adds to its length")
     rate = Parameter(float, min=1e-9, unit="bit/s", doc="speed of transmission")
     overhead = Parameter(
@@ -71,6 +71,8 @@ class RadioMedium(Medium):
         super().__init__(**values)
         if self.max_window < self.window:
             raise EpicycleError(f"max_window {self.max_window} is below window {self.window}")
+        if self.length_field is None and not (self.message_length or self.number_length or self.overhead):
+            raise EpicycleError("messages take no time: give message_length, number_length, length_field or overhead")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         airtime = to_nanoseconds(self.overhead + self.length_of(token) / self.rate)

@@ -375,7 +375,7 @@ AT_ZERO: list[Aspect] = [
     Corrupt(probability=0, kind="bit_flip"),
     Throttle(rate=1e9),
     Bus(factor=0),
-    RadioMedium(message_length=0, rate=1),
+    RadioMedium(message_length=1, rate=1e12),
     RangeLoss(positions=["a.at", "b.at"], range=math.inf),
     OutOfRange(positions="a.at", target="b.at", range=math.inf),
     Occlusion(positions=["a.at", "b.at"], target="b.at", radius=0),
