@@ -1,6 +1,7 @@
 """What can be woven around a model: aspects, and the join points that they act at."""
 
 from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
+from .composite import CompositeAspect, Request
 from .core import (
     Aspect,
     CommunicationAspect,
@@ -39,6 +40,7 @@ __all__ = [
     "Bias",
     "Bus",
     "CommunicationAspect",
+    "CompositeAspect",
     "Corrupt",
     "Count",
     "Drift",
@@ -69,6 +71,7 @@ __all__ = [
     "RangeLoss",
     "Reading",
     "Reorder",
+    "Request",
     "Saturate",
     "Selection",
     "SelectionParameter",

@@ -14,6 +14,7 @@ from .director import ActorError, Director, LoopError, describe
 from .execution import ExecutingDirector
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog
+from .requests import Requests
 from .signal import Signal
 
 Emit = Callable[[Any, int | None], None]
@@ -43,6 +44,7 @@ class Wiring:
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
         self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
+        self._requests = {woven.name: Requests(woven) for woven in model.aspects if woven.model is not None}
         self._shared: dict[object, dict[Any, Any]] = {}
         self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
         for woven in model.aspects:
@@ -50,6 +52,9 @@ class Wiring:
                 self._woven_at.setdefault(path, []).append(woven)
             for connection in woven.connections:
                 self._woven_on.setdefault(connection, []).append(woven)
+        for woven in model.aspects:
+            if woven.model is not None:
+                listeners.setdefault(woven.model.response, []).append(partial(self._answer, woven))
         for path in dict.fromkeys(path for woven in model.aspects for path in woven.looks_at):
             listeners.setdefault(path, []).append(partial(self._latest.__setitem__, path))
         self._directors: dict[str, Director | LocalDirector] = {}
@@ -86,11 +91,24 @@ class Wiring:
                 wires = self.graph.wires_to(port)
                 port.width = len(wires)
                 channels.update({wire.hops: channel for channel, wire in enumerate(wires)})
-        return [
+        emits = [
             (output, self._emit(output, channels))
             for actor in self.graph.actors.values()
             for output in actor.outputs.values()
         ]
+        self._open_requests(channels)
+        return emits
+
+    def _open_requests(self, channels: dict[tuple[Hop, ...], int]) -> None:
+        """Find the ways from the request ports of aspects that are models to the actors inside."""
+        ways: dict[str, Deliver] = {}
+        for requests in self._requests.values():
+            for place, path in requests.model.requests.items():
+                if path not in ways:
+                    ways[path] = _all(self._branches(path, (), channels))
+                passage = self._passages.get(path)
+                onward = ways[path] if passage is None else passage.lane(place, ways[path])
+                requests.entries[place] = self._woven(path, path, onward)
 
     def _emit(self, port: OutputPort[Any], channels: dict[tuple[Hop, ...], int]) -> Emit:
         """What ``port.send`` does."""
@@ -178,7 +196,10 @@ class Wiring:
 
     def _through(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str = "") -> Deliver:
         """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
-        point, pass_token = self._point(woven, path, source, onward, place or path), woven.aspect.pass_token
+        point = self._point(woven, path, source, onward, place or path)
+        pass_token: Callable[[Any, JoinPoint], None] = woven.aspect.pass_token
+        if woven.model is not None:
+            pass_token = self._requests[woven.name].add_way(point, place or path)
 
         def through(token: Any) -> None:
             try:
@@ -198,6 +219,15 @@ class Wiring:
                 woven.aspect.pass_by(token, point)
 
         return through_if_active
+
+    def _answer(self, woven: WovenAspect, request: Any) -> None:
+        """Let a token go on that has come through an aspect's composite."""
+        try:
+            self._requests[woven.name].answer(request)
+        except (ActorError, LoopError):  # of what comes behind it
+            raise
+        except EpicycleError as error:
+            raise self._error(woven, "delivering", error) from None
 
     def _holds(self, woven: WovenAspect, point: JoinPoint) -> bool:
         """Whether the ``when`` of an aspect is true of what the ports have sent last; before they have, it is not."""

@@ -2,6 +2,7 @@
 
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
+from .ends import CompositePort, Instance
 from .graph import Hop, ModelGraph, Wire
 from .load import load_model
 from .model import Model
@@ -10,7 +11,7 @@ from .packaged import packaged_disturbances, packaged_models
 from .patterns import PatternError, select
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
-from .scope import Composite, CompositePort, Instance
+from .scope import Composite
 from .weave import WovenAspect, extent
 
 __all__ = [

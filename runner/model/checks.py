@@ -9,7 +9,7 @@ import networkx as nx
 
 from epicycle.actors import InputPort, accepts, type_name
 
-from .graph import Hop, ModelGraph, Wire
+from .graph import Detour, Hop, ModelGraph, Wire
 from .problems import Position, Problems
 from .schedule import dependencies
 
@@ -191,6 +191,16 @@ def _shortest_loop(graph: ModelGraph, inner: nx.DiGraph) -> list[list[Hop]]:
 
 def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> None:
     actors = [graph.owner(way[0].source) for way in ways]
+    detour = next((hop for way in ways for hop in way if isinstance(hop, Detour)), None)
+    if detour is not None:
+        problems.add(
+            f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
+            detour.position,
+            *map(_step, ways),
+            f"the aspect {detour.aspect} sends the tokens of all its ports through one model: let it stand at fewer of "
+            "them, or give that model a delay",
+        )
+        return
     # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
     # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
     back = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
@@ -231,13 +241,16 @@ def _with_delay(graph: ModelGraph, hop: Hop) -> str:
 def check_reach(graph: ModelGraph, problems: Problems) -> None:
     """Warn of actors that can never fire, because no source is before them."""
     alive: set[str] = set()
+    detours: dict[str, list[str]] = {}
+    for detour in graph.detours:
+        detours.setdefault(detour.source, []).append(detour.destination)
     waiting = [port.path for actor in graph.actors.values() if actor.is_source for port in actor.outputs.values()]
     while waiting:
         path = waiting.pop()
         if path in alive:
             continue
         alive.add(path)
-        waiting += graph.ports.successors(path)
+        waiting += [*graph.ports.successors(path), *detours.get(path, ())]
         port = graph.ports.nodes[path]["port"]
         if isinstance(port, InputPort):
             waiting += [output.path for output in port.actor.outputs.values()]

@@ -34,7 +34,7 @@ DIRECTOR_KEYS = ("start", "drift")
 PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
 PORT_KEYS = ("type", "doc")
 CONNECTION_KEYS = ("from", "to", "all", "delay")
-POINTCUT_KEYS = ("type", "tag", "port")
+POINTCUT_KEYS = ("at", "type", "tag", "port", "request")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
 METRIC_KEYS = ("of", "take", "unit", "doc")
 
@@ -69,7 +69,8 @@ class PortText:
 class PointcutText:
     """Where an aspect stands: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
 
-    One that holds none of these is misshapen, and has been told so.
+    ``request`` is the port by which the tokens enter an aspect that is a model.
+    One that holds neither pattern, type nor tag is misshapen, and has been told so.
     """
 
     text: str
@@ -78,6 +79,7 @@ class PointcutText:
     type: Text | None = None
     tag: Text | None = None
     port: Text | None = None
+    request: Text | None = None
 
     @classmethod
     def of(cls, text: Text) -> PointcutText:
@@ -360,23 +362,29 @@ class DeclarationReader(NodeReader):
         return part
 
     def pointcuts(self, node: Node) -> list[PointcutText]:
-        """A pattern, ``!pattern``, ``{type: ..., port: ...}`` or ``{tag: ..., port: ...}``, or a list of these."""
+        """A pattern, ``!pattern``, ``{at: ...}``, ``{type: ..., port: ...}`` or ``{tag: ...}``, or a list of these."""
         found = []
         for item in node.items if isinstance(node, Sequence) else (node,):
             if not isinstance(item, Mapping):
                 found += [PointcutText.of(text) for text in self.texts(item, "at")]
                 continue
             entries = self.entries(item, "a pointcut", POINTCUT_KEYS) or {}
-            chosen = PointcutText("", item.position)
-            found.append(chosen)
-            if ("type" in entries) == ("tag" in entries):
+            texts = {
+                key: Text(text, entry.value.position)
+                for key, entry in entries.items()
+                if (text := self.text(entry.value, f"{key} of a pointcut")) is not None
+            }
+            by_pattern = "at" in texts
+            found.append(PointcutText.of(texts.pop("at")) if by_pattern else PointcutText("", item.position))
+            if [key in entries for key in ("at", "type", "tag")].count(True) != 1 or (by_pattern and "port" in texts):
                 self.problems.add(
-                    "a pointcut chooses by type or by tag", item.position, "write {type: ..., port: ...} or {tag: ...}"
+                    "a pointcut chooses by pattern, by type or by tag",
+                    item.position,
+                    "write {at: ...}, {type: ..., port: ...} or {tag: ...}",
                 )
                 continue
-            for key, entry in entries.items():
-                if (text := self.text(entry.value, f"{key} of a pointcut")) is not None:
-                    setattr(chosen, key, Text(text, entry.value.position))
+            for key, said in texts.items():
+                setattr(found[-1], key, said)
         return found
 
     def connection(self, node: Node) -> ConnectionText | None:

@@ -6,9 +6,7 @@ computed from it is not judged; an actor that cannot be made leaves its ports in
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Sequence
-from pathlib import Path
+from collections.abc import Collection
 from typing import Any
 
 from epicycle.actors import (
@@ -17,29 +15,27 @@ from epicycle.actors import (
     Parameter,
     ParameterError,
     counted_in_si,
-    declared_parameters,
     plain,
     to_nanoseconds,
-    unknown_parameter,
 )
+from epicycle.aspects import Aspect, CompositeAspect
 
 from .catalogue import Catalogue, CatalogueError
 from .checks import check
+from .composite_aspect import OWN, ModelWeaving, as_actor, check_nesting, detours
+from .configuration import Configurator
 from .declarations import CompositeText, ModelText, PartText, PortText
-from .document import Entry, Mapping, Node
-from .files import data_file
+from .document import Entry
 from .graph import ModelGraph
 from .model import Model
 from .observation import Observation
 from .patterns import PathIndex
 from .port_types import PortTypeError, read_type, token_types
-from .problems import Position, Problems, did_you_mean, nearest
-from .settings import Setting, Settings
-from .values import Values
+from .problems import Position, Problems, did_you_mean
+from .settings import Settings
 from .weave import Weaving, WovenAspect
 from .wiring import Child, Wiring
 
-_INDEX = re.compile(r"\[\d+\]")
 MAX_COUNT = 100_000
 MAX_INSTANCES = 200_000  # of actors and composites together
 MAX_DEPTH = 50
@@ -50,7 +46,7 @@ class TooLargeError(Exception):
     """The model has too many parts to go on; the reason has been noted."""
 
 
-class Elaborator:
+class Elaborator(Configurator):
     """Unfolds one model; problems are collected, and the model is good only if there are none."""
 
     def __init__(
@@ -62,15 +58,11 @@ class Elaborator:
         catalogue: Catalogue,
         broken: Collection[str] = (),
     ) -> None:
+        super().__init__(settings, problems)
         self.text = text
         self.composites = composites
         self.broken = broken  # composites that are there, but lack what they extend
-        self.settings = settings
-        self.problems = problems
         self.catalogue = catalogue
-        self.graph = ModelGraph()
-        self.values = Values(problems)
-        self.settable: dict[str, None] = {}
         self.aspects: list[WovenAspect] = []
         # Aspects are woven when all ports exist: (name, scope, declaration, names).
         self._to_weave: list[tuple[str, str, PartText, dict[str, object]]] = []
@@ -94,9 +86,7 @@ class Elaborator:
             self._body("", root, names, ())
         except TooLargeError:
             return Model(root.name)
-        ports = PathIndex(self.graph.ports.nodes)
-        for name, scope, part, scope_names in self._to_weave:
-            self._aspect(name, scope, part, scope_names, ports)
+        self._weave()
         for setting in self.settings.unused():
             self._add_unused(setting)
         check(self.graph, self.problems)
@@ -132,125 +122,8 @@ class Elaborator:
             self._actor(path, path.rpartition(".")[0], part, names, ())
         except TooLargeError:
             return []
-        ports = PathIndex(self.graph.ports.nodes)
-        for name, scope, aspect, scope_names in self._to_weave:
-            self._aspect(name, scope, aspect, scope_names, ports)
+        self._weave()
         return self.aspects
-
-    def _add_unused(self, setting: Setting) -> None:
-        """A setting that no parameter took, unless it is meant for an array that is empty now."""
-        if self.graph.is_excused(setting.path):
-            return
-        known = list(self.settable)
-        if "[*]" in setting.path:
-            known = list(dict.fromkeys(_INDEX.sub("[*]", path) for path in known))
-        owner, _, last = setting.path.rpartition(".")
-        beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
-        # The nearest one of the same owner, or else the nearest of all.
-        near = did_you_mean(last, beside).replace("mean '", f"mean '{owner}." if owner else "mean '")
-        near = near or did_you_mean(setting.path, known)
-        valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
-        self.problems.add(f"{setting.path!r} sets no parameter{near}", setting.position, *(() if near else valid))
-
-    # -- parameters -----------------------------------------------------------------------------------------------
-
-    def _parameters(
-        self,
-        path: str,
-        composite: CompositeText,
-        given: dict[str, Entry],
-        outer: dict[str, object],
-        position: Position | None,
-    ) -> dict[str, object]:
-        """The values of a composite's parameters: set from outside, else given, else the default."""
-        names: dict[str, object] = {}
-        label = path or composite.name
-        above = path.rpartition(".")[0]  # the composite whose fault a wrong value is
-        for key, entry in given.items():
-            if key not in composite.parameters:
-                self.problems.add(
-                    f"{label}: {composite.name} has no parameter {key!r}"
-                    f"{did_you_mean(key, list(composite.parameters))}",
-                    entry.key.position,
-                    f"valid parameters: {', '.join(composite.parameters) or 'none'}",
-                    scope=above,
-                )
-        given = _as_meant(given, composite.parameters)
-        for name, declared in composite.parameters.items():
-            full = f"{path}.{name}" if path else name
-            node, scope, instance = declared.value, names, path
-            later: Sequence[str] = list(composite.parameters)
-            if name in given:
-                node, scope, instance, later = given[name].value, outer, above, ()
-            if (setting := self._setting(full)) is not None:
-                node, scope, instance, later = setting.node, {}, "", ()
-            if node is None:
-                needs = f"{label}: {composite.name} needs" if path else f"{label} needs"
-                self.problems.add(
-                    f"{needs} a value for {name!r}",
-                    position or declared.position,
-                    *((f"{name}: {declared.doc}",) if declared.doc else ()),
-                    scope=above,
-                )
-                names[name] = self.values.missing
-                continue
-            value = self.values.of(node, scope, full, instance, later)
-            names[name] = self.values.declared(full, declared, value, node.position, instance)
-        return names
-
-    def _setting(self, full: str) -> Setting | None:
-        """The setting for a parameter, if there is one."""
-        self.settable[full] = None
-        return self.settings.find(full)
-
-    def _configuration(
-        self,
-        label: str,
-        cls: type,
-        given: dict[str, Entry],
-        names: dict[str, object],
-        position: Position,
-        path: str,
-        composite: str,
-    ) -> dict[str, object] | None:
-        """Converted values for a Configurable class; None if some are wrong."""
-        declared = declared_parameters(cls)
-        before, complete = len(self.problems), True
-        result: dict[str, object] = {}
-        for key, entry in given.items():
-            if key not in declared:
-                self.problems.add(
-                    f"{label}: {unknown_parameter(cls, key)}",
-                    entry.key.position,
-                    f"valid parameters: {', '.join(declared) or 'none'}",
-                    scope=composite,
-                )
-        given = _as_meant(given, declared)
-        for name, parameter in declared.items():
-            node = given[name].value if name in given else None
-            scope = names
-            if (setting := self._setting(f"{path}.{name}")) is not None:
-                node, scope = setting.node, {}
-            if node is None:
-                if parameter.required:
-                    self.problems.add(
-                        f"{label}: {cls.__name__} needs a value for {name!r}",
-                        position,
-                        *((f"{name}: {parameter.doc}",) if parameter.doc else ()),
-                        scope=composite,
-                    )
-                continue
-            value = self.values.of(node, scope, f"{label}.{name}", composite)
-            if value is self.values.missing:
-                complete = False
-                continue
-            try:
-                result[name] = parameter.convert(value)
-                if parameter.type is Path and result[name] is not None:
-                    result[name] = data_file(Path(value), node.position)
-            except ParameterError as error:
-                self.problems.add(f"{label}.{name}: {error}", _place(node, error), scope=composite)
-        return result if complete and len(self.problems) == before else None
 
     def _valid_types(self, kind: str, asked: str) -> str:
         """Which types there are: their names, or how to see them if they are too many for a message."""
@@ -278,6 +151,11 @@ class Elaborator:
                 self.graph.unknown.add(full)
             else:
                 children[name] = child
+        for name, part in composite.aspects.items():
+            if part.type.text in self.composites and (
+                model := self._aspect_model(path, composite, part, names, within)
+            ):
+                children[name] = model
         wiring = Wiring(path, composite, children, self.graph, self.values, self.problems)
         self.graph.is_wired = self.graph.is_wired and composite.is_wired
         for connection in composite.connections:
@@ -491,22 +369,42 @@ class Elaborator:
 
     # -- aspects ------------------------------------------------------------------------------------
 
-    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], all_ports: PathIndex) -> None:
-        known = self.catalogue.aspects
-        try:
-            cls = known.get(part.type.text)
-        except CatalogueError as error:
-            self.problems.add(f"aspect {name}: {error.message}", part.type.position, *error.help, scope=scope)
-            return
-        if cls is None:
+    def _weave(self) -> None:
+        """Let all aspects stand where they are to, now that all ports exist."""
+        ports = PathIndex(self.graph.ports.nodes)
+        for name, scope, part, names in self._to_weave:
+            self._aspect(name, scope, part, names, ports)
+        if check_nesting(self.aspects, self.graph, self.problems):
+            self.graph.detours = detours(self.graph, self.aspects)
+
+    def _aspect_model(
+        self, path: str, composite: CompositeText, part: PartText, names: dict[str, object], within: tuple[str, ...]
+    ) -> Child | None:
+        """Make the composite that an aspect is; one that is not enabled is made for trial alone."""
+        full = f"{path}.{part.name}" if path else part.name
+        clash = "an actor" if part.name in composite.actors else "a port"
+        if part.name in (*composite.actors, *composite.inputs, *composite.outputs):
             self.problems.add(
-                f"aspect {name}: there is no aspect type {part.type.text!r}{did_you_mean(part.type.text, known)}",
-                part.type.position,
-                self._valid_types("aspect", part.type.text),
-                scope=scope,
+                f"{full!r} is the name of {clash} and of an aspect that is a model", part.position, "rename one"
             )
+            return None
+        if self._is_enabled(full, path, part, names):
+            return self._actor(full, path, as_actor(part), names, within)
+        graph, mark = self.graph, len(self._to_weave)
+        self.graph = ModelGraph()
+        self._actor(full, path, as_actor(part), names, within)
+        self.graph = graph
+        del self._to_weave[mark:]
+        self.graph.unknown.add(full)
+        return None
+
+    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], all_ports: PathIndex) -> None:
+        cls = self._aspect_type(name, scope, part)
+        if cls is None:
             return
-        values = self._configuration(f"aspect {name}", cls, part.values, names, part.position, name, scope)
+        is_model = cls is CompositeAspect
+        given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
+        values = self._configuration(f"aspect {name}", cls, given, names, part.position, name, scope)
         if not part.at:
             self.problems.add(
                 f"aspect {name} does not say where it stands",
@@ -515,8 +413,10 @@ class Elaborator:
                 scope=scope,
             )
         self.graph.positions[f"aspect {name}"] = part.position
-        is_enabled = self._is_enabled(name, scope, part, names)
         weaving = Weaving(self.graph, all_ports, name, cls, scope, self.problems)
+        if is_model and name in self.graph.composites:
+            weaving = ModelWeaving(self.graph, all_ports, name, name, scope, self.problems, part.position)
+        is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)
         except (EpicycleError, ValueError) as error:
@@ -524,12 +424,54 @@ class Elaborator:
             aspect = None
         if aspect is None:
             weaving.select(part.at)  # for what is wrong with it
+            if isinstance(weaving, ModelWeaving):
+                weaving.leave()
             return
         woven = weaving.weave(
             aspect, part.at, lambda name: part.values[name].value.position if name in part.values else None
         )
+        if isinstance(weaving, ModelWeaving):
+            weaving.check(woven)
+            weaving.connect(woven)
         if is_enabled:
             self.aspects.append(woven)
+
+    def _aspect_type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
+        known, wanted = self.catalogue.aspects, part.type.text
+        if wanted in self.broken:
+            return None
+        try:
+            cls = known.get(wanted)
+        except CatalogueError as error:
+            self.problems.add(f"aspect {name}: {error.message}", part.type.position, *error.help, scope=scope)
+            return None
+        if wanted in self.composites:
+            if cls is not None:
+                self.problems.add(
+                    f"aspect {name}: {wanted} is an aspect type and a composite",
+                    part.type.position,
+                    "give the composite another name",
+                    scope=scope,
+                )
+                return None
+            return CompositeAspect
+        if cls is None:
+            self.problems.add(
+                f"aspect {name}: there is no aspect type {wanted!r}{did_you_mean(wanted, [*known, *self.composites])}",
+                part.type.position,
+                self._valid_types("aspect", wanted),
+                scope=scope,
+            )
+            return None
+        requests = [pointcut.request for pointcut in part.at if pointcut.request is not None]
+        if requests:
+            self.problems.add(
+                f"aspect {name}: {wanted} is no composite, so it has no request ports",
+                requests[0].position,
+                "leave out 'request'",
+                scope=scope,
+            )
+        return cls
 
     def _is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
         if part.enabled is None:
@@ -543,26 +485,6 @@ class Elaborator:
             return True
 
 
-def _place(node: Node, error: ParameterError) -> Position:
-    """Where in a value, as far as it is written out, an error is."""
-    for number, key in enumerate(error.keys, start=1):
-        if not isinstance(node, Mapping) or key not in node.entries:
-            break
-        if error.of_key and number == len(error.keys):
-            return node.entries[key].key.position
-        node = node.entries[key].value
-    return node.position
-
-
 def _shown(value: object, unit: str) -> object:
     """The value of a parameter of the model, as a plain number in the unit that it declares."""
     return plain(value) if unit else counted_in_si(value)
-
-
-def _as_meant(given: dict[str, Entry], valid: Collection[str]) -> dict[str, Entry]:
-    """The values with misspelled names put right, or else they would seem to be missing as well."""
-    result = {name: entry for name, entry in given.items() if name in valid}
-    for name, entry in given.items():
-        if name not in valid and (meant := nearest(name, valid)) is not None:
-            result.setdefault(meant, entry)
-    return result

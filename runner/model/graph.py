@@ -13,6 +13,7 @@ from typing import Any
 import networkx as nx
 
 from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_own_ports
+from epicycle.aspects import Request
 
 from .clock import Clock
 from .patterns import could_be_within
@@ -47,6 +48,17 @@ class Wire:
         return all(hop.delay is None for hop in self.hops)
 
 
+@dataclass(frozen=True, eq=False)
+class Detour(Hop):
+    """A part of the way that tokens take through an aspect that is a model, within the tag: it orders firings.
+
+    Tokens go from where they are sent to the composite's request port, and from its response port to where they were
+    going.
+    """
+
+    aspect: str
+
+
 class ModelGraph:
     """The flattened graph of one model."""
 
@@ -64,6 +76,7 @@ class ModelGraph:
         self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
         self.absent: set[str] = set()  # types and tags of what would stand in empty arrays, and of unmade actors
         self.is_wired = True  # whether every connection that the model declares has been made
+        self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}
@@ -103,6 +116,12 @@ class ModelGraph:
         self._borders.setdefault(self.owner(path), ([], []))[direction == "output"].append(path)
         if position is not None:
             self.positions[path] = position
+
+    def open_requests(self, path: str) -> None:
+        """Make an input of a composite the place where an aspect's requests come in: tokens begin their way there."""
+        port = OutputPort(Request, multi=True)
+        port.name, port.path = path.rpartition(".")[2], path
+        self.ports.nodes[path]["port"] = port
 
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
         """Add one connection between two ports."""
@@ -193,7 +212,8 @@ class ModelGraph:
 
     def is_end(self, path: str) -> bool:
         """Whether a port belongs to something that fires, and tokens do not only pass through it."""
-        return self.ports.nodes[path]["port"] is not None or self.owner(path) in self.clocks
+        owner = self.owner(path)
+        return owner in self.clocks or (self.ports.nodes[path]["port"] is not None and owner not in self.composites)
 
     def outgoing(self, path: str) -> Sequence[Hop]:
         """The connections that leave a port, in the order of their declaration."""

@@ -9,12 +9,14 @@ from epicycle.actors import Tag, declared_parameters
 
 from ..tables import Table, as_html, as_text, short
 from .checks import check
+from .composite_aspect import check_nesting, detours
 from .declarations import REDUCTIONS, MetricText
+from .ends import Port
 from .graph import ModelGraph
 from .observation import Metric, Observation, checked_seed, nanoseconds
 from .problems import Position, Problem, Problems, did_you_mean
 from .reading import NAME, Text, within
-from .scope import Composite, Port, Scope
+from .scope import Composite, Scope
 from .scopes import Scopes, is_within
 from .site import call_site
 from .values import Values
@@ -142,6 +144,8 @@ class Model(Scope):
         """Check the model as a whole; raises ``ModelError`` with all that is wrong.  A ``Simulation`` does so first."""
         if not self.is_checked:
             problems = Problems()
+            if check_nesting(self.aspects, self.graph, problems):
+                self.graph.detours = detours(self.graph, self.aspects)
             check(self.graph, problems)
             problems.raise_if_any()
             self.warnings = problems.warnings
@@ -164,7 +168,11 @@ class Model(Scope):
             woven.ports = [port for port in woven.ports if not is_within(port, path)]
             woven.actors = {actor: unit for actor, unit in woven.actors.items() if not is_within(actor, path)}
             woven.connections = [ends for ends in woven.connections if not any(is_within(end, path) for end in ends)]
-        self.aspects = [woven for woven in self.aspects if not is_within(woven.name, path)]
+        self.aspects = [
+            woven
+            for woven in self.aspects
+            if not is_within(woven.name, path) and not (woven.model and is_within(woven.model.path, path))
+        ]
         self.recorded = [port for port in self.recorded if not is_within(port, path)]
         self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
         for metric in self.metrics:

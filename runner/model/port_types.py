@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from epicycle.actors import declared_ports, shaped
+from epicycle.aspects import Request
 
 from .catalogue import Catalogue
 from .problems import did_you_mean
@@ -81,8 +82,8 @@ def _size(text: str) -> int | None:
 
 
 def token_types(catalogue: Catalogue) -> dict[str, type]:
-    """The classes that the ports of all actors speak of, by name."""
-    found: dict[str, type] = {}
+    """The classes that the ports of all actors speak of, and what passes through aspects that are models, by name."""
+    found: dict[str, type] = {Request.__name__: Request}
     for actor in catalogue.loaded()[0].actors.values():
         for port in declared_ports(actor).values():
             for each in _classes(port.type):

@@ -50,6 +50,8 @@ def dependencies(graph: ModelGraph) -> dict[str, Any]:
     for *_, hop in graph.ports.edges(data="hop"):
         if hop.delay is None:
             hops[graph.director_over(hop)].append(hop)
+    for detour in graph.detours:
+        hops[graph.director_over(detour)].append(detour)
     regions: dict[str, Any] = {}
     for director in reversed(graph.clocks):  # inner ones first: the outer ones need to know what depends on what
         region = regions[director] = nx.DiGraph()

@@ -73,8 +73,8 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "changed_actor": _changed("actor", Actor.reserved),
         "changed_aspect": _changed("aspect", Aspect.reserved),
         "actor": _typed(actors, "actor", Actor.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
-        "aspect": _typed(aspects, "aspect", Aspect.reserved, ("type", "at")),
-        "added_aspect": _typed(aspects, "aspect", Aspect.reserved),
+        "aspect": _typed(aspects, "aspect", Aspect.reserved, ("type", "at"), open_to=f"^{NAME}(\\.{NAME})?$"),
+        "added_aspect": _typed(aspects, "aspect", Aspect.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
         "figure": _typed(figures, "figure", frozenset({"type"})),
     }
     for kind, types, reserved in (
@@ -218,9 +218,11 @@ _PORT: dict[str, tuple[Schema, str]] = {
     "doc": (_ref("text"), "What it is."),
 }
 _POINTCUT: dict[str, tuple[Schema, str]] = {
+    "at": (_POINTCUT_TEXT, "Ports or actors, as a pattern, or a connection."),
     "type": (_ref("text"), "The type of the actors and composites at which, or at whose ports, it stands."),
     "tag": (_ref("text"), "A tag of the actors and composites at which, or at whose ports, it stands."),
     "port": (_ref("text"), "The name of the port; none: all ports where it can stand."),
+    "request": (_ref("text"), "For an aspect that is a composite: the input by which these tokens come in."),
 }
 _METRIC: dict[str, tuple[Schema, str]] = {
     "of": (_PATTERN, "The output port (or a pattern for several)."),
@@ -356,7 +358,7 @@ def _typed(
     *,
     open_to: str = "",
 ) -> Schema:
-    """A mapping with a type; types other than the known ones (composites, for actors) fit the pattern ``open_to``."""
+    """A mapping with a type; types other than the known ones (composites) fit the pattern ``open_to``."""
     choice = _choice(types)
     if open_to:
         choice = {"anyOf": [choice, {"type": "string", "pattern": open_to}]}

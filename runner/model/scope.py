@@ -8,28 +8,19 @@ the program.  A call that fails changes nothing.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar, overload
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from epicycle.actors import (
-    Actor,
-    InputPort,
-    OutputPort,
-    Parameter,
-    ParameterError,
-    accepts,
-    to_nanoseconds,
-    type_name,
-)
-from epicycle.aspects import Aspect
+from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
+from epicycle.aspects import Aspect, CompositeAspect
 
+from .composite_aspect import ModelWeaving, check_nesting
 from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
 from .document import Scalar
+from .ends import CompositePort, Ends, Instance, Places, clock_of, each_of, mistake, raising
 from .graph import Hop
 from .patterns import PathIndex
-from .problems import ModelError, Position, Problem, Problems, did_you_mean
+from .problems import Position, Problems, did_you_mean
 from .reading import NAME, Text, within
 from .site import call_site, node_of
 from .values import Values
@@ -44,32 +35,6 @@ _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
 OF_NO_CLASS = "Composite"  # what stands for the class of a composite that Python builds
 
 A = TypeVar("A", bound=Actor)
-
-
-@dataclass(frozen=True)
-class CompositePort:
-    """A port of a composite, through which tokens pass."""
-
-    path: str
-    direction: str
-
-    def __repr__(self) -> str:
-        return f"<{self.direction} port {self.path} of a composite>"
-
-
-Port: TypeAlias = "InputPort[Any] | OutputPort[Any] | CompositePort"
-Ends: TypeAlias = "str | Port | Iterable[str | Port]"
-Place: TypeAlias = "str | Port | Actor | Composite"
-Places: TypeAlias = "Place | Iterable[Place]"
-
-
-class Instance(Protocol):
-    """An instance of a composite class that can be added to a model; see ``load_composite``."""
-
-    path: str
-
-    def unfold(self, path: str, model: Model, position: Position) -> None:
-        """Make it part of a model, at its full path."""
 
 
 class Scope:
@@ -101,12 +66,12 @@ class Scope:
         """
         position = call_site()
         if isinstance(part, Actor) and part.home is not None:
-            raise _mistake(
+            raise mistake(
                 f"{part.path} is part of a model already, and an actor belongs to one model",
                 position,
                 f"make another one: {type(part).__name__}(...)",
             )
-        with _raising() as problems:
+        with raising() as problems:
             full = self._free(part.path, position, problems)
         if isinstance(part, Actor):
             part.move(full)
@@ -134,9 +99,9 @@ class Scope:
         (default: as around it) and goes ``drift`` times as fast.  Raises ``ModelError``.
         """
         position = call_site()
-        with _raising() as problems:
+        with raising() as problems:
             full = self._free(name, position, problems)
-            begin, speed = _clock(full, start, drift, position, problems)
+            begin, speed = clock_of(full, start, drift, position, problems)
         self._model.graph.composites[full] = OF_NO_CLASS
         if director:
             self._model.graph.add_director(full, begin, speed)
@@ -158,7 +123,7 @@ class Scope:
         position = call_site()
         child = self._children.get(name.partition("[")[0])
         full = self._full(name)
-        with _raising() as problems:
+        with raising() as problems:
             if child is None or full not in child.paths:
                 known = [path[len(self._full("")) :] for each in self._children.values() for path in each.paths]
                 problems.add(
@@ -189,7 +154,7 @@ class Scope:
             port = graph.ports.nodes[full]["port"]
             return CompositePort(full, graph.direction(full)) if port is None else port
         known = [*graph.actors, *graph.composites, *graph.ports]
-        raise _mistake(f"there is no {full!r}{did_you_mean(full, known)}", call_site())
+        raise mistake(f"there is no {full!r}{did_you_mean(full, known)}", call_site())
 
     def _free(self, name: str, position: Position, problems: Problems) -> str:
         """The full path of a new part, if its name can be taken."""
@@ -249,7 +214,7 @@ class Scope:
         graph = self._model.graph
         before, was_wired = graph.mark(), graph.is_wired
         try:
-            with _raising() as problems:
+            with raising() as problems:
                 connection = self._connection(source, destination, delay, position, problems)
                 if connection is not None:
                     wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
@@ -269,7 +234,7 @@ class Scope:
         graph = self._model.graph
         before, was_wired = graph.mark(), graph.is_wired
         try:
-            with _raising() as problems:
+            with raising() as problems:
                 connection = self._connection(source, destination, None, position, problems)
                 if connection is not None:
                     wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
@@ -282,7 +247,7 @@ class Scope:
             graph.is_wired = was_wired
         found = [hop for one, other in pairs for hop in graph.outgoing(one) if hop.destination == other]
         if not found:
-            with _raising() as problems:
+            with raising() as problems:
                 for one, other in pairs:
                     here = ", ".join(hop.destination for hop in graph.outgoing(one))
                     problems.add(
@@ -317,7 +282,7 @@ class Scope:
 
     def _ends(self, ends: Ends, position: Position, problems: Problems) -> list[Text]:
         found = []
-        for end in _each(ends):
+        for end in each_of(ends):
             name = end if isinstance(end, str) else self._name_of(end, position, problems)
             if name is not None:
                 found.append(Text(name, within(Text(name, position), name)))
@@ -389,33 +354,70 @@ class Scope:
 
     # -- aspects --------------------------------------------------------------------------------------------------
 
-    def weave(self, name: str, aspect: Aspect, *, at: Places) -> WovenAspect:
+    def weave(
+        self, name: str, aspect: Aspect | Composite | Instance, *, at: Places | Mapping[str, Places]
+    ) -> WovenAspect:
         """Let an aspect stand at ports or actors, given as such or as patterns over those that are there now.
 
-        Aspects at one port or actor apply in the order in which they are woven.  Raises ``ModelError``.
+        Aspects at one port or actor apply in the order in which they are woven.  An aspect may be a model: a composite
+        of this model, or an instance of a composite class, which is added.  If it has several request ports, ``at``
+        says what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  Raises ``ModelError``.
         """
         position = call_site()
         full = self._full(name)
-        with _raising() as problems:
+        with raising() as problems:
             if not NAME.match(name):
                 problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
-            pointcuts = []
-            for end in _each(at):
-                path = end if isinstance(end, str) else self._place(end, aspect, position, problems)
-                if path is not None:
-                    name_here = path if path is end else path.removeprefix(self._full(""))
-                    pointcuts.append(PointcutText.of(Text(name_here, within(Text(name_here, position), name_here))))
-            index = PathIndex(self._model.graph.ports.nodes)
-            weaving = Weaving(self._model.graph, index, full, type(aspect), self.path, problems)
-            woven = weaving.weave(aspect, pointcuts, lambda _: position)
-        self._model.aspects.append(woven)
+        if isinstance(aspect, Aspect):
+            with raising() as problems:
+                pointcuts = self._pointcuts(at, type(aspect), position, problems)
+                weaving = Weaving(self._model.graph, self._ports, full, type(aspect), self.path, problems)
+                woven = weaving.weave(aspect, pointcuts, lambda _: position)
+            self._model.aspects.append(woven)
+            return woven
+        model = self._model
+        composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
+        try:
+            with raising() as problems:
+                pointcuts = self._pointcuts(at, CompositeAspect, position, problems)
+                detour = ModelWeaving(model.graph, self._ports, full, composite.path, self.path, problems, position)
+                woven = detour.weave(CompositeAspect(), pointcuts, lambda _: position)
+                detour.check(woven)
+                check_nesting([*model.aspects, woven], model.graph, problems)
+        except Exception:
+            if composite is not aspect:
+                self.remove(composite.path.removeprefix(self._full("")))
+            raise
+        detour.connect(woven)
+        model.graph.positions.setdefault(f"aspect {full}", position)
+        model.aspects.append(woven)
+        model.changed()
         return woven
 
-    def _place(self, place: object, aspect: Aspect, position: Position, problems: Problems) -> str | None:
+    @property
+    def _ports(self) -> PathIndex:
+        return PathIndex(self._model.graph.ports.nodes)
+
+    def _pointcuts(
+        self, at: Places | Mapping[str, Places], cls: type[Aspect], position: Position, problems: Problems
+    ) -> list[PointcutText]:
+        """Pointcuts as a model file would declare them."""
+        found = []
+        for request, ends in at.items() if isinstance(at, Mapping) else ((None, at),):
+            for end in each_of(ends):
+                path = end if isinstance(end, str) else self._place(end, cls, position, problems)
+                if path is not None:
+                    here = path if path is end else path.removeprefix(self._full(""))
+                    pointcut = PointcutText.of(Text(here, within(Text(here, position), here)))
+                    pointcut.request = None if request is None else Text(request, position)
+                    found.append(pointcut)
+        return found
+
+    def _place(self, place: object, cls: type[Aspect], position: Position, problems: Problems) -> str | None:
         """The path of a port, or of an actor or composite for an aspect that stands at such."""
-        if "actor" not in aspect.stands_at or not isinstance(place, (Actor, Composite)):
+        if "actor" not in cls.stands_at or not isinstance(place, (Actor, Composite)):
             return self._known(place, position, problems)
         if isinstance(place, Actor) and self._model.graph.actors.get(place.path) is not place:
             problems.add(f"{place.path} is not part of this model", position, "add it to the model first")
@@ -423,16 +425,21 @@ class Scope:
         return place.path
 
     def unweave(self, name: str) -> None:
-        """Take an aspect out."""
+        """Take an aspect out, with its composite if it is a model."""
         full = self._full(name)
         known = [woven.name for woven in self._model.aspects]
         if full not in known:
-            raise _mistake(
+            raise mistake(
                 f"the model has no aspect {full!r}{did_you_mean(full, known)}",
                 call_site(),
                 f"its aspects: {', '.join(known) or 'none'}",
             )
-        del self._model.aspects[known.index(full)]
+        woven = self._model.aspects[known.index(full)]
+        if woven.model is None:
+            self._model.aspects.remove(woven)
+        else:  # its composite is of no use without it
+            above, _, part = woven.model.path.rpartition(".")
+            (self._model.scope(above) if above else self._model).remove(part)
 
 
 class Composite(Scope):
@@ -452,7 +459,7 @@ class Composite(Scope):
     def _port(self, name: str, direction: str) -> CompositePort:
         position = call_site()
         full = self._full(name)
-        with _raising() as problems:
+        with raising() as problems:
             if not NAME.match(name):
                 problems.add(f"{name!r} is not a port name", position)
             elif name in self._text.inputs or name in self._text.outputs:
@@ -475,34 +482,3 @@ class Composite(Scope):
     def __repr__(self) -> str:
         inputs, outputs = ", ".join(self._text.inputs) or "none", ", ".join(self._text.outputs) or "none"
         return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
-
-
-@contextmanager
-def _raising() -> Iterator[Problems]:
-    """Collects problems and raises them at the end, if there are any."""
-    problems = Problems()
-    yield problems
-    problems.raise_if_any()
-
-
-def _clock(path: str, start: object, drift: object, position: Position, problems: Problems) -> tuple[int | None, float]:
-    """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""
-    begin, speed = None, 1.0
-    try:
-        begin = None if start is None else to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
-    except (ParameterError, ValueError) as error:
-        problems.add(f"{path}: director.start: {error}", position)
-    try:
-        speed = Parameter(float, unit="1", min=1e-6, max=1e6).convert(drift) or 1.0
-    except ParameterError as error:
-        problems.add(f"{path}: director.drift: {error}", position)
-    return begin, speed
-
-
-def _each(ends: Ends | Places) -> list[Any]:
-    """One or several ends as a list; what is no end is found out later."""
-    return list(ends) if isinstance(ends, Iterable) and not isinstance(ends, str) else [ends]
-
-
-def _mistake(message: str, position: Position, *hints: str) -> ModelError:
-    return ModelError([Problem(message, position, hints)])

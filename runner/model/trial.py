@@ -8,7 +8,6 @@ from .catalogue import Catalogue
 from .checks import check
 from .declarations import CompositeText, ModelText, PartText
 from .elaborate import Elaborator, TooLargeError
-from .patterns import PathIndex
 from .problems import Problems
 from .settings import Settings
 
@@ -24,7 +23,11 @@ def try_classes(
 ) -> None:
     """Check what can be checked of every class of which the model has no instance."""
     tried = set(used)
-    inner = {part.type.text for composite in composites.values() for part in composite.actors.values()}
+    inner = {
+        part.type.text
+        for composite in composites.values()
+        for part in (*composite.actors.values(), *composite.aspects.values())
+    }
     # Those that stand in no other come first, for the others are then tried as their parts.
     for name in sorted(composites, key=lambda name: name in inner):
         if name not in tried:
@@ -55,9 +58,7 @@ class _Trial(Elaborator):
         for direction in ("input", "output"):
             for port in composite.ports(direction):
                 self.graph.ports.nodes[f"{path}.{port}"]["unmade"] = True  # anything may be connected to it
-        ports = PathIndex(self.graph.ports.nodes)
-        for name, scope, aspect, scope_names in self._to_weave:
-            self._aspect(name, scope, aspect, scope_names, ports)
+        self._weave()
         check(self.graph, self.problems, whole=False)
 
     def _enlist(self, path: str, part: PartText) -> None:

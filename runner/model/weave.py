@@ -25,12 +25,22 @@ from .reading import Text
 
 
 @dataclass
+class AspectModel:
+    """The composite that an aspect is, the port from which it answers, and the port by which each place asks it."""
+
+    path: str
+    kind: str
+    response: str
+    requests: dict[str, str]
+
+
+@dataclass
 class WovenAspect:
     """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
 
-    ``actors`` are those at which it stands, and what was aimed at: the actor, or a composite around it.  ``readings``
-    are what its expressions over ports ask for, ``selections`` what its parameters with patterns select, ``reads`` the
-    ports that it looks at otherwise.
+    ``actors`` are those at which it stands, and what was aimed at: the actor, or a composite around it.  ``model`` is
+    its composite if it is a model itself.  ``readings`` are what its expressions over ports ask for, ``selections``
+    what its parameters with patterns select, ``reads`` the ports that it looks at otherwise.
     """
 
     name: str
@@ -41,6 +51,12 @@ class WovenAspect:
     readings: dict[PortFormula, list[Reading]] = field(default_factory=dict)
     selections: dict[str, Selection] = field(default_factory=dict)
     reads: list[str] = field(default_factory=list)
+    model: AspectModel | None = None
+
+    @property
+    def kind(self) -> str:
+        """The name of its type."""
+        return type(self.aspect).__name__ if self.model is None else self.model.kind
 
     @property
     def places(self) -> list[str]:
@@ -275,26 +291,7 @@ class Weaving:
         for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
             if "->" not in pointcut.text:
                 continue
-            if "input" not in self.cls.stands_at:
-                self._problem(f"{self.cls.__name__} stands at output ports, not on connections", pointcut)
-                continue
-            left, _, right = (part.strip() for part in pointcut.text.partition("->"))
-            try:
-                found = [
-                    (hop.source, hop.destination)
-                    for *_, hop in self.graph.ports.edges(data="hop")
-                    if matches(self._full(left), hop.source) and matches(self._full(right), hop.destination)
-                ]
-            except PatternError as error:
-                self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
-                continue
-            if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
-                known = [f"{hop.source} -> {hop.destination}" for *_, hop in self.graph.ports.edges(data="hop")]
-                self._problem(
-                    f"{pointcut.text!r} matches no connection"
-                    f"{did_you_mean(f'{self._full(left)} -> {self._full(right)}', known)}",
-                    pointcut,
-                )
+            found = self._connections_of(pointcut)
             if not pointcut.exclude:
                 chosen |= dict.fromkeys(found)
             elif found and not chosen.keys() & found:
@@ -306,6 +303,30 @@ class Weaving:
             else:
                 chosen = {each: None for each in chosen if each not in found}
         return [each for each in chosen if each[1] not in self._left_out]
+
+    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
+        """The connections that one pointcut selects."""
+        if "input" not in self.cls.stands_at:
+            self._problem(f"{self.cls.__name__} stands at output ports, not on connections", pointcut)
+            return []
+        left, _, right = (part.strip() for part in pointcut.text.partition("->"))
+        try:
+            found = [
+                (hop.source, hop.destination)
+                for *_, hop in self.graph.ports.edges(data="hop")
+                if matches(self._full(left), hop.source) and matches(self._full(right), hop.destination)
+            ]
+        except PatternError as error:
+            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
+            return []
+        if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
+            known = [f"{hop.source} -> {hop.destination}" for *_, hop in self.graph.ports.edges(data="hop")]
+            self._problem(
+                f"{pointcut.text!r} matches no connection"
+                f"{did_you_mean(f'{self._full(left)} -> {self._full(right)}', known)}",
+                pointcut,
+            )
+        return found
 
     def _excuses(self, pattern: str) -> bool:
         """Whether a pattern that matches nothing is right."""

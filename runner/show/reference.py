@@ -104,7 +104,7 @@ def weaving(model: Model) -> RenderableType:
             number = str(place + 1) if len(woven) > 1 else ""
             table.add_row(*map(Text, ("" if place else path, number, name, kind, parameters)))
     idle = [each for each in model.aspects if not each.places]
-    return Group(table, *(Text(f"{each.name} ({type(each.aspect).__name__}) stands nowhere") for each in idle))
+    return Group(table, *(Text(f"{each.name} ({each.kind}) stands nowhere") for each in idle))
 
 
 def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
@@ -115,7 +115,7 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
         given = {name: value for name, value in written.items() if name != "type"} if isinstance(written, dict) else {}
         parameters = ", ".join(f"{name}: {shown(value)}" for name, value in given.items())
         for path in (*woven.ports, *woven.actors):
-            found.setdefault(path, []).append((woven.name, type(woven.aspect).__name__, parameters))
+            found.setdefault(path, []).append((woven.name, woven.kind, parameters))
     return {path: found[path] for path in (*model.graph.ports.nodes, *model.graph.actors) if path in found}
 
 

@@ -59,7 +59,7 @@ def summary_table(model: Model, results: Results) -> Group:
     for name, figures in results.aspects.items():
         woven = next(each for each in model.aspects if each.name == name)
         for what, figure in figures.items():
-            where = f"by {type(woven.aspect).__name__} at {extent([woven])}"
+            where = f"by {woven.kind} at {extent([woven])}"
             table.add_row(f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where)
     table.add_row("events", f"{results.events}", "", "sends and acts of aspects in the event log")
     table.add_row("firings", f"{results.firings}", "", "of actors")

@@ -165,8 +165,8 @@ def test_windows_can_be_set_from_outside() -> None:
         (
             "type: PacketLoss, probability: 1, at: {port: input}",
             (
-                "m.yaml:16:48: error: a pointcut chooses by type or by tag\n"
-                "   help: write {type: ..., port: ...} or {tag: ...}"
+                "m.yaml:16:48: error: a pointcut chooses by pattern, by type or by tag\n"
+                "   help: write {at: ...}, {type: ..., port: ...} or {tag: ...}"
             ),
         ),
         (

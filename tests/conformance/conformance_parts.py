@@ -49,6 +49,29 @@ class TestActorPortDepth(Actor):
         self.output.send(type(self).depths)
 
 
+class MicrostepDelay(Actor):
+    """Delays each token by some seconds and keeps its microstep, as Ptolemy's ``TimeDelay`` does."""
+
+    input: InputPort[Any] = InputPort(Any)
+    output: OutputPort[Any] = OutputPort(Any, depends_on=())
+
+    delay = Parameter(float, 1.0, unit="s", min=0)
+
+    def initialize(self) -> None:
+        self._held: list[tuple[Tag, Any]] = []
+
+    def fire(self) -> None:
+        due = [token for tag, token in self._held if tag <= self.tag]
+        self._held = [(tag, token) for tag, token in self._held if tag > self.tag]
+        for token in due:
+            self.output.send(token)
+        for token in self.input.tokens:
+            wake = self.wake_in(self.delay)
+            self._held.append((Tag(wake.tag.time, self.tag.microstep), token))
+        if any(tag.time == self.tag.time for tag, _ in self._held):
+            self.wake_in(0)
+
+
 class _OfVariable(Actor):
     """What has to do with a variable of the model, which Epicycle does not have: its parameters are fixed in a run.
 
@@ -92,6 +115,7 @@ class ConstOfVariable(_OfVariable):
 TYPES = (
     CancelFireAtTest,
     ConstOfVariable,
+    MicrostepDelay,
     SetVariable,
     Sink,
     TestActorPortDepth,

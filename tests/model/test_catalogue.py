@@ -187,7 +187,7 @@ def check_installed(site: Path) -> None:
     assert (icing["stands_at"], icing["events"], icing["parameters"][0]["default"]) == (["output"], ["frozen"], 273.15)
     schema = json.loads(epicycle(site, "schema"))
     assert schema["$defs"]["actor.Thermometer"]["properties"]["start"]["minimum"] == 0
-    assert "Icing" in schema["$defs"]["aspect"]["properties"]["type"]["enum"]
+    assert "Icing" in schema["$defs"]["aspect"]["properties"]["type"]["anyOf"][0]["enum"]
     (site / "weather.yaml").write_text(MODEL, encoding="utf-8")
     results = json.loads(epicycle(site, "run", "weather.yaml", "--json"))
     assert results["metrics"] == {"coldest": 273.15, "last": 275.0}

@@ -50,7 +50,7 @@ KNOWN = "|".join({each.__name__ for each in TYPES} | built_in().actors.keys() | 
 SHAPE = re.compile(
     "is not a mapping|has no key|has no type\\b|is not a name|is not a connection|has no port on its|has no '(from|to)'"
     "|is not a list|is not a text|is not a port name|does not say of what|cannot take|cannot be called|is out of bounds"
-    f"|({KNOWN}) has no parameter|there is no aspect type|is not (a|an|one of|true or false)\\b"
+    f"|({KNOWN}) has no parameter|is not (a|an|one of|true or false)\\b"
 )
 # Messages that look like it, but are about other files, computed values, or units.
 NOT_SHAPE = re.compile(
@@ -190,7 +190,8 @@ def test_every_key_of_the_language_has_a_rule() -> None:
         ("model: m\nactors: {a: {type: RobustController, objective: {type: Infrm}}}", ["$.actors.a.objective.type"]),
         ('model: m\nactors: {a: {type: RobustController, objective: "${o}"}}', []),
         ("model: m\nactors: {a: {type: RobustController, tube_time: step}}", ["$.actors.a.tube_time"]),
-        ("model: m\naspects: {a: {type: PacketLos, at: a.b}}", ["$.aspects.a.type"]),
+        ("model: m\naspects: {a: {type: [PacketLoss], at: a.b}}", ["$.aspects.a.type"]),
+        ("model: m\naspects: {a: {type: MyMedium, at: [{at: a.b, request: in2}]}}", []),
         ("model: m\naspects: {a: {type: PacketLoss, at: a.b, probability: 2}}", ["$.aspects.a.probability"]),
         ("model: m\naspects: {a: {type: PacketLoss, at: a.b, probability: 1, enabled: 1}}", ["$.aspects.a.enabled"]),
         ("model: m\nconnections: [a.b > c.d]", ["$.connections[0]"]),

@@ -91,7 +91,7 @@ def _legend(drawing: Drawing) -> list[Row]:
     rows = []
     for name in _aspects(drawing):
         woven = [each for each in drawing.outline.model.aspects if short_name(each.name) == name]
-        kinds = ", ".join(dict.fromkeys(type(each.aspect).__name__ for each in woven))
+        kinds = ", ".join(dict.fromkeys(each.kind for each in woven))
         rows.append(Row("aspect", name, f"aspect {kinds}, at {extent(woven)}"))
     if labels := [pill.text for pill in drawing.pills if not pill.aspect]:
         delayed = [words for words in labels if words[0].isdigit()]

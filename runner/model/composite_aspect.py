@@ -1,0 +1,262 @@
+"""Aspects that are models: a composite class that is woven around ports, and stands beside them in the graph.
+
+Tokens come in by a *request port*, an input of the composite, and go on when they leave by its *response port*: the
+output ``response``, or its only output.  Which of several inputs takes the tokens of a pointcut is said there
+(``request: in2``); else it is the input ``request``, or the only input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import networkx as nx
+
+from epicycle.actors import accepts, declared_parameters, type_name
+from epicycle.aspects import CompositeAspect, Request
+
+from .declarations import PartText, PointcutText
+from .graph import Detour, ModelGraph
+from .patterns import PathIndex
+from .problems import Position, Problems, did_you_mean
+from .weave import AspectModel, Weaving, WovenAspect
+
+BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
+OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: not the composite's matter
+
+
+def as_actor(part: PartText) -> PartText:
+    """The composite of an aspect's declaration, as it would be declared among the actors."""
+    values = {name: entry for name, entry in part.values.items() if name not in OWN}
+    priority = values.pop("priority").value if "priority" in values else None
+    return replace(part, values=values, priority=priority)
+
+
+class ModelWeaving(Weaving):
+    """Finds the places of an aspect that is the composite at ``path``, and connects it with them."""
+
+    def __init__(
+        self,
+        graph: ModelGraph,
+        ports: PathIndex,
+        name: str,
+        path: str,
+        scope: str,
+        problems: Problems,
+        position: Position,
+    ) -> None:
+        super().__init__(graph, ports, name, CompositeAspect, scope, problems)
+        self.path = path
+        self.position = position
+        self.model = AspectModel(path, graph.composites[path], "", {})
+        self.inputs, self.outputs = graph.borders(path)
+        self.requests: dict[str, None] = {}  # the request ports
+        self._is_misplaced = False
+        self._is_unsure = False  # whether it was told that a request port is not known
+
+    def check(self, woven: WovenAspect) -> None:
+        """Find the ports by which tokens come in and leave, and see whether the composite can stand where it is to."""
+        self.model.response = self._only(self.outputs, "response", "output", self.position)
+        if not self.requests and not self._is_unsure:
+            self._request(PointcutText("", self.position))
+        if self._is_unsure:
+            self.leave()
+        for port in self.requests:
+            for hop in list(self.graph.incoming(port)):
+                self._problem(
+                    f"{port} is for the tokens of this aspect, and nothing else can be connected to it",
+                    hop.position,
+                    "add another input for what else the composite needs",
+                )
+                self.graph.disconnect(hop)
+        self._check_types()
+        self._check_directors(woven)
+
+    def connect(self, woven: WovenAspect) -> None:
+        """Let the tokens of all places come in, and go on when they are answered."""
+        for port in self.requests:
+            self.graph.open_requests(port)
+        if self.model.response:
+            self.graph.ports.nodes[self.model.response]["type"] = Request
+        if self.model.response and not self._is_misplaced:
+            woven.model = self.model
+
+    def leave(self) -> None:
+        """There is no such aspect, for a reason that has been told: what its tokens would do is no news."""
+        for port in self.inputs:
+            self.graph.ports.nodes[port]["unmade"] = True
+
+    def _of(self, pointcut: PointcutText) -> list[str]:
+        found = super()._of(pointcut)
+        outside = [port for port in found if not self._is_inside(port)]
+        self._ask(pointcut, outside, found)
+        return outside
+
+    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
+        found = super()._connections_of(pointcut)
+        outside = [ends for ends in found if not any(map(self._is_inside, ends))]
+        self._ask(pointcut, [_place(*ends) for ends in outside], [_place(*ends) for ends in found])
+        return outside
+
+    def _ask(self, pointcut: PointcutText, places: list[str], found: list[str]) -> None:
+        """Note by which port the tokens of the places come in; of several pointcuts the last counts."""
+        if pointcut.exclude:
+            return
+        if found and not places:
+            self._problem(f"it cannot stand inside of itself, at {found[0]}", pointcut)
+        request = self._request(pointcut)
+        if request:
+            self.model.requests.update(dict.fromkeys(places, request))
+
+    def _request(self, pointcut: PointcutText) -> str:
+        """The port by which the tokens of a pointcut come in."""
+        asked = pointcut.request
+        if asked is None:
+            found = self._only(
+                self.inputs,
+                "request",
+                "input",
+                pointcut.position,
+                BY_PLACE,
+            )
+        else:
+            found = f"{self.path}.{asked.text}"
+            if found not in self.inputs:
+                names = _names(self.inputs)
+                self._problem(
+                    f"{self.model.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}",
+                    asked,
+                    f"its inputs: {', '.join(names) or 'none'}",
+                )
+                found = ""
+        if found:
+            self.requests[found] = None
+        self._is_unsure = self._is_unsure or not found
+        return found
+
+    def _only(self, ports: list[str], name: str, direction: str, position: Position, hint: str = "") -> str:
+        """The port of that name, or the only one of its direction."""
+        named = f"{self.path}.{name}"
+        if named in ports or len(ports) == 1:
+            return named if named in ports else ports[0]
+        if not ports:
+            self._problem(
+                f"{self.model.kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {self.model.kind}"
+            )
+        else:
+            self._problem(
+                f"{self.model.kind} has {len(ports)} {direction}s, none of them called {name!r}",
+                position,
+                f"its {direction}s: {', '.join(_names(ports))}",
+                f"call one of them {name!r}" + (f", {hint}" if hint else ""),
+            )
+        return ""
+
+    def _check_types(self) -> None:
+        """Whether the ports, if they declare types, take and give requests."""
+        for port in [*self.requests, *([self.model.response] if self.model.response else [])]:
+            node = self.graph.ports.nodes[port]
+            wanted = node.get("type")
+            if wanted is not None and not accepts(wanted, Request):
+                self._problem(
+                    f"{port.rpartition('.')[2]} of {self.model.kind} is for {type_name(wanted)}, but through an "
+                    "aspect go requests",
+                    node.get("declared"),
+                    "leave out its type: the actors inside get requests, which hold the tokens",
+                )
+
+    def _check_directors(self, woven: WovenAspect) -> None:
+        """Whether all places stand under the composite's own director, which has one order and one time for them."""
+        graph, own = self.graph, self.graph.director_of(self.path)
+        found = {port: graph.director_of(graph.owner(port)) for port in woven.ports}
+        for source, destination in woven.connections:
+            hop = next(hop for hop in graph.outgoing(source) if hop.destination == destination)
+            found[_place(source, destination)] = graph.director_over(hop)
+        for place, director in found.items():
+            if director != own:
+                self._problem(
+                    f"{place} is {'inside' if director else 'outside'} of {director or own}, which has a director of "
+                    "its own",
+                    self.position,
+                    f"declare it inside of {director}, or let it stand at the ports of {director}"
+                    if director
+                    else f"declare it outside of {own}",
+                )
+                self._is_misplaced = True
+                return
+
+    def _is_inside(self, port: str) -> bool:
+        return port.startswith(f"{self.path}.")
+
+
+def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
+    """The ways of tokens through aspects that are models, as far as they may be gone within the tag.
+
+    Where an aspect stands, tokens may also pass it by, when it is not active: its detours come beside the connections,
+    which they never replace.  So a model that is right with such an aspect is right without it.
+    """
+    at: dict[str, list[WovenAspect]] = {}
+    for woven in aspects:
+        if woven.model is not None:
+            for place in woven.model.requests:
+                at.setdefault(place, []).append(woven)
+    found: dict[tuple[str, str, str], Detour] = {}
+
+    def lead(sources: list[str], place: str) -> list[str]:
+        """Through the aspects at a place; the ports from which tokens may come then."""
+        for woven in at.get(place, ()):
+            assert woven.model is not None
+            for source in sources:
+                add(source, woven.model.requests[place], woven)
+            sources = [*sources, woven.model.response]
+        return sources
+
+    def add(source: str, destination: str, woven: WovenAspect) -> None:
+        position = graph.positions.get(f"aspect {woven.name}")
+        order = graph.mark() + len(found)
+        key = (source, destination, woven.name)
+        found.setdefault(key, Detour(source, destination, None, position, order, woven.name))
+
+    responses = {woven.model.response: woven for many in at.values() for woven in many if woven.model is not None}
+    senders: dict[str, list[str]] = {}
+    for port in graph.ports.nodes if at else ():
+        if graph.direction(port) == "output" and graph.is_end(port):
+            senders[port] = lead([port], port)  # an aspect at an output stands before the send
+    for *_, hop in graph.ports.edges(data="hop") if at else ():
+        sources = senders.get(hop.source, [hop.source]) if hop.delay is None else []
+        sources = lead(sources, _place(hop.source, hop.destination))
+        if hop.destination not in senders:
+            sources = lead(sources, hop.destination)
+        for source in sources:
+            if source in responses:
+                add(source, hop.destination, responses[source])
+    return list(found.values())
+
+
+def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> bool:
+    """Whether no aspect stands in another that stands in it, or the tokens of both would never come out."""
+    models = [woven for woven in aspects if woven.model is not None]
+    inside = nx.DiGraph()
+    for woven in models:
+        for other in models:
+            assert other.model is not None
+            ends = [*woven.ports, *(end for ends in woven.connections for end in ends)]
+            if woven is not other and any(end.startswith(f"{other.model.path}.") for end in ends):
+                inside.add_edge(woven.name, other.name)
+    is_sound = nx.is_directed_acyclic_graph(inside)
+    if not is_sound:
+        first, second = nx.find_cycle(inside)[0]
+        problems.add(
+            f"aspect {first}: it stands inside of {second}, and {second} inside of it",
+            graph.positions.get(f"aspect {first}"),
+            f"a token would never come out: let one of them stand elsewhere, or leave it out: '!{second}.**'",
+        )
+    return bool(is_sound)
+
+
+def _place(source: str, destination: str) -> str:
+    return f"{source} -> {destination}"
+
+
+def _names(ports: Iterable[str]) -> list[str]:
+    return [port.rpartition(".")[2] for port in ports]

@@ -1,0 +1,163 @@
+"""The values of parameters: what is set from outside goes before what is given, and this before the default."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+from epicycle.actors import ParameterError, declared_parameters, unknown_parameter
+
+from .declarations import CompositeText
+from .document import Entry, Mapping, Node
+from .files import data_file
+from .graph import ModelGraph
+from .problems import Position, Problems, did_you_mean, nearest
+from .settings import Setting, Settings
+from .values import Values
+
+_INDEX = re.compile(r"\[\d+\]")
+
+
+class Configurator:
+    """Finds the values of all parameters of a model, and what is wrong with them."""
+
+    def __init__(self, settings: Settings, problems: Problems) -> None:
+        self.settings = settings
+        self.problems = problems
+        self.graph = ModelGraph()
+        self.values = Values(problems)
+        self.settable: dict[str, None] = {}
+
+    def _parameters(
+        self,
+        path: str,
+        composite: CompositeText,
+        given: dict[str, Entry],
+        outer: dict[str, object],
+        position: Position | None,
+    ) -> dict[str, object]:
+        """The values of a composite's parameters: set from outside, else given, else the default."""
+        names: dict[str, object] = {}
+        label = path or composite.name
+        above = path.rpartition(".")[0]  # the composite whose fault a wrong value is
+        for key, entry in given.items():
+            if key not in composite.parameters:
+                self.problems.add(
+                    f"{label}: {composite.name} has no parameter {key!r}"
+                    f"{did_you_mean(key, list(composite.parameters))}",
+                    entry.key.position,
+                    f"valid parameters: {', '.join(composite.parameters) or 'none'}",
+                    scope=above,
+                )
+        given = _as_meant(given, composite.parameters)
+        for name, declared in composite.parameters.items():
+            full = f"{path}.{name}" if path else name
+            node, scope, instance = declared.value, names, path
+            later: Sequence[str] = list(composite.parameters)
+            if name in given:
+                node, scope, instance, later = given[name].value, outer, above, ()
+            if (setting := self._setting(full)) is not None:
+                node, scope, instance, later = setting.node, {}, "", ()
+            if node is None:
+                needs = f"{label}: {composite.name} needs" if path else f"{label} needs"
+                self.problems.add(
+                    f"{needs} a value for {name!r}",
+                    position or declared.position,
+                    *((f"{name}: {declared.doc}",) if declared.doc else ()),
+                    scope=above,
+                )
+                names[name] = self.values.missing
+                continue
+            value = self.values.of(node, scope, full, instance, later)
+            names[name] = self.values.declared(full, declared, value, node.position, instance)
+        return names
+
+    def _setting(self, full: str) -> Setting | None:
+        """The setting for a parameter, if there is one."""
+        self.settable[full] = None
+        return self.settings.find(full)
+
+    def _configuration(
+        self,
+        label: str,
+        cls: type,
+        given: dict[str, Entry],
+        names: dict[str, object],
+        position: Position,
+        path: str,
+        composite: str,
+    ) -> dict[str, object] | None:
+        """Converted values for a Configurable class; None if some are wrong."""
+        declared = declared_parameters(cls)
+        before, complete = len(self.problems), True
+        result: dict[str, object] = {}
+        for key, entry in given.items():
+            if key not in declared:
+                self.problems.add(
+                    f"{label}: {unknown_parameter(cls, key)}",
+                    entry.key.position,
+                    f"valid parameters: {', '.join(declared) or 'none'}",
+                    scope=composite,
+                )
+        given = _as_meant(given, declared)
+        for name, parameter in declared.items():
+            node = given[name].value if name in given else None
+            scope = names
+            if (setting := self._setting(f"{path}.{name}")) is not None:
+                node, scope = setting.node, {}
+            if node is None:
+                if parameter.required:
+                    self.problems.add(
+                        f"{label}: {cls.__name__} needs a value for {name!r}",
+                        position,
+                        *((f"{name}: {parameter.doc}",) if parameter.doc else ()),
+                        scope=composite,
+                    )
+                continue
+            value = self.values.of(node, scope, f"{label}.{name}", composite)
+            if value is self.values.missing:
+                complete = False
+                continue
+            try:
+                result[name] = parameter.convert(value)
+                if parameter.type is Path and result[name] is not None:
+                    result[name] = data_file(Path(value), node.position)
+            except ParameterError as error:
+                self.problems.add(f"{label}.{name}: {error}", _place(node, error), scope=composite)
+        return result if complete and len(self.problems) == before else None
+
+    def _add_unused(self, setting: Setting) -> None:
+        """A setting that no parameter took, unless it is meant for an array that is empty now."""
+        if self.graph.is_excused(setting.path):
+            return
+        known = list(self.settable)
+        if "[*]" in setting.path:
+            known = list(dict.fromkeys(_INDEX.sub("[*]", path) for path in known))
+        owner, _, last = setting.path.rpartition(".")
+        beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
+        # The nearest one of the same owner, or else the nearest of all.
+        near = did_you_mean(last, beside).replace("mean '", f"mean '{owner}." if owner else "mean '")
+        near = near or did_you_mean(setting.path, known)
+        valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
+        self.problems.add(f"{setting.path!r} sets no parameter{near}", setting.position, *(() if near else valid))
+
+
+def _place(node: Node, error: ParameterError) -> Position:
+    """Where in a value, as far as it is written out, an error is."""
+    for number, key in enumerate(error.keys, start=1):
+        if not isinstance(node, Mapping) or key not in node.entries:
+            break
+        if error.of_key and number == len(error.keys):
+            return node.entries[key].key.position
+        node = node.entries[key].value
+    return node.position
+
+
+def _as_meant(given: dict[str, Entry], valid: Collection[str]) -> dict[str, Entry]:
+    """The values with misspelled names put right, or else they would seem to be missing as well."""
+    result = {name: entry for name, entry in given.items() if name in valid}
+    for name, entry in given.items():
+        if name not in valid and (meant := nearest(name, valid)) is not None:
+            result.setdefault(meant, entry)
+    return result

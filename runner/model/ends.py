@@ -1,0 +1,75 @@
+"""What a program names when it builds a model: ports and lists of them; and how its mistakes are told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
+
+from .problems import ModelError, Position, Problem, Problems
+
+if TYPE_CHECKING:
+    from .model import Model
+    from .scope import Composite
+
+
+@dataclass(frozen=True)
+class CompositePort:
+    """A port of a composite, through which tokens pass."""
+
+    path: str
+    direction: str
+
+    def __repr__(self) -> str:
+        return f"<{self.direction} port {self.path} of a composite>"
+
+
+Port: TypeAlias = "InputPort[Any] | OutputPort[Any] | CompositePort"
+Ends: TypeAlias = "str | Port | Iterable[str | Port]"
+Place: TypeAlias = "str | Port | Actor | Composite"
+Places: TypeAlias = "Place | Iterable[Place]"
+
+
+class Instance(Protocol):
+    """An instance of a composite class that can be added to a model; see ``load_composite``."""
+
+    path: str
+
+    def unfold(self, path: str, model: Model, position: Position) -> None:
+        """Make it part of a model, at its full path."""
+
+
+@contextmanager
+def raising() -> Iterator[Problems]:
+    """Collects problems and raises them at the end, if there are any."""
+    problems = Problems()
+    yield problems
+    problems.raise_if_any()
+
+
+def clock_of(
+    path: str, start: object, drift: object, position: Position, problems: Problems
+) -> tuple[int | None, float]:
+    """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""
+    begin, speed = None, 1.0
+    try:
+        begin = None if start is None else to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
+    except (ParameterError, ValueError) as error:
+        problems.add(f"{path}: director.start: {error}", position)
+    try:
+        speed = Parameter(float, unit="1", min=1e-6, max=1e6).convert(drift) or 1.0
+    except ParameterError as error:
+        problems.add(f"{path}: director.drift: {error}", position)
+    return begin, speed
+
+
+def each_of(ends: Ends | Places) -> list[Any]:
+    """One or several ends as a list; what is no end is found out later."""
+    return list(ends) if isinstance(ends, Iterable) and not isinstance(ends, str) else [ends]
+
+
+def mistake(message: str, position: Position, *hints: str) -> ModelError:
+    return ModelError([Problem(message, position, hints)])
