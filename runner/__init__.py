@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .engine import ActorError, Results, Signal, Simulation
     from .model import Composite, Model, ModelError, load_composite, load_model
+    from .trial import Trial
 
 __all__ = [
     "ActorError",
@@ -17,6 +18,7 @@ __all__ = [
     "Results",
     "Signal",
     "Simulation",
+    "Trial",
     "load_composite",
     "load_model",
 ]
@@ -27,6 +29,7 @@ _HOMES = {
     "Results": "engine",
     "Signal": "engine",
     "Simulation": "engine",
+    "Trial": "trial",
     "Model": "model",
     "ModelError": "model",
     "load_composite": "model",

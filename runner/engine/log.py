@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, Tag, to_seconds
 
-from ..tables import pandas_module
+from ..tables import pandas_module, short
 from .encoding import canonical, plain
 
 if TYPE_CHECKING:
@@ -38,6 +38,18 @@ class Record:
     channel: int | None
     aspect: str
     value: Any
+
+    def encoded(self, *, microstep: bool = True) -> bytes:
+        """The record in the canonical form of which the digest is made; with ``microstep`` false without that."""
+        names = map(canonical, (self.event, self.actor, self.port, self.aspect, self.channel))
+        tag = _TAG(b"i", self.tag.time, b"i", self.tag.microstep if microstep else 0)
+        return tag + b"".join(names) + canonical(self.value)
+
+    def __str__(self) -> str:
+        channel = "" if self.channel is None else f"[{self.channel}]"
+        what = f"{self.aspect}: {self.event}" if self.aspect else self.event
+        place = f"{self.actor}.{self.port}{channel}" if self.port else self.actor
+        return f"({to_seconds(self.tag.time):g} s, {self.tag.microstep}) {place} {what} {short(self.value)}"
 
     def row(self) -> tuple[float, int, str, str, str, int | None, str, str]:
         """The record in the columns of a file; the value is JSON text."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,32 +20,27 @@ from epicycle.actors import EpicycleError, ParameterError, Tag, declared_paramet
 from epicycle.aspects import (
     Aspect,
     Bias,
-    Bus,
     Corrupt,
     Drift,
     Duplicate,
-    ExecutionAspect,
     FieldError,
     GilbertElliott,
     JoinPoint,
     Latency,
     MeasurementFailure,
     Noise,
-    ObservationAspect,
-    Occlusion,
-    Outage,
     Outlier,
-    OutOfRange,
     PacketLoss,
     Quantise,
-    RadioMedium,
-    RangeLoss,
     Reorder,
     Saturate,
     SelectionParameter,
     StuckAt,
     Throttle,
 )
+
+sys.path.insert(0, str(Path(__file__).parent))
+from strengths import AT_WORK, AT_ZERO, at_ports, concrete_aspects
 
 MILLISECOND = 1_000_000
 SURE = 0.999
@@ -77,6 +74,7 @@ class Bench:
             "a.port",
             self,
             lambda token: self.out.append((self.tag.time / MILLISECOND, token)),
+            source="b.port",
             selections={
                 name: {each: [each] for each in parameter.patterns(getattr(aspect, name))}
                 for name, parameter in declared_parameters(type(aspect)).items()
@@ -361,37 +359,8 @@ def test_corruption(kind: str) -> None:
 
 # -- what all have in common -----------------------------------------------------------------------------------------
 
-AT_ZERO: list[Aspect] = [
-    PacketLoss(probability=0),
-    GilbertElliott(p=0),
-    GilbertElliott(p=0.3, loss_bad=0),
-    MeasurementFailure(probability=0),
-    MeasurementFailure(probability=0, burst=3),
-    Latency(),
-    Latency(reordering=True, distribution="normal"),
-    Duplicate(probability=0),
-    Reorder(probability=0),
-    Corrupt(probability=0),
-    Corrupt(probability=0, kind="bit_flip"),
-    Throttle(rate=1e9),
-    Bus(factor=0),
-    RadioMedium(message_length=1, rate=1e12),
-    RangeLoss(positions=["a.at", "b.at"], range=math.inf),
-    OutOfRange(positions="a.at", target="b.at", range=math.inf),
-    Occlusion(positions=["a.at", "b.at"], target="b.at", radius=0),
-    Outage(groups={}),
-    Noise(deviation=0),
-    Bias(by=0),
-    Drift(),
-    Outlier(probability=0, deviation=3),
-    Outlier(probability=0.5, deviation=0),
-    Quantise(step=0),
-    Saturate(),
-    StuckAt(p=0),
-]
 
-
-@pytest.mark.parametrize("aspect", AT_ZERO, ids=repr)
+@pytest.mark.parametrize("aspect", at_ports(AT_ZERO), ids=repr)
 def test_strength_zero_hands_on_the_very_tokens_and_leaves_no_trace(aspect: Aspect) -> None:
     sent = [1.5, 3, np.array([1.0, 2.0]), Reading("a", (1.0, [2.0])), {"x": 1.0}, -0.0, math.nan]
     bench = Bench(aspect, world={"a.at": [0.0, 0.0], "b.at": {"position": [3.0, 4.0]}}).play(sent, period=10)
@@ -402,21 +371,21 @@ def test_strength_zero_hands_on_the_very_tokens_and_leaves_no_trace(aspect: Aspe
     assert bench.point.counts == {}
 
 
-def test_every_aspect_has_a_zero() -> None:
-    import epicycle.aspects
+def test_every_aspect_has_strengths() -> None:
+    assert concrete_aspects() == {type(aspect) for aspect in AT_ZERO} == {type(aspect) for aspect in AT_WORK}
 
-    public = {getattr(epicycle.aspects, name) for name in epicycle.aspects.__all__}
-    concrete = {
-        each
-        for each in public
-        if isinstance(each, type)
-        and issubclass(each, Aspect)
-        and each.pass_token is not Aspect.pass_token
-        and not getattr(each, "__abstractmethods__", None)
-        and not issubclass(each, ObservationAspect)  # which have no strength: test_observation.py
-        and not issubclass(each, ExecutionAspect)  # whose zeros are in test_execution.py
-    }
-    assert concrete == {type(aspect) for aspect in AT_ZERO}
+
+@pytest.mark.parametrize("aspect", at_ports(AT_WORK), ids=repr)
+def test_whatever_is_done_to_a_token_is_told(aspect: Aspect) -> None:
+    """A token without an act has passed as it came, when it came."""
+    sent = [Reading(str(index), 10.0 + index) for index in range(200)]
+    bench = Bench(aspect, world={"a.at": [0.0], "b.at": [4.0], "c.at": [2.0]}).play(sent)
+    told = {id(value[0] if isinstance(value, list) else value) for _, value in bench.acts}
+    passed = [(id(token), time) for time, token in bench.out]
+    untouched = [(id(token), float(index)) for index, token in enumerate(sent) if id(token) not in told]
+    assert [each for each in passed if each[0] not in told and each in untouched] == untouched
+    assert told
+    assert {event for event, _ in bench.acts} <= set(aspect.events)
 
 
 def test_tokens_of_every_kind_keep_their_type() -> None:

@@ -1,0 +1,131 @@
+"""Tests of non-interference: what an aspect leaves as it is."""
+
+from __future__ import annotations
+
+import random  # noqa: TID251 (to see that nobody uses it)
+from collections.abc import Sequence
+
+import numpy as np
+
+from epicycle.aspects import Aspect
+
+from .trial import Event, Trial, Woven
+from .visits import Visits
+
+NAME = "tested"
+OTHER = "other"
+
+
+def assert_silent_at_zero(aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**") -> None:
+    """With a strength of zero the event log is, to the bit, the one of the model without the aspect.
+
+    ``aspect`` is made with that strength: ``Noise(deviation=0)``.
+    """
+    visits = Visits(aspect)
+    log = trial(Woven(NAME, visits.aspect, at))
+    visits.demand_some(at)
+    _compare(f"{aspect!r} at {at} is not silent", trial(), "without it", log, "with it")
+
+
+def assert_observes_only(aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**") -> None:
+    """The event log without the aspect's own events is, to the bit, the one of the model without the aspect."""
+    visits = Visits(aspect)
+    log = [event for event in trial(Woven(NAME, visits.aspect, at)) if event.aspect != NAME]
+    visits.demand_some(at)
+    what = f"{aspect!r} at {at} does more than to observe"
+    _compare(what, trial(), "without it", log, "with it, its own events left out")
+
+
+def assert_removal_moves_nothing(
+    aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**", beside: Sequence[Woven] = ()
+) -> None:
+    """Adding or removing the aspect moves no random stream of an actor or of an aspect of the model or ``beside`` it.
+
+    The aspect is woven at full strength and decides on every token, but what it decides is not done: each token goes on
+    as it came.  So nothing of the log may differ, unless the aspect draws from a stream that is not its own, changes a
+    token in place, or reaches into the model in another way.  (Microsteps are not compared: what the aspect does later
+    takes some, and moves those of SimPy processes at that time.)
+    """
+    visits = Visits(aspect, acts=False, tells=False)
+    log = trial(Woven(NAME, visits.aspect, at), *beside)
+    visits.demand_some(at)
+    what = f"{aspect!r} at {at} moves what is not its own, though none of its decisions was carried out"
+    _compare(what, trial(*beside), "without it", log, "with it", microstep=False)
+
+
+def assert_streams_are_its_own(aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**") -> None:
+    """Each join point has a random stream of its own, which nothing moves, and no randomness comes from elsewhere.
+
+    No two join points share a stream; at each one, the stream, and what the aspect decides, stay the same when the
+    aspect stands at half of them, beside another one of its kind.  (Decisions may depend on other join points if the
+    aspect keeps something in ``point.shared``.)  The generators of ``random`` and NumPy that are shared by all stay
+    untouched, and the same aspect decides the same in a second run.
+    """
+    before = _shared_generators()
+    alone = Visits(aspect, acts=False)
+    acts = _acts(trial(Woven(NAME, alone.aspect, at)))
+    alone.demand_some(at)
+    if _shared_generators() != before:
+        raise AssertionError(f"{aspect!r} draws from a generator that is shared by all: it has point.random")
+
+    once, again = trial(Woven(NAME, aspect, at)), trial(Woven(NAME, aspect, at))
+    _compare(f"{aspect!r} at {at} acts in another way in a second run", once, "the first", again, "the second")
+
+    ports: dict[str, str] = {}  # by the state of their streams
+    for port, stream in alone.streams.items():
+        if stream in ports:
+            raise AssertionError(f"{aspect!r} has one random stream for {ports[stream]} and {port}")
+        ports[stream] = port
+
+    half = list(alone.streams)[::2]
+    here, beside = Visits(aspect, acts=False), Visits(aspect, acts=False, tells=False)
+    acts_of_half = _acts(trial(Woven(OTHER, beside.aspect, at), Woven(NAME, here.aspect, half)))
+    for port in half:
+        if here.streams.get(port) != alone.streams[port]:
+            raise AssertionError(f"{aspect!r}: its random stream at {port} depends on where else it stands")
+    if shared := set(beside.streams.values()) & set(alone.streams.values()):
+        raise AssertionError(f"{aspect!r} shares the random stream at {ports[shared.pop()]} with another of its kind")
+    if not alone.shares:
+        what = f"{aspect!r}: what it decides at a port depends on where else it stands"
+        acts = [event for event in acts if _port(event) in set(half)]
+        _compare(what, acts, f"at {at}", acts_of_half, "at half of that")
+
+
+def assert_order_of_unrelated_aspects_is_free(first: Woven, second: Woven, trial: Trial) -> None:
+    """Two aspects that stand at different ports can be declared in either order: the event log is the same."""
+    visits = Visits(first.aspect), Visits(second.aspect)
+    woven = Woven(first.name, visits[0].aspect, first.at), Woven(second.name, visits[1].aspect, second.at)
+    log = trial(*woven)
+    for each, one in zip(visits, (first, second), strict=True):
+        each.demand_some(one.at)
+    if common := [port for port in visits[0].streams if port in visits[1].streams]:
+        raise AssertionError(f"{first.name} and {second.name} both stand at {common[0]}, so their order matters")
+    what = f"{first.aspect!r} and {second.aspect!r} depend on the order of their declaration"
+    _compare(what, log, f"{first.name} first", trial(*reversed(woven)), f"{second.name} first")
+
+
+def _shared_generators() -> str:
+    state = np.random.get_state(legacy=False)  # noqa: NPY002 (to see that nobody uses it)
+    return repr((random.getstate(), state["state"]["key"].tolist(), state["state"]["pos"]))
+
+
+def _port(event: Event) -> str:
+    return f"{event.actor}.{event.port}" if event.port else event.actor
+
+
+def _acts(log: Sequence[Event]) -> list[Event]:
+    return [event for event in log if event.aspect == NAME]
+
+
+def _compare(
+    what: str, one: Sequence[Event], which: str, other: Sequence[Event], which_other: str, *, microstep: bool = True
+) -> None:
+    """Raise ``AssertionError`` at the first event that differs."""
+    for place in range(max(len(one), len(other))):
+        pair = [log[place] if place < len(log) else None for log in (one, other)]
+        encoded = [None if event is None else event.encoded(microstep=microstep) for event in pair]
+        if encoded[0] != encoded[1]:
+            told = ["nothing more" if event is None else str(event) for event in pair]
+            if told[0] == told[1]:  # up to the sixth digit
+                told = [repr(event) for event in pair]
+            raise AssertionError(f"{what}: event {place + 1} differs\n  {which}: {told[0]}\n  {which_other}: {told[1]}")

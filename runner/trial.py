@@ -1,0 +1,48 @@
+"""Trial: a model that is run again and again, each time with other aspects, as ``epicycle.aspects.testing`` asks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from epicycle.aspects.testing import Woven
+
+from .engine import Record, Simulation
+from .model import Model, load_model
+
+
+class Trial:
+    """Runs a model with some aspects woven in addition to its own, and returns the records of the event log.
+
+    ``model`` is one that was loaded or built, or what ``load_model`` takes, with ``options`` for it; ``until`` is the
+    stop time (s), ``seed`` that of all runs.  The run without further aspects is made once.
+
+    >>> assert_silent_at_zero(Noise(deviation=0), Trial("mm1", until=50.0))
+    """
+
+    def __init__(
+        self, model: Model | str | Path, *, until: float | None = None, seed: int | None = None, **options: Any
+    ) -> None:
+        self.model = model if isinstance(model, Model) else load_model(model, **options)
+        self.until = until
+        self.seed = seed
+        self._plain: list[Record] | None = None
+
+    def __call__(self, *woven: Woven) -> list[Record]:
+        """The records of a run with these aspects, declared after the model's own and in this order."""
+        if woven:
+            return self._run(woven)
+        if self._plain is None:
+            self._plain = self._run(())
+        return self._plain
+
+    def _run(self, woven: tuple[Woven, ...]) -> list[Record]:
+        before = list(self.model.aspects)
+        try:
+            for each in woven:
+                self.model.weave(each.name, each.aspect, at=each.at)
+            simulation = Simulation(self.model, seed=self.seed, keep_log=True)
+            simulation.run(until=self.until)
+            return simulation.log.records
+        finally:
+            self.model.aspects[:] = before

@@ -1,0 +1,15 @@
+"""What all tests have in common: what they count together is told at the end."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """How many pairs of aspect and model were tested, on however many workers: sums of what tests record."""
+    totals: Counter[str] = Counter()
+    for report in terminalreporter.stats.get("passed", ()):
+        totals.update({name: value for name, value in report.user_properties if name.startswith("pairs ")})
+    for name, total in totals.items():
+        terminalreporter.write_line(f"{name}: {total}")
