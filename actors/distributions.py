@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .core import Configurable, Parameter, ParameterError, array_parameter
+from .core import Configurable, Parameter, ParameterError, array_parameter, counted
 from .tokens import token_type
 
 
@@ -148,7 +148,8 @@ class Choice(Distribution):
             raise ParameterError("Choice.values: the list is empty, there is nothing to choose from")
         if self.weights is not None and (len(self.weights) != len(self.values) or not 0 < self.weights.sum() < np.inf):
             raise ParameterError(
-                f"Choice.weights: {self.weights.tolist()} does not give a weight to each of {len(self.values)} values"
+                f"Choice.weights: {self.weights.tolist()} does not give a weight to each of "
+                f"{counted(len(self.values), 'value')}"
             )
         self.token_type = token_type(self.values)
         weights = np.ones(len(self.values)) if self.weights is None else self.weights

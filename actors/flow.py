@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, PortError, PortParameter
+from .core import Actor, InputPort, OutputPort, Parameter, PortError, PortParameter, counted
 
 
 class Merge(Actor):
@@ -141,5 +141,5 @@ class Repeat(Actor):
 
 def _channel(number: int, control: InputPort[Any], width: int, name: str) -> int:
     if not 0 <= number < max(width, 1):
-        raise PortError(f"{control.path} is {number}, but {name} has {width} channels, counted from 0")
+        raise PortError(f"{control.path} is {number}, but {name} has {counted(width, 'channel')}, counted from 0")
     return int(number)

@@ -22,6 +22,7 @@ from .core import (
     Parameter,
     ParameterError,
     array_parameter,
+    counted,
     declared_parameters,
     did_you_mean,
 )
@@ -227,7 +228,7 @@ class LookupTable(Actor):
         if not numeric:
             raise ParameterError("values: only numbers can be interpolated")
         if len(self.at) != len(self.values):
-            raise ParameterError(f"at: there are {len(self.at)} arguments for {len(self.values)} values")
+            raise ParameterError(f"at: {counted(len(self.at), 'argument')} for {counted(len(self.values), 'value')}")
         if not np.all(np.diff(self.at) > 0):
             raise ParameterError(f"at: {self.at.tolist()} does not ascend")
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, Tag, array_parameter
+from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, Tag, array_parameter, counted
 
 _DISPLAY = logging.getLogger("epicycle.display")
 
@@ -138,7 +138,7 @@ class Test(Actor):
     def __init__(self, path: str, **parameters: object) -> None:
         super().__init__(path, **parameters)
         if self.times is not None and len(self.times) != len(self.values):
-            raise ParameterError(f"there are {len(self.times)} times for {len(self.values)} values")
+            raise ParameterError(f"{counted(len(self.times), 'time')} for {counted(len(self.values), 'value')}")
 
     def initialize(self) -> None:
         self._seen = 0
@@ -163,7 +163,7 @@ class Test(Actor):
     def wrapup(self) -> None:
         if self.complete and self._seen < len(self.values):
             raise EpicycleError(
-                f"{self._seen} of {len(self.values)} expected tokens came, the next was to be "
+                f"{self._seen} of {counted(len(self.values), 'expected token')} came, the next was to be "
                 f"{self.values[self._seen]!r}"
             )
 

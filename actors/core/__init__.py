@@ -22,6 +22,7 @@ from .quantity import Quantity, counted_in_si, plain
 from .random import random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
+from .words import counted
 
 __all__ = [
     "NANOSECONDS_PER_SECOND",
@@ -45,6 +46,7 @@ __all__ = [
     "accepts",
     "array_parameter",
     "convert",
+    "counted",
     "counted_in_si",
     "declared_parameters",
     "declared_ports",

@@ -6,7 +6,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, Final
 
-from ..core import Quantity, did_you_mean
+from ..core import Quantity, counted, did_you_mean
 
 MAX_STEPS = 100_000
 MAX_ELEMENTS = 100_000
@@ -282,7 +282,8 @@ def subscript(whole: Any, index: object) -> Any:
     if type(index) is not int:
         raise TypeError(f"{kind_of(whole)} is indexed by a whole number, not by {kind_of(index)}")
     if not -len(whole) <= index < len(whole):
-        raise ValueError(f"there is no element {index}: there are {len(whole)}, the first is 0")
+        number = counted(len(whole), "element")
+        raise ValueError(f"there is no element {index} in {kind_of(whole)} of {number}, counted from 0")
     return whole[index]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core import Actor, EpicycleError, InputPort, OutputPort
+from ..core import Actor, EpicycleError, InputPort, OutputPort, counted
 
 
 class ChannelError(EpicycleError):
@@ -23,7 +23,7 @@ class BroadcastChannel(Actor):
     def initialize(self) -> None:
         if self.input.width != self.output.width:
             raise ChannelError(
-                f"{self.path} has {self.input.width} connections into 'input' "
+                f"{self.path} has {counted(self.input.width, 'connection')} into 'input' "
                 f"but {self.output.width} out of 'output'; "
                 "connect both once for each participant, in the same order"
             )

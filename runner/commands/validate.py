@@ -18,6 +18,5 @@ def add(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Load the model, and say how large it is."""
     model, _ = load(options, strict=options.strict)
-    wires = sum(1 for _ in model.graph.wires())
-    print(f"{options.model} is valid: {len(model.graph.actors)} actors, {wires} wires, {len(model.aspects)} aspects")
+    print(f"{options.model} is valid: {model.extent}")
     return DONE

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import to_seconds
+from epicycle.actors import counted, to_seconds
 
 from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
@@ -131,7 +131,7 @@ class Results:
     def __repr__(self) -> str:
         return (
             f"<Results of {self.model}, seed {self.seed}: {self.end:g} s, ended by {self.stopped}, "
-            f"{self.events:,} events, digest {self.digest[:16]}...>"
+            f"{counted(self.events, 'event')}, digest {self.digest[:16]}...>"
         )
 
     def __str__(self) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import EpicycleError, Tag, to_seconds
+from epicycle.actors import EpicycleError, Tag, counted, to_seconds
 
 from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
@@ -102,7 +102,7 @@ class Signal:
             return f"<Signal {self.name}: no tokens>"
         kind = type(self.tokens[0]).__name__
         first, last = self.tags[0].seconds, self.tags[-1].seconds
-        tokens = "1 token" if len(self) == 1 else f"{len(self):,} tokens"
+        tokens = counted(len(self), "token")
         return f"<Signal {self.name}: {tokens} ({kind}) from {first:g} s to {last:g} s>"
 
     def __str__(self) -> str:

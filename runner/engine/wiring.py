@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag
+from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag, counted
 from epicycle.aspects import ActorPoint, JoinPoint, Medium
 
 from ..model import Hop, Model, WovenAspect
@@ -124,7 +124,8 @@ class Wiring:
                 everywhere(token)
                 return
             if not 0 <= channel < len(ways):
-                raise PortError(f"{port.path} has {len(ways)} channels from 0 on, there is no channel {channel}")
+                known = f"it has {counted(len(ways), 'channel')}, counted from 0"
+                raise PortError(f"{port.path} has no channel {channel}: {known}")
             log(director.tag, "send", path, name, channel, "", token)
             heard(token)
             ways[channel](token)

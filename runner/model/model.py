@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from epicycle.actors import Tag, declared_parameters
+from epicycle.actors import Tag, counted, declared_parameters
 
 from ..tables import Table, as_html, as_text, short
 from .checks import check
@@ -190,11 +190,15 @@ class Model(Scope):
     def _repr_html_(self) -> str:
         return as_html(self._caption(), self._tables())
 
+    @property
+    def extent(self) -> str:
+        """How large it is, in words."""
+        graph = self.graph
+        parts = [(len(graph.actors), "actor"), (graph.connections, "connection"), (len(self.aspects), "aspect")]
+        return ", ".join(counted(number, noun) for number, noun in parts)
+
     def _caption(self) -> str:
-        hops = self.graph.since(0)
-        parts = [(len(self.graph.actors), "actor"), (len(hops), "connection"), (len(self.aspects), "aspect")]
-        counts = ", ".join(f"{number} {word}{'' if number == 1 else 's'}" for number, word in parts)
-        return f"{self.name}: {counts}" + ("" if self.stop is None else f", stops at {self.stop:g} s")
+        return f"{self.name}: {self.extent}" + ("" if self.stop is None else f", stops at {self.stop:g} s")
 
     def _tables(self) -> list[Table]:
         actors = []

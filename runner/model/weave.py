@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from epicycle.actors import declared_parameters
+from epicycle.actors import counted, declared_parameters
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, PortsParameter, Reading, Selection, SelectionParameter
 
@@ -74,7 +74,7 @@ def extent(aspects: Iterable[WovenAspect]) -> str:
     """At how many ports and actors some aspects stand, in words."""
     places = [(place, "actor" if place in woven.actors else "port") for woven in aspects for place in woven.places]
     numbers = [(sum(kind == word for _, kind in places), word) for word in ("port", "actor")]
-    said = [f"{number} {word}{'' if number == 1 else 's'}" for number, word in numbers if number]
+    said = [counted(number, noun) for number, noun in numbers if number]
     return " and ".join(said) or "no place"
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from epicycle.actors import Actor, Parameter, ParameterError, declared_ports, has_own_ports, to_nanoseconds
+from epicycle.actors import Actor, Parameter, ParameterError, counted, declared_ports, has_own_ports, to_nanoseconds
 
 from .declarations import CompositeText, ConnectionText
 from .document import Scalar
@@ -267,4 +267,4 @@ class _ToldError(Exception):
 
 
 def _ports(end: End) -> str:
-    return f"{len(end.ports)} port{'s' if len(end.ports) != 1 else ''}"
+    return counted(len(end.ports), "port")

@@ -36,7 +36,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_warnings_and_strict(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "m.yaml"]) == 0
     out, err = capsys.readouterr()
-    assert (out, err) == ("m.yaml is valid: 5 actors, 4 wires, 0 aspects\n", WARNING.format("warning"))
+    assert (out, err) == ("m.yaml is valid: 5 actors, 4 connections, 0 aspects\n", WARNING.format("warning"))
     assert main(["validate", "m.yaml", "--strict"]) == 2
     assert capsys.readouterr() == ("", WARNING.format("error"))
     assert main(["validate", "collision_avoidance", "--strict"]) == 0

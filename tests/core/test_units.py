@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from epicycle.actors.core.errors import EpicycleError
 from epicycle.actors.core.units import Unit, UnitError, convert, parse_unit, quantity
+from epicycle.actors.core.words import counted
 
 
 @pytest.mark.parametrize(
@@ -136,3 +137,10 @@ def test_only_unit_errors_come_out(text: str) -> None:
         convert("1 " + text, "m")
     except UnitError:
         pass
+
+
+@pytest.mark.parametrize(
+    ("number", "words"), [(0, "0 ports"), (1, "1 port"), (2, "2 ports"), (-1, "-1 ports"), (12_345, "12,345 ports")]
+)
+def test_counted(number: int, words: str) -> None:
+    assert counted(number, "port") == words

@@ -111,7 +111,7 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             IN,
             "",
             (
-                "a failed in fire() at (0 s, 1): a.output has 0 channels from 0 on, there is no channel 4\n"
+                "a failed in fire() at (0 s, 1): a.output has no channel 4: it has 0 channels, counted from 0\n"
                 "   declared at m.yaml:12:3"
             ),
         ),

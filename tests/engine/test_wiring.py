@@ -82,7 +82,8 @@ def test_a_channel_that_is_not_there(to: int) -> None:
     with pytest.raises(ActorError) as caught:
         simulate(SPREAD.format(to=to))
     assert str(caught.value).splitlines()[0] == (
-        f"box.spread failed in fire() at (0 s, 1): box.spread.output has 4 channels from 0 on, there is no channel {to}"
+        f"box.spread failed in fire() at (0 s, 1): box.spread.output has no channel {to}: "
+        "it has 4 channels, counted from 0"
     )
 
 

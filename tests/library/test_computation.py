@@ -363,7 +363,7 @@ def test_lookup_by_index_and_beyond_the_ends() -> None:
         feed(table, {"input": seconds(0.5)})
     for wrong, message in [
         ({"values": []}, "it: values: the table is empty"),
-        ({"values": [1, 2], "at": [1]}, "it: at: there are 1 arguments for 2 values"),
+        ({"values": [1, 2], "at": [1]}, "it: at: 1 argument for 2 values"),
         ({"values": [1, 2], "at": [1, 1]}, "it: at: [1.0, 1.0] does not ascend"),
         ({"values": ["a"], "at": [1]}, "it: values: only numbers can be interpolated"),
     ]:

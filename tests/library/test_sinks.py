@@ -116,7 +116,7 @@ def test_test_compares_by_structure(token: Any, value: Any, is_alike: bool) -> N
 
 
 def test_test_says_how_many_times_are_missing() -> None:
-    with pytest.raises(ModelError, match="it: there are 1 times for 2 values"):
+    with pytest.raises(ModelError, match="it: 1 time for 2 values"):
         model_of({"type": "Test", "values": [1, 2], "times": [1]}, {"input": EVENTS})
 
 

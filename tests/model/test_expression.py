@@ -185,7 +185,7 @@ FUNCTION_LIST = ", ".join(sorted(FUNCTIONS))
         ("'a' < 1", "'a' < 1: < cannot compare a text with a number", "'a' < 1"),
         ("1 in 1", "1 in 1: 'in' needs a list, dict or text on its right, not a number", "1 in 1"),
         ("1 in 'a'", "1 in 'a': 'in' looks for a text in a text, not for a number", "1 in 'a'"),
-        ("starts[2]", "starts[2]: there is no element 2: there are 2, the first is 0", "starts[2]"),
+        ("starts[2]", "starts[2]: there is no element 2 in a list of 2 elements, counted from 0", "starts[2]"),
         ("starts['a']", "starts['a']: a list is indexed by a whole number, not by a text", "starts['a']"),
         (
             "starts[flag]",

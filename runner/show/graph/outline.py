@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from epicycle.actors import InputPort, OutputPort, PortParameter
+from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 
 from ...model import Model
 from ...model.clock import Clock
@@ -94,8 +94,8 @@ class Outline:
         closed = sum(1 for box in self.root.walk() if box.is_closed)
         if not closed:
             return ""
-        what = "1 composite is" if closed == 1 else f"{closed} composites are"
-        return f"{what} drawn closed; --depth {self.levels} opens everything"
+        are = "is" if closed == 1 else "are"
+        return f"{counted(closed, 'composite')} {are} drawn closed; --depth {self.levels} opens everything"
 
 
 def outline(model: Model, depth: int | None = None, expand: bool = False) -> Outline:
