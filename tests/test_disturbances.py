@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
+from itertools import groupby
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from scipy import stats
 
-from epicycle.runner import ModelError, Simulation, load_model
+from epicycle.runner import ModelError, Results, Simulation, load_model
+from epicycle.runner.cli import main
 from epicycle.runner.model import packaged_disturbances
 
 NAMES = sorted(packaged_disturbances())
@@ -24,10 +30,137 @@ def test_disturbance_acts_on_the_scenario(name: str, observers: int) -> None:
     results = Simulation(model, seed=3).run(until=1.5)
     assert own <= results.aspects.keys()
     if observers:
-        assert results.digest != Simulation(plain, seed=3).run(until=1.5).digest
+        acts = {name: counts for name in own if (counts := results.aspects[name]) != {"violated": 0}}
+        assert all(sum(count or 0 for count in counts.values()) > 0 for counts in acts.values()), acts
     for path, signal in results.signals.items():
         if path.endswith(".state"):
             assert all(math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity))
+
+
+def test_all_of_them_together() -> None:
+    model = load_model("collision_avoidance", set={"observers": 2}, disturb=NAMES)
+    assert Simulation(model, seed=1).run(until=0.5).events > 0
+
+
+def test_two_disturbances_without_an_aspect_of_the_model(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = "--set observers=3 --disturb shared_radio --disturb gps_drift --without packet_loss --until 1 --json"
+    assert main(["run", "collision_avoidance", *arguments.split()]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["aspects"].keys() == {
+        *("measurement_failure", "radio", "gps_drift", "gps_noise", "keeps_off_obstacle", "keeps_off_robots")
+    }
+    assert result["aspects"]["radio"]["utilisation"] > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("observers", [0, 4])
+@pytest.mark.parametrize("name", NAMES)
+def test_robots_are_safe_or_it_is_told(name: str, observers: int) -> None:
+    for seed in (1, 2):
+        results = Simulation(
+            load_model("collision_avoidance", set={"observers": observers}, disturb=name), seed=seed
+        ).run()
+        for metric, aspect in (
+            ("min_obstacle_distance", "keeps_off_obstacle"),
+            ("min_robot_distance", "keeps_off_robots"),
+        ):
+            distance = results.metrics[metric]
+            assert (results.aspects[aspect]["violated"] == 0) == (distance is None or distance >= 2.0)
+
+
+# -- what each of them means ------------------------------------------------------------------------------------------
+
+
+def values(results: Results, actor: str, port: str, event: str = "send") -> dict[int, Any]:
+    """What a port sent, or an aspect did at it, by tick."""
+    return {
+        round(record.tag.seconds * 10): record.value
+        for record in results.log.records
+        if (record.actor, record.port, record.event) == (actor, port, event)
+    }
+
+
+def test_gps_drift_is_in_what_a_robot_says_and_not_in_where_it_is() -> None:
+    """The believed place walks away from the true one by 0.13 m / sqrt(s) in each direction, at 99.9 %."""
+    squares, count = 0.0, 0
+    settings = {
+        "observers": 2,
+        "gps_noise": 0,
+        "**.sensor.along": 1e-9,
+        "**.sensor.across": 1e-9,
+        "**.controller.horizon": 3,
+    }
+    for seed in range(4):
+        model = load_model("collision_avoidance", set=settings, disturb="gps_drift")
+        results = Simulation(model, seed=seed, keep_log=True).run(until=1.6)
+        obstacle = values(results, "obstacle", "state")
+        for robot in ("main", "observer[0]", "observer[1]"):
+            state, plan, seen = (
+                values(results, f"{robot}.{actor}", port)
+                for actor, port in (("vehicle", "state"), ("controller", "plan"), ("sensor", "measurement"))
+            )
+            error = {tick: plan[tick].state.position - state[tick].position for tick in range(17)}
+            assert np.abs(error[0]).max() == 0.0
+            for tick in range(17):
+                # It measures from where it is, and says that it did so from where it believes to be.
+                assert seen[tick].observer.tolist() == plan[tick].state.position.tolist()
+                away = obstacle[tick].position - state[tick].position
+                assert seen[tick].value == pytest.approx(away, abs=1e-6)
+            steps = np.diff([error[tick] for tick in range(17)], axis=0) / (0.13 * math.sqrt(0.1))
+            squares, count = squares + float((steps**2).sum()), count + steps.size
+    low, high = stats.chi2.interval(0.999, count)
+    assert low <= squares <= high
+
+
+def test_range_limited_sensors_fail_where_the_obstacle_is_far() -> None:
+    model = load_model("collision_avoidance", set={"observers": 2}, disturb="range_limited")
+    results = Simulation(model, seed=2, keep_log=True).run(until=2.5)
+    obstacle, near = values(results, "obstacle", "state"), set()
+    for robot in ("main", "observer[0]", "observer[1]"):
+        state = values(results, f"{robot}.vehicle", "state")
+        failed = values(results, f"{robot}.sensor", "measurement", "failed")
+        for tick, own in state.items():
+            is_far = math.dist(own.position, obstacle[tick].position) > 15.0
+            assert (tick in failed) == is_far
+            near.add(is_far)
+    assert near == {True, False}
+
+
+def test_airtime_of_the_shared_radio_grows_with_the_robots() -> None:
+    share = []
+    for robots in (1, 3, 5):
+        model = load_model("collision_avoidance", set={"observers": robots - 1, "horizon": 3}, disturb="shared_radio")
+        share.append(Simulation(model, seed=1).run(until=1.0).aspects["radio"]["utilisation"])
+    # A plan of 3 steps has 1 + 4 + 2 * 4 numbers, a measurement 6, 64 bits each, beside what every message has.
+    airtime = 2 * (242e-6 + 768e-6) + (13 + 6) * 64e-6
+    assert share[0] == pytest.approx(airtime / 0.1, rel=0.11)  # up to the airtime of the last tick
+    for robots, each in ((3, share[1]), (5, share[2])):  # what collides takes its time only once
+        assert 0.6 * robots * share[0] < each <= robots * share[0]
+
+
+def test_sensors_drop_out_in_runs() -> None:
+    settings = {"observers": 0, "dropout": 0.5, "**.controller.horizon": 3, "arrival_near.tolerance": 0}
+    model = load_model("collision_avoidance", set=settings, disturb="sensor_dropout_burst")
+    results = Simulation(model, seed=4, keep_log=True).run(until=20)
+    failed = values(results, "main.sensor", "measurement", "failed")
+    lengths = [len(list(run)) for is_failed, run in groupby(tick in failed for tick in range(201)) if is_failed]
+    error = stats.norm.ppf(0.9995) * math.sqrt(1 - 1 / 5) * 5 / math.sqrt(len(lengths))
+    assert abs(np.mean(lengths) - 5) < error
+    assert np.mean(lengths) > 2.5  # more than the 2 of independent failures
+
+
+def test_a_controller_that_is_ready_by_the_next_tick_is_fast_enough() -> None:
+    """Solving for less than a period changes nothing of what happens at the ticks, and for longer it does."""
+    ways = []
+    for disturb, settings in (
+        ((), {}),
+        ("slow_controller", {"solve_time": "90 ms", "solve_spread": 0}),
+        ("slow_controller", {"solve_time": "101 ms", "solve_spread": 0}),
+    ):
+        model = load_model("collision_avoidance", set={"observers": 2, **settings}, disturb=disturb)
+        states = Simulation(model, seed=1).run(until=2.5).signals["main.state"]
+        ways.append([token.position.tolist() for token in states.tokens])
+    assert ways[0] == ways[1] != ways[2]
 
 
 @pytest.mark.parametrize("latency", ["1 us", "30 ms"])

@@ -19,6 +19,9 @@ class Sensor(Actor):
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
+    location = InputPort(
+        BodyState, required=False, doc="where it believes to be, which stands in the measurement; unconnected: as robot"
+    )
     target = InputPort(BodyState, doc="where the target is")
     measurement = OutputPort(Measurement, doc="sent at tags where both are known and the target is in range")
 
@@ -37,8 +40,9 @@ class Sensor(Actor):
         error_along, error_across = self.random_stream("noise").normal(size=2)
         if not (self.robot.present and self.target.present):
             return
-        observer = self.robot.value.position
-        offset = self.target.value.position - observer
+        position = self.robot.value.position
+        believed = self.location.value.position if self.location.present else position
+        offset = self.target.value.position - position
         distance = math.hypot(offset[0], offset[1])
         if self.max_range is not None and distance > self.max_range:
             return
@@ -48,4 +52,4 @@ class Sensor(Actor):
         else:
             athwart = np.array([-direction[1], direction[0]])
             value = offset + self.along * error_along * direction + self.across * error_across * athwart
-        self.measurement.send(Measurement(self._name, observer, self.kind, value, self.along, self.across))
+        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across))
