@@ -27,8 +27,9 @@ from .measurement import (
 )
 from .media import Bus, Medium
 from .observation import Assert, Count, InvariantError, Probe
+from .processor import Processor
 from .radio import RadioMedium
-from .selection import GroupsParameter, PortsParameter, SelectionParameter
+from .selection import ByActorParameter, GroupsParameter, PortsParameter, SelectionParameter
 from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
 from .tokens import FieldError
 
@@ -39,6 +40,7 @@ __all__ = [
     "Assert",
     "Bias",
     "Bus",
+    "ByActorParameter",
     "CommunicationAspect",
     "CompositeAspect",
     "Corrupt",
@@ -66,6 +68,7 @@ __all__ = [
     "PacketLoss",
     "PortsParameter",
     "Probe",
+    "Processor",
     "Quantise",
     "RadioMedium",
     "RangeLoss",

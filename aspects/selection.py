@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
 from epicycle.actors import REQUIRED, Parameter, ParameterError
@@ -38,6 +38,45 @@ class PortsParameter(SelectionParameter[tuple[str, ...]]):
 
     def patterns(self, value: tuple[str, ...]) -> tuple[str, ...]:
         return value
+
+
+class ByActorParameter(SelectionParameter[Mapping[str, T]], Generic[T]):
+    """Values for some actors: ``{robot.planner: 20 ms, "robot[*]": 1 ms}``; an actor gets the last that is for it.
+
+    A composite stands for all the actors in it.
+    """
+
+    selects = "actor"
+
+    def __init__(self, item: Parameter[T], *, words: str = "numbers", doc: str = "") -> None:
+        super().__init__({}, doc=doc)
+        self.item = item
+        self.words = words  # what the values are, in the plural
+
+    def describe_type(self) -> str:
+        return f"mapping from actors to {self.words}"
+
+    def convert(self, value: object) -> Mapping[str, T] | None:
+        if not isinstance(value, Mapping) or not all(isinstance(pattern, str) for pattern in value):
+            raise ParameterError(f"{value!r} is not a {self.describe_type()}")
+        converted: dict[str, Any] = {}
+        for pattern, each in value.items():
+            try:
+                converted[pattern] = self.item.convert(each)
+            except ParameterError as error:
+                raise ParameterError(f"{pattern}: {error}") from None
+        return converted
+
+    def patterns(self, value: Mapping[str, T]) -> tuple[str, ...]:
+        return tuple(value)
+
+    @staticmethod
+    def of(value: Mapping[str, T], selection: Mapping[str, Sequence[str]], actor: str) -> T | None:
+        """What is for an actor, None if nothing is; ``selection`` is what the patterns select."""
+        for pattern in list(value)[::-1]:
+            if any(actor == path or actor.startswith(f"{path}.") for path in selection.get(pattern, ())):
+                return value[pattern]
+        return None
 
 
 class GroupsParameter(SelectionParameter[Mapping[str, tuple[str, ...]]]):

@@ -33,7 +33,7 @@ from .patterns import PathIndex
 from .port_types import PortTypeError, read_type, token_types
 from .problems import Position, Problems, did_you_mean
 from .settings import Settings
-from .weave import Weaving, WovenAspect
+from .weave import Weaving, WovenAspect, check_processors
 from .wiring import Child, Wiring
 
 MAX_COUNT = 100_000
@@ -90,6 +90,7 @@ class Elaborator(Configurator):
         for setting in self.settings.unused():
             self._add_unused(setting)
         check(self.graph, self.problems)
+        check_processors(self.aspects, self.graph, self.problems)
         model = Model(root.name, doc=root.doc)
         model.graph, model.aspects = self.graph, self.aspects
         model.warnings = self.problems.warnings

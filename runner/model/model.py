@@ -20,7 +20,7 @@ from .scope import Composite, Scope
 from .scopes import Scopes, is_within
 from .site import call_site
 from .values import Values
-from .weave import WovenAspect
+from .weave import WovenAspect, check_processors
 
 
 class Model(Scope):
@@ -147,6 +147,7 @@ class Model(Scope):
             if check_nesting(self.aspects, self.graph, problems):
                 self.graph.detours = detours(self.graph, self.aspects)
             check(self.graph, problems)
+            check_processors(self.aspects, self.graph, problems)
             problems.raise_if_any()
             self.warnings = problems.warnings
             self.is_checked = True

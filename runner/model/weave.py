@@ -15,7 +15,7 @@ from typing import Any
 
 from epicycle.actors import counted, declared_parameters
 from epicycle.actors.expression import PortFormula
-from epicycle.aspects import Aspect, PortsParameter, Reading, Selection, SelectionParameter
+from epicycle.aspects import Aspect, ExecutionAspect, PortsParameter, Reading, Selection, SelectionParameter
 
 from .declarations import PointcutText
 from .graph import ModelGraph
@@ -76,6 +76,21 @@ def extent(aspects: Iterable[WovenAspect]) -> str:
     numbers = [(sum(kind == word for _, kind in places), word) for word in ("port", "actor")]
     said = [counted(number, noun) for number, noun in numbers if number]
     return " and ".join(said) or "no place"
+
+
+def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> None:
+    """An actor runs on one processor at most."""
+    taken: dict[str, str] = {}
+    for woven in aspects:
+        if not (isinstance(woven.aspect, ExecutionAspect) and woven.aspect.is_processor):
+            continue
+        if twice := [actor for actor in woven.actors if actor in taken]:
+            problems.add(
+                f"aspect {woven.name}: {twice[0]} runs on the processor {taken[twice[0]]!r} already",
+                graph.positions.get(f"aspect {woven.name}"),
+                f"an actor has one processor: leave it out here, with '!{twice[0]}', or there",
+            )
+        taken.update(dict.fromkeys(woven.actors, woven.name))
 
 
 class Weaving:
@@ -348,7 +363,7 @@ class Weaving:
         fitting = [path for path in found if not of_ports or self._sends(path)]
         if found and not fitting:
             self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
-        elif not found and not self.graph.is_excused(self._full(pattern)):
+        elif not found and not self.graph.is_excused(self._full(pattern) + ("" if of_ports else ".*")):
             near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
             self._problem(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
         elif len(fitting) > 1 and parameter.is_single:

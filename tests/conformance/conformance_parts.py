@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Tag
+from epicycle.actors import Actor, CurrentMicrostep, CurrentTime, InputPort, OutputPort, Parameter, Tag
 
 
 class Sink(Actor):
@@ -91,6 +91,18 @@ class _OfVariable(Actor):
         return next((value for tag, value in reversed(self.assignments()) if tag < self.tag), self.initial)
 
 
+class TimeOfSeveral(CurrentTime):
+    """A CurrentTime to which two senders are connected: there these share one channel."""
+
+    trigger: InputPort[Any] = InputPort(Any, multi=True)
+
+
+class MicrostepOfSeveral(CurrentMicrostep):
+    """The same of CurrentMicrostep."""
+
+    trigger: InputPort[Any] = InputPort(Any, multi=True)
+
+
 class SetVariable(_OfVariable):
     """Assigns a token to a variable, and sends the value that it still has."""
 
@@ -116,7 +128,9 @@ TYPES = (
     CancelFireAtTest,
     ConstOfVariable,
     MicrostepDelay,
+    MicrostepOfSeveral,
     SetVariable,
     Sink,
     TestActorPortDepth,
+    TimeOfSeveral,
 )

@@ -97,16 +97,17 @@ def requests(model: Model) -> Sends:
 
 LATER = {
     "RefiringActorInDE": "execution and communication aspects that are models",
-    "ScheduleEmbeddedActors": "an execution aspect: a fixed-priority scheduler",
 }
 """The cases of Ptolemy's aspects, which wait for ours of that kind."""
 QUANTITY_MANAGER = "CompositeQM"
+OTHER_MICROSTEPS = ("ScheduleEmbeddedActors",)
+"""The cases in which times and order are Ptolemy's, and microsteps are not; docs/ptolemy.md tells why."""
 REFUSED = "DEFixedPointLimitation"
 CASES = [
     "BusConfigureParamsDE", "CancelFireAt", "DEScheduleTest", "DEinDEwithStartTimes", "DepthTest4", "DiscreteClock10",
     "Feedback", "Iteration", "MergeWithoutDiscard", "Priority1", "QuantityManager2Busses", "QueueAndServer",
-    "ResettableTimer3", "ServerWithVariableDelay3", "SynchronizerDE", "TimeDelayMicrosteps2", "TimeDelayZeroDelay",
-    "TransferInputs", "VariableDelay2", "transferInputsandOutputs",
+    "ResettableTimer3", "ScheduleEmbeddedActors", "ServerWithVariableDelay3", "SynchronizerDE", "TimeDelayMicrosteps2",
+    "TimeDelayZeroDelay", "TransferInputs", "VariableDelay2", "transferInputsandOutputs",
 ]  # fmt: skip
 
 
@@ -115,9 +116,12 @@ def test_sends_as_ptolemy(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     model = load(case)
     monkeypatch.setattr(TestActorPortDepth, "depths", depths(model.graph, "", dependencies(model.graph)[""]))
     found, expected = sends(model), recorded(case)
-    assert [send[1:4] for send in found] == [send[1:4] for send in expected]
+    same = slice(2 if case in OTHER_MICROSTEPS else 1, 4)
+    assert [send[same] for send in found] == [send[same] for send in expected]
     for (time, _, port, _, value), (recorded_time, _, _, _, text) in zip(found, expected, strict=True):
         assert abs(time - recorded_time) <= RESOLUTION, (port, recorded_time)
+        if case in OTHER_MICROSTEPS and port == "current_microstep.output":
+            continue
         token = own_token(text)
         if isinstance(token, dict):  # depths: Scale has ports here that it does not have there
             value = {name: value.get(name) for name in token}
