@@ -17,6 +17,7 @@ from epicycle.aspects import CommunicationAspect, ExecutionAspect, ExecutionTime
 from epicycle.aspects.execution import ActorPoint
 from epicycle.runner import ActorError, Model, ModelError, Simulation, load_model
 from epicycle.runner.engine import Results, Tracer
+from epicycle.runner.show.graph.outline import outline
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
@@ -546,3 +547,14 @@ def test_streams_belong_to_actors() -> None:
         return [time for time, _, actor, _ in acts(simulate(text)[1]) if actor == "pair[1].one"]
 
     assert skips(both) == skips(one) != []
+
+
+def test_drawings_mark_actors() -> None:
+    model = load(PARTS.format('type: SkipFiring, probability: 0, at: ["a", "pair[1].two"]'))
+    for depth, marked in [
+        (1, {"a": ("it",), "pair[1]": (), "pair[1].two": ("it",)}),
+        (0, {"a": ("it",), "pair[1]": ("it",)}),
+    ]:
+        boxes = {box.path: box.aspects for box in outline(model, depth).root.walk()}
+        assert marked.items() <= boxes.items()
+        assert not any(aspects for path, aspects in boxes.items() if path not in marked)
