@@ -31,7 +31,7 @@ class ExecutionTime(ExecutionAspect):
 
     time = Parameter(float, 0.0, min=0.0, unit="s", doc="fixed part of the execution time")
     distribution: Parameter[Distribution | None] = Parameter(
-        Distribution, None, doc="law of the random part, in seconds; one number is drawn for every firing"
+        Distribution, None, unit="s", doc="law of the random part; one time is drawn for every firing"
     )
     times: Parameter[Path | None] = Parameter(
         Path,

@@ -23,7 +23,7 @@ class _DurationParameter(Parameter[float | Distribution]):
 
     def convert(self, value: object) -> float | Distribution | None:
         if isinstance(value, (Mapping, Distribution)):
-            return Parameter(Distribution).convert(value)
+            return Parameter(Distribution, unit="s").convert(value)
         if isinstance(value, str) and not any(letter.isdigit() for letter in value):
             raise ParameterError(f"{value!r} is not a time in s, nor a distribution {{type: ..., ...}}")
         return super().convert(value)
@@ -65,7 +65,7 @@ class Processor(ExecutionAspect):
         doc="time that a firing needs (s), by actor: {pattern: time or distribution}",
     )
     priorities = ByActorParameter(
-        Parameter(float), doc="priority by actor, the smallest most urgent: {pattern: number}"
+        Parameter(float, unit="1"), doc="priority by actor, the smallest most urgent: {pattern: number}"
     )
     deadlines = ByActorParameter(
         Parameter(float, min=0.0, unit="s"),

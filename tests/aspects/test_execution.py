@@ -81,7 +81,7 @@ def test_a_firing_takes_time(aspect: str, expected: list[tuple[float, int]], del
 
 def test_lindley() -> None:
     """Random times on a server without a queue's limit: d[n] = max(a[n], d[n-1]) + s[n], in whole nanoseconds."""
-    text = CHAIN.format("type: ExecutionTime, time: 2 ms, distribution: {type: Exponential, mean: 0.006}, at: a")
+    text = CHAIN.format("type: ExecutionTime, time: 2 ms, distribution: {type: Exponential, mean: 6 ms}, at: a")
     _, results = simulate(text.replace("1 s", "10 ms").replace("5 s", "30 s"), seed=3)
     done = [tag.time for tag in (r.tag for r in results.log.records if r.event == "send" and r.actor == "a")]
     came = [10_000_000 * n for n in range(len(done))]

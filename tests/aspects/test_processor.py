@@ -197,7 +197,7 @@ def test_rate_monotonic_misses_where_edf_does_not() -> None:
     ("time", "squared"),
     [
         (0.7, 0.7**2),  # M/D/1
-        ({"type": "Exponential", "mean": 0.7}, 2 * 0.7**2),  # M/M/1
+        ({"type": "Exponential", "mean": "700 ms"}, 2 * 0.7**2),  # M/M/1
     ],
 )
 def test_one_queue_for_all(time: Any, squared: float) -> None:
