@@ -24,6 +24,7 @@ from epicycle.aspects import (
     Outlier,
     OutOfRange,
     PacketLoss,
+    Processor,
     Quantise,
     RadioMedium,
     RangeLoss,
@@ -65,6 +66,8 @@ AT_ZERO: list[Aspect] = [
     ExecutionTime(scale=0, time=1),
     ExecutionTime(measure=True),
     SkipFiring(probability=0),
+    Processor(),
+    Processor(policy="edf", preemptive=False),
 ]
 
 AT_WORK: list[Aspect] = [
@@ -91,6 +94,7 @@ AT_WORK: list[Aspect] = [
     StuckAt(p=0.5, r=0.5),
     ExecutionTime(time="1.5 ms"),
     SkipFiring(probability=0.5),
+    Processor(time="0.1 ms"),
 ]
 
 
