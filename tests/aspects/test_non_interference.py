@@ -133,13 +133,13 @@ def test_observers_only_observe(aspect: Aspect, record_property: Any) -> None:
 @pytest.mark.parametrize("aspect", AT_WORK, ids=repr)
 def test_a_hundred_ports_have_streams_of_their_own(aspect: Aspect) -> None:
     woven = at_grid(aspect, "first[*]")
-    assert_streams_are_its_own(woven.aspect, grid(100, 5), woven.at)
+    assert_streams_are_its_own(woven.aspect, grid(100, 2), woven.at)
 
 
 @pytest.mark.parametrize("aspect", AT_WORK, ids=repr)
 def test_order_of_unrelated_aspects_is_free(aspect: Aspect) -> None:
     trial = grid(2, 8)
-    for other in AT_WORK:
+    for other in AT_WORK[AT_WORK.index(aspect) :]:
         first, second = at_grid(aspect, "first[*]"), at_grid(other, "second[*]")
         assert_order_of_unrelated_aspects_is_free(replace(first, name="a"), replace(second, name="b"), trial)
 
