@@ -1,7 +1,7 @@
 """What can be woven around a model: aspects, and the join points that they act at."""
 
 from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
-from .composite import CompositeAspect, Request
+from .composite import CompositeAspect, CompositeExecutionAspect, FiringRequest, Request
 from .core import (
     Aspect,
     CommunicationAspect,
@@ -43,6 +43,7 @@ __all__ = [
     "ByActorParameter",
     "CommunicationAspect",
     "CompositeAspect",
+    "CompositeExecutionAspect",
     "Corrupt",
     "Count",
     "Drift",
@@ -50,6 +51,7 @@ __all__ = [
     "ExecutionAspect",
     "ExecutionTime",
     "FieldError",
+    "FiringRequest",
     "GilbertElliott",
     "GroupsParameter",
     "InvariantError",

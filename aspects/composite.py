@@ -26,6 +26,17 @@ class Request:
     way: int = 0  # which of the ways through the port
 
 
+@dataclass(frozen=True)
+class FiringRequest(Request):
+    """A firing that is due, on its way through an aspect that is a model: ``port`` is the path of the actor.
+
+    ``execution_time`` (s) is what the aspect says of this actor; ``token`` is None.  The actor fires when the request
+    is answered, with the tokens and wake-ups of the time at which it came.
+    """
+
+    execution_time: float = 0.0
+
+
 class CompositeAspect(Aspect):
     """An aspect that is a model: each token is a request to a composite, and goes on when the composite answers.
 
@@ -34,3 +45,15 @@ class CompositeAspect(Aspect):
     """
 
     events: ClassVar[tuple[str, ...]] = ("requested", "delivered")
+
+
+class CompositeExecutionAspect(Aspect):
+    """An aspect at actors that is a model: each firing is a request to a composite, and happens when it answers.
+
+    Events: ``requested``, with the execution time; ``executed``, with the seconds since.  A request that is never
+    answered is a firing that never happens.  Ptolemy: ``CompositeExecutionAspect``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("requested", "executed")
+    stands_at: ClassVar[frozenset[str]] = frozenset({"actor"})
+    is_processor: ClassVar[bool] = True

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from epicycle.actors import EpicycleError, to_nanoseconds, to_seconds
-from epicycle.aspects import JoinPoint, Request
+from epicycle.aspects import FiringRequest, Job, JoinPoint, Request
 
 from ..model import WovenAspect
 from .local import Deliver
@@ -21,12 +21,24 @@ class Requests:
         self.model = woven.model
         self.entries: dict[str, Deliver] = {}  # where requests come in, by the place that they come from
         self._ways: dict[str, list[JoinPoint]] = {}
+        self._jobs: dict[tuple[str, int], Job] = {}  # the firings that wait for an answer, by actor and number
+        self._number: dict[str, int] = {}  # how many firings of an actor there were
 
     def add_way(self, point: JoinPoint, place: str) -> Callable[[Any, JoinPoint], None]:
         """A further way through a place, to all that is behind a port or to one channel: what to do with its tokens."""
         ways = self._ways.setdefault(place, [])
         way = len(ways)
         ways.append(point)
+
+        def ask_for_firing(job: Job, point: JoinPoint) -> None:
+            number = self._number[place] = self._number.get(place, -1) + 1
+            self._jobs[place, number] = job
+            seconds = self.model.times[place]
+            point.act("requested", seconds)
+            self.entries[place](FiringRequest(None, "", place, point.now, self.name, number, seconds))
+
+        if place in self.model.times:
+            return ask_for_firing
 
         def ask(token: Any, point: JoinPoint) -> None:
             point.act("requested", token)
@@ -41,9 +53,21 @@ class Requests:
                 f"{self.model.response} sends {request!r}, which is no request: what leaves an aspect that is a model "
                 "must be what came in, with another token in it if need be"
             )
+        job = self._jobs.pop((request.port, request.way), None) if isinstance(request, FiringRequest) else None
+        if job is not None and request.aspect == self.name:
+            (point,) = self._ways[request.port]
+            point.act("executed", self._since(request, point))
+            point.forward(job)
+            return
         ways = self._ways.get(request.port, []) if request.aspect == self.name else []
-        if not 0 <= request.way < len(ways):
-            raise EpicycleError(f"{self.model.response} sends {request!r}, which is no request to {self.name}")
+        if isinstance(request, FiringRequest) or not 0 <= request.way < len(ways):
+            raise EpicycleError(
+                f"{self.model.response} sends {request!r}, which is no request to {self.name} that waits for an answer"
+            )
         point = ways[request.way]
-        point.act("delivered", request.token, to_seconds(point.tag.time - to_nanoseconds(request.time)))
+        point.act("delivered", request.token, self._since(request, point))
         point.forward(request.token)
+
+    def _since(self, request: Request, point: JoinPoint) -> float:
+        """The seconds since a request."""
+        return to_seconds(point.tag.time - to_nanoseconds(request.time))

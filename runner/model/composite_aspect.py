@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import networkx as nx
 
 from epicycle.actors import accepts, declared_parameters, type_name
-from epicycle.aspects import CompositeAspect, Request
+from epicycle.aspects import Aspect, CompositeAspect, Request
 
 from .declarations import PartText, PointcutText
 from .graph import Detour, ModelGraph
@@ -44,8 +45,9 @@ class ModelWeaving(Weaving):
         scope: str,
         problems: Problems,
         position: Position,
+        cls: type[Aspect] = CompositeAspect,
     ) -> None:
-        super().__init__(graph, ports, name, CompositeAspect, scope, problems)
+        super().__init__(graph, ports, name, cls, scope, problems)
         self.path = path
         self.position = position
         self.model = AspectModel(path, graph.composites[path], "", {})
@@ -54,13 +56,17 @@ class ModelWeaving(Weaving):
         self._is_misplaced = False
         self._is_unsure = False  # whether it was told that a request port is not known
 
+    @property
+    def kind(self) -> str:
+        return self.model.kind
+
     def check(self, woven: WovenAspect) -> None:
         """Find the ports by which tokens come in and leave, and see whether the composite can stand where it is to."""
         self.model.response = self._only(self.outputs, "response", "output", self.position)
         if not self.requests and not self._is_unsure:
             self._request(PointcutText("", self.position))
         if self._is_unsure:
-            self.leave()
+            self.graph.leave_open(self.path)
         for port in self.requests:
             for hop in list(self.graph.incoming(port)):
                 self._problem(
@@ -81,10 +87,21 @@ class ModelWeaving(Weaving):
         if self.model.response and not self._is_misplaced:
             woven.model = self.model
 
-    def leave(self) -> None:
-        """There is no such aspect, for a reason that has been told: what its tokens would do is no news."""
-        for port in self.inputs:
-            self.graph.ports.nodes[port]["unmade"] = True
+    def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+        ports, connections, actors = super().select(pointcuts)
+        actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
+        for known in (self.model.requests, self.model.times):
+            of_units: dict[str, Any] = dict(known) if actors else {}
+            known.update({actor: of_units[unit] for actor, unit in actors.items() if unit in of_units})
+        return ports, connections, actors
+
+    def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> list[str]:
+        found = list(super()._aimed_at(pointcut, index))
+        outside = [path for path in found if path != self.path and not self._is_inside(path)]
+        self._ask(pointcut, outside, found)
+        if not pointcut.exclude:
+            self.model.times.update(dict.fromkeys(outside, pointcut.seconds))
+        return outside
 
     def _of(self, pointcut: PointcutText) -> list[str]:
         found = super()._of(pointcut)
@@ -124,7 +141,7 @@ class ModelWeaving(Weaving):
             if found not in self.inputs:
                 names = _names(self.inputs)
                 self._problem(
-                    f"{self.model.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}",
+                    f"{self.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}",
                     asked,
                     f"its inputs: {', '.join(names) or 'none'}",
                 )
@@ -140,12 +157,10 @@ class ModelWeaving(Weaving):
         if named in ports or len(ports) == 1:
             return named if named in ports else ports[0]
         if not ports:
-            self._problem(
-                f"{self.model.kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {self.model.kind}"
-            )
+            self._problem(f"{self.kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {self.kind}")
         else:
             self._problem(
-                f"{self.model.kind} has {len(ports)} {direction}s, none of them called {name!r}",
+                f"{self.kind} has {len(ports)} {direction}s, none of them called {name!r}",
                 position,
                 f"its {direction}s: {', '.join(_names(ports))}",
                 f"call one of them {name!r}" + (f", {hint}" if hint else ""),
@@ -159,7 +174,7 @@ class ModelWeaving(Weaving):
             wanted = node.get("type")
             if wanted is not None and not accepts(wanted, Request):
                 self._problem(
-                    f"{port.rpartition('.')[2]} of {self.model.kind} is for {type_name(wanted)}, but through an "
+                    f"{port.rpartition('.')[2]} of {self.kind} is for {type_name(wanted)}, but through an "
                     "aspect go requests",
                     node.get("declared"),
                     "leave out its type: the actors inside get requests, which hold the tokens",
@@ -169,6 +184,7 @@ class ModelWeaving(Weaving):
         """Whether all places stand under the composite's own director, which has one order and one time for them."""
         graph, own = self.graph, self.graph.director_of(self.path)
         found = {port: graph.director_of(graph.owner(port)) for port in woven.ports}
+        found |= {actor: graph.director_of(actor) for actor in woven.actors}
         for source, destination in woven.connections:
             hop = next(hop for hop in graph.outgoing(source) if hop.destination == destination)
             found[_place(source, destination)] = graph.director_over(hop)
@@ -217,6 +233,13 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
         key = (source, destination, woven.name)
         found.setdefault(key, Detour(source, destination, None, position, order, woven.name))
 
+    for place in list(at):
+        if place in graph.actors:  # what it asks for comes in after its turn
+            actor = graph.actors[place]
+            for woven in at[place]:
+                for port in (*actor.inputs.values(), *actor.outputs.values()):
+                    assert woven.model is not None
+                    add(port.path, woven.model.requests[place], woven)
     responses = {woven.model.response: woven for many in at.values() for woven in many if woven.model is not None}
     senders: dict[str, list[str]] = {}
     for port in graph.ports.nodes if at else ():
@@ -240,7 +263,7 @@ def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: P
     for woven in models:
         for other in models:
             assert other.model is not None
-            ends = [*woven.ports, *(end for ends in woven.connections for end in ends)]
+            ends = [*woven.ports, *woven.actors, *(end for ends in woven.connections for end in ends)]
             if woven is not other and any(end.startswith(f"{other.model.path}.") for end in ends):
                 inside.add_edge(woven.name, other.name)
     is_sound = nx.is_directed_acyclic_graph(inside)

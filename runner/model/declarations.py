@@ -34,7 +34,7 @@ DIRECTOR_KEYS = ("start", "drift")
 PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
 PORT_KEYS = ("type", "doc")
 CONNECTION_KEYS = ("from", "to", "all", "delay")
-POINTCUT_KEYS = ("at", "type", "tag", "port", "request")
+POINTCUT_KEYS = ("at", "type", "tag", "port", "request", "time")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
 METRIC_KEYS = ("of", "take", "unit", "doc")
 
@@ -69,7 +69,8 @@ class PortText:
 class PointcutText:
     """Where an aspect stands: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
 
-    ``request`` is the port by which the tokens enter an aspect that is a model.
+    For an aspect that is a model, ``request`` is the port by which tokens or firings come in, ``time`` says that it
+    stands at actors and how long their firings take; ``seconds`` is its value.
     One that holds neither pattern, type nor tag is misshapen, and has been told so.
     """
 
@@ -80,6 +81,8 @@ class PointcutText:
     tag: Text | None = None
     port: Text | None = None
     request: Text | None = None
+    time: Node | None = None
+    seconds: float = 0.0
 
     @classmethod
     def of(cls, text: Text) -> PointcutText:
@@ -372,7 +375,7 @@ class DeclarationReader(NodeReader):
             texts = {
                 key: Text(text, entry.value.position)
                 for key, entry in entries.items()
-                if (text := self.text(entry.value, f"{key} of a pointcut")) is not None
+                if key != "time" and (text := self.text(entry.value, f"{key} of a pointcut")) is not None
             }
             by_pattern = "at" in texts
             found.append(PointcutText.of(texts.pop("at")) if by_pattern else PointcutText("", item.position))
@@ -383,6 +386,7 @@ class DeclarationReader(NodeReader):
                     "write {at: ...}, {type: ..., port: ...} or {tag: ...}",
                 )
                 continue
+            found[-1].time = entries["time"].value if "time" in entries else None
             for key, said in texts.items():
                 setattr(found[-1], key, said)
         return found

@@ -7,6 +7,7 @@ computed from it is not judged; an actor that cannot be made leaves its ports in
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 from epicycle.actors import (
@@ -18,13 +19,13 @@ from epicycle.actors import (
     plain,
     to_nanoseconds,
 )
-from epicycle.aspects import Aspect, CompositeAspect
+from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect
 
 from .catalogue import Catalogue, CatalogueError
 from .checks import check
 from .composite_aspect import OWN, ModelWeaving, as_actor, check_nesting, detours
 from .configuration import Configurator
-from .declarations import CompositeText, ModelText, PartText, PortText
+from .declarations import CompositeText, ModelText, PartText, PointcutText, PortText
 from .document import Entry
 from .graph import ModelGraph
 from .model import Model
@@ -403,7 +404,7 @@ class Elaborator(Configurator):
         cls = self._aspect_type(name, scope, part)
         if cls is None:
             return
-        is_model = cls is CompositeAspect
+        is_model = cls in (CompositeAspect, CompositeExecutionAspect)
         given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
         values = self._configuration(f"aspect {name}", cls, given, names, part.position, name, scope)
         if not part.at:
@@ -416,7 +417,8 @@ class Elaborator(Configurator):
         self.graph.positions[f"aspect {name}"] = part.position
         weaving = Weaving(self.graph, all_ports, name, cls, scope, self.problems)
         if is_model and name in self.graph.composites:
-            weaving = ModelWeaving(self.graph, all_ports, name, name, scope, self.problems, part.position)
+            weaving = ModelWeaving(self.graph, all_ports, name, name, scope, self.problems, part.position, cls)
+            part = replace(part, at=[self._timed(pointcut, name, scope, names) for pointcut in part.at])
         is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)
@@ -426,7 +428,7 @@ class Elaborator(Configurator):
         if aspect is None:
             weaving.select(part.at)  # for what is wrong with it
             if isinstance(weaving, ModelWeaving):
-                weaving.leave()
+                self.graph.leave_open(name)
             return
         woven = weaving.weave(
             aspect, part.at, lambda name: part.values[name].value.position if name in part.values else None
@@ -455,7 +457,18 @@ class Elaborator(Configurator):
                     scope=scope,
                 )
                 return None
-            return CompositeAspect
+            timed = [pointcut.time is not None for pointcut in part.at if not pointcut.exclude]
+            if any(timed) and not all(timed):
+                where = next(each for each in part.at if not each.exclude and each.time is None)
+                self.problems.add(
+                    f"aspect {name}: it stands at ports here, and elsewhere at actors",
+                    where.position,
+                    "give every place a time, or none: actors have one, the execution time of their firings",
+                    scope=scope,
+                )
+                self.graph.leave_open(name)
+                return None
+            return CompositeExecutionAspect if any(timed) else CompositeAspect
         if cls is None:
             self.problems.add(
                 f"aspect {name}: there is no aspect type {wanted!r}{did_you_mean(wanted, [*known, *self.composites])}",
@@ -464,15 +477,28 @@ class Elaborator(Configurator):
                 scope=scope,
             )
             return None
-        requests = [pointcut.request for pointcut in part.at if pointcut.request is not None]
-        if requests:
-            self.problems.add(
-                f"aspect {name}: {wanted} is no composite, so it has no request ports",
-                requests[0].position,
-                "leave out 'request'",
-                scope=scope,
-            )
+        for pointcut in part.at:
+            for key, said in (("request", pointcut.request), ("time", pointcut.time)):
+                if said is not None:
+                    self.problems.add(
+                        f"aspect {name}: {wanted} is no composite, so a pointcut of it has no {key!r}",
+                        said.position,
+                        scope=scope,
+                    )
         return cls
+
+    def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
+        """The pointcut with its execution time in s."""
+        if pointcut.time is None:
+            return pointcut
+        label = f"aspect {name}: time"
+        value = self.values.of(pointcut.time, names, label, scope)
+        try:
+            seconds = 0.0 if value is self.values.missing else Parameter(float, unit="s", min=0.0).convert(value)
+        except ParameterError as error:
+            self.problems.add(f"{label}: {error}", pointcut.time.position, scope=scope)
+            return pointcut
+        return replace(pointcut, seconds=seconds or 0.0)
 
     def _is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
         if part.enabled is None:

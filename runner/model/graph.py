@@ -123,6 +123,11 @@ class ModelGraph:
         port.name, port.path = path.rpartition(".")[2], path
         self.ports.nodes[path]["port"] = port
 
+    def leave_open(self, composite: str) -> None:
+        """Nothing more is said of what comes into a composite: another problem has been told."""
+        for port in self.borders(composite)[0]:
+            self.ports.nodes[port]["unmade"] = True
+
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
         """Add one connection between two ports."""
         hop = Hop(source, destination, delay, position, self._order)

@@ -11,8 +11,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
-from epicycle.aspects import Aspect, CompositeAspect
+from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, accepts, type_name
+from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect
 
 from .composite_aspect import ModelWeaving, check_nesting
 from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
@@ -355,13 +355,19 @@ class Scope:
     # -- aspects --------------------------------------------------------------------------------------------------
 
     def weave(
-        self, name: str, aspect: Aspect | Composite | Instance, *, at: Places | Mapping[str, Places]
+        self,
+        name: str,
+        aspect: Aspect | Composite | Instance,
+        *,
+        at: Places | Mapping[str, Places],
+        time: float | str | None = None,
     ) -> WovenAspect:
         """Let an aspect stand at ports or actors, given as such or as patterns over those that are there now.
 
         Aspects at one port or actor apply in the order in which they are woven.  An aspect may be a model: a composite
         of this model, or an instance of a composite class, which is added.  If it has several request ports, ``at``
-        says what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  Raises ``ModelError``.
+        says what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  With a ``time`` (s, or a text with a
+        unit) such an aspect stands at actors, whose firings take so long.  Raises ``ModelError``.
         """
         position = call_site()
         full = self._full(name)
@@ -370,6 +376,7 @@ class Scope:
                 problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
+            seconds = _seconds(time, aspect, position, problems)
         if isinstance(aspect, Aspect):
             with raising() as problems:
                 pointcuts = self._pointcuts(at, type(aspect), position, problems)
@@ -377,13 +384,17 @@ class Scope:
                 woven = weaving.weave(aspect, pointcuts, lambda _: position)
             self._model.aspects.append(woven)
             return woven
-        model = self._model
+        model, kind = self._model, CompositeAspect if seconds is None else CompositeExecutionAspect
         composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
         try:
             with raising() as problems:
-                pointcuts = self._pointcuts(at, CompositeAspect, position, problems)
-                detour = ModelWeaving(model.graph, self._ports, full, composite.path, self.path, problems, position)
-                woven = detour.weave(CompositeAspect(), pointcuts, lambda _: position)
+                pointcuts = self._pointcuts(at, kind, position, problems)
+                for pointcut in pointcuts:
+                    pointcut.seconds = seconds or 0.0
+                detour = ModelWeaving(
+                    model.graph, self._ports, full, composite.path, self.path, problems, position, kind
+                )
+                woven = detour.weave(kind(), pointcuts, lambda _: position)
                 detour.check(woven)
                 check_nesting([*model.aspects, woven], model.graph, problems)
         except Exception:
@@ -482,3 +493,14 @@ class Composite(Scope):
     def __repr__(self) -> str:
         inputs, outputs = ", ".join(self._text.inputs) or "none", ", ".join(self._text.outputs) or "none"
         return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
+
+
+def _seconds(time: float | str | None, aspect: object, position: Position, problems: Problems) -> float | None:
+    """An execution time in s; None: the aspect does not stand at actors, or not as a model."""
+    if time is not None and isinstance(aspect, Aspect):
+        problems.add(f"{type(aspect).__name__} is no composite, so 'time' is not for weave() to say", position)
+    try:
+        return None if time is None else Parameter(float, unit="s", min=0.0).convert(time)
+    except ParameterError as error:
+        problems.add(f"time: {error}", position)
+        return None

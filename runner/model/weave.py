@@ -15,7 +15,15 @@ from typing import Any
 
 from epicycle.actors import counted, declared_parameters
 from epicycle.actors.expression import PortFormula
-from epicycle.aspects import Aspect, ExecutionAspect, PortsParameter, Reading, Selection, SelectionParameter
+from epicycle.aspects import (
+    Aspect,
+    CompositeExecutionAspect,
+    ExecutionAspect,
+    PortsParameter,
+    Reading,
+    Selection,
+    SelectionParameter,
+)
 
 from .declarations import PointcutText
 from .graph import ModelGraph
@@ -32,6 +40,7 @@ class AspectModel:
     kind: str
     response: str
     requests: dict[str, str]
+    times: dict[str, float] = field(default_factory=dict)  # how long the firings of an actor take, in s
 
 
 @dataclass
@@ -82,7 +91,8 @@ def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems
     """An actor runs on one processor at most."""
     taken: dict[str, str] = {}
     for woven in aspects:
-        if not (isinstance(woven.aspect, ExecutionAspect) and woven.aspect.is_processor):
+        aspect = woven.aspect
+        if not (isinstance(aspect, (ExecutionAspect, CompositeExecutionAspect)) and aspect.is_processor):
             continue
         if twice := [actor for actor in woven.actors if actor in taken]:
             problems.add(
@@ -107,6 +117,11 @@ class Weaving:
         self.problems = problems
         self._left_out: set[str] = set()  # ports, which counts for the connections to them, too
         self._is_excused = False  # whether a pointcut selects nothing because there is nothing now
+
+    @property
+    def kind(self) -> str:
+        """The name of its type."""
+        return self.cls.__name__
 
     def weave(
         self, aspect: Aspect, pointcuts: list[PointcutText], position_of: Callable[[str], Position | None]
@@ -164,7 +179,7 @@ class Weaving:
         fitting = [port for port in found if self._fits(port)]
         if found and not fitting:
             self._problem(
-                f"{self.cls.__name__} stands at {' or '.join(sorted(self.cls.stands_at))} ports, "
+                f"{self.kind} stands at {' or '.join(sorted(self.cls.stands_at))} ports, "
                 f"but {found[0]} is an {self.graph.direction(found[0])} port",
                 pointcut,
             )
@@ -196,9 +211,7 @@ class Weaving:
             if not found and not any(path in graph.unknown for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 where = pointcut.type or pointcut.tag
-                self._problem(
-                    f"{self.cls.__name__} stands at {wanting} ports, but no {_asked(pointcut)} has one", where
-                )
+                self._problem(f"{self.kind} stands at {wanting} ports, but no {_asked(pointcut)} has one", where)
             return found
         found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
         if not found:
@@ -259,7 +272,7 @@ class Weaving:
 
     def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> Iterable[str]:
         """The actors and composites that one pointcut selects."""
-        name, text = self.cls.__name__, pointcut.text
+        name, text = self.kind, pointcut.text
         if pointcut.port is not None:
             self._problem(f"{name} stands at actors, not at their ports", pointcut.port, "leave 'port' out")
         if not text:
@@ -322,7 +335,7 @@ class Weaving:
     def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
         """The connections that one pointcut selects."""
         if "input" not in self.cls.stands_at:
-            self._problem(f"{self.cls.__name__} stands at output ports, not on connections", pointcut)
+            self._problem(f"{self.kind} stands at output ports, not on connections", pointcut)
             return []
         left, _, right = (part.strip() for part in pointcut.text.partition("->"))
         try:

@@ -274,6 +274,70 @@ def test_what_comes_out_must_have_gone_in() -> None:
     )
 
 
+# -- at actors ------------------------------------------------------------------------------------------------------
+
+CPU = """
+  Cpu:
+    inputs: [request]
+    outputs: [response]
+    actors:
+      each: {type: Merge}
+      cost: {type: Expression, expression: "job['execution_time']"}
+      server: {type: Server}
+    connections:
+      - request -> each.input
+      - each.output -> cost.job, server.input
+      - cost.output -> server.service_time
+      - server.output -> response
+  Hub:
+    inputs: [request]
+    outputs: [response]
+    actors: {join: {type: Merge}}
+    connections: [request -> join.input, join.output -> response]
+"""
+
+
+def firing_pair(woven: str, **changes: Any) -> Model:
+    text = PAIR.replace("actors:\n  t:", CPU.lstrip("\n") + "actors:\n  t:")
+    return load(text.replace("{ASPECTS}", "{" + woven + "}"), **changes)
+
+
+def test_firings_wait_for_a_model() -> None:
+    """A processor for which both compute: at each second a for 0.1 s, then b for 0.2 s."""
+    woven = "cpu: {type: Cpu, at: [{at: a, time: 100 ms}, {type: Scale, time: 0.2}]}".replace("type: Scale", "at: b")
+    results = run(firing_pair(woven))
+    assert acts(results, "requested", "executed")[:4] == [
+        (0.0, "requested", "a.", 0.1),
+        (0.0, "requested", "b.", 0.2),
+        (0.1, "executed", "a.", 0.1),
+        (pytest.approx(0.3), "executed", "b.", 0.3),
+    ]
+    assert [(tag.seconds, value) for tag, _, value in sends(results, "b.output")] == [(0.3, 0), (1.3, 3), (2.3, 6)]
+    assert results.aspects["cpu"] == {"requested": 6, "executed": 6}
+    changed = run(firing_pair(woven, set=["cpu.server.servers=2"]))
+    assert [tag.seconds for tag, *_ in sends(changed, "b.output")] == [0.2, 1.2, 2.2]
+
+
+def test_a_wire_lets_actors_fire_as_ever() -> None:
+    places = "[{type: Scale, time: 0}, {at: j, time: 1 s}, {at: t, time: 0}]"
+    assert sends(run(firing_pair(f"net: {{type: Wire, at: {places}}}"))) == sends(run(firing_pair("")))
+
+
+def test_what_fires_inside_takes_a_microstep() -> None:
+    """An actor has its turn before the model that it asks, so the answer counts at the next microstep."""
+    results = run(firing_pair("hub: {type: Hub, at: {at: a, time: 0}}"))
+    assert [(tag.seconds, tag.microstep) for tag, *_ in sends(results, "a.output")] == [(0, 2), (1, 2), (2, 2)]
+    assert [(tag.seconds, tag.microstep) for tag, *_ in sends(results, "b.output")] == [(0, 1), (1, 1), (2, 1)]
+
+
+def test_a_firing_that_is_not_answered_does_not_happen() -> None:
+    results = run(
+        firing_pair("net: {type: Hub, at: {at: a, time: 0}}, loss: {type: PacketLoss, probability: 1, at: net.request}")
+    )
+    assert results.aspects["net"] == {"requested": 3, "executed": 0}
+    assert not sends(results, "a.output")
+
+
 # -- what cannot be -------------------------------------------------------------------------------------------------
 
 
@@ -308,13 +372,36 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
         ),
         (
             "net: {type: PacketLoss, probability: 0, at: {at: a.input, request: east}}",
-            """m.yaml:33:78: error: aspect net: PacketLoss is no composite, so it has no request ports
-   help: leave out 'request'""",
+            "m.yaml:33:78: error: aspect net: PacketLoss is no composite, so a pointcut of it has no 'request'",
         ),
         (
             "net: {type: Desk, at: {at: a.input, type: Scale}}",
             """m.yaml:33:33: error: a pointcut chooses by pattern, by type or by tag
    help: write {at: ...}, {type: ..., port: ...} or {tag: ...}""",
+        ),
+        (
+            "net: {type: Desk, at: [a.input, {at: b, time: 1 s}]}",
+            """m.yaml:33:34: error: aspect net: it stands at ports here, and elsewhere at actors
+   help: give every place a time, or none: actors have one, the execution time of their firings""",
+        ),
+        (
+            "net: {type: Desk, at: {at: a.input, time: -1}}",
+            """m.yaml:33:38: error: aspect net: Desk stands at actors, but a.input is a port
+   help: write 'a', without the port
+m.yaml:33:53: error: aspect net: time: -1 is out of bounds, expected a number in s >= 0""",
+        ),
+        (
+            "net: {type: PacketLoss, probability: 0, at: {at: a.input, time: 1}}",
+            "m.yaml:33:75: error: aspect net: PacketLoss is no composite, so a pointcut of it has no 'time'",
+        ),
+        (
+            "one: {type: Desk, at: {at: a, time: 1}}, two: {type: Desk, at: {at: '*', time: 1}}",
+            """m.yaml:33:52: error: aspect two: a runs on the processor 'one' already
+   help: an actor has one processor: leave it out here, with '!a', or there""",
+        ),
+        (
+            "net: {type: Desk, at: {at: net.server, time: 1}}",
+            "m.yaml:33:38: error: aspect net: it cannot stand inside of itself, at net.server",
         ),
         (
             "a: {type: Desk, at: b.input}",
@@ -463,6 +550,9 @@ def test_models_built_in_python(tmp_path: Path) -> None:
     model.weave("net", desk("net", time=0.1), at=[model["a"].input, "b.input"])
     assert [time for time, *_ in acts(run(model), "delivered")][:2] == [0.1, 0.2]
     model.unweave("net")
+    model.weave("cpu", desk("cpu"), at=[model["a"], "b"], time="1 s")
+    assert [time for time, *_ in acts(run(model), "executed")][:2] == [0.3, 0.6]
+    model.unweave("cpu")
     assert not model.graph.composites
     assert not model.aspects
     assert run(model).digest == run(python_pair()).digest

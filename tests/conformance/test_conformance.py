@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.aspects import Request
+from epicycle.aspects import FiringRequest, Request
 from epicycle.runner.engine import Simulation
 from epicycle.runner.model import Model, ModelError, load_model
 from epicycle.runner.model.catalogue import built_in
@@ -29,20 +29,24 @@ from conformance_parts import TYPES, TestActorPortDepth
 HERE = Path(__file__).parent
 RESOLUTION = 1e-9  # s
 REQUEST = re.compile(r"\{receiver = object\(\S+ \{\.\w+\.(?P<port>\S+)\.receiver \}\), token = (?P<token>.*)\}\Z")
+FIRING = re.compile(r"\{actor = object\(\S+ \{\.\w+\.(?P<actor>\S+)\}\), executionTime = (?P<time>\S+)\}\Z")
 Sends = list[tuple[float, int, str, int, Any]]
 
 
 def own_name(name: str) -> str:
     """``S+Samplers, DE.trueOutput`` as ``s_samplers_de.true_output``."""
     name = re.sub(r"[^A-Za-z0-9.]+", "_", name)
+    name = re.sub(r"Composite(Communication|Execution)Aspect\.(Communication|Execution)?", r"\1.", name)
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
 def own_token(text: str) -> Any:
     """A token in Ptolemy's syntax; an array that was sent element by element is written with brackets.
 
-    Of a request to an aspect that is a model, the port where it goes and its token.
+    Of a request to an aspect that is a model: the port where it goes and its token, or an actor and its execution time.
     """
+    if firing := FIRING.match(text):
+        return own_name(firing["actor"]), json.loads(firing["time"])
     if request := REQUEST.match(text):
         return own_name(request["port"]), json.loads(request["token"])
     if "DepthTest4." in text:
@@ -88,18 +92,32 @@ def requests(model: Model) -> Sends:
     """What comes in by the request ports of aspects that are models: in Ptolemy these are actors that send it."""
     asked = {woven.name: woven.model for woven in model.aspects}
     results = Simulation(model, seed=0, keep_log=True).run()
-    return [
-        (r.tag.seconds, r.tag.microstep, f"{asked[r.aspect].requests[f'{r.actor}.{r.port}']}.output", 0, r.value)
-        for r in results.log.records
-        if r.event == "requested"
-    ]
+    found = []
+    for r in results.log.records:
+        place = f"{r.actor}.{r.port}" if r.port else r.actor  # a port, or an actor whose firing is asked for
+        if r.event == "requested":
+            port = f"{asked[r.aspect].requests[place]}.output"
+            found.append((r.tag.seconds, r.tag.microstep, port, 0, (place, r.value)))
+    return found
 
 
-LATER = {
-    "RefiringActorInDE": "execution and communication aspects that are models",
-}
-"""The cases of Ptolemy's aspects, which wait for ours of that kind."""
+def came_in(model: Model, recorded_sends: Sends) -> tuple[Sends, Sends]:
+    """What Ptolemy sent, apart from what came in by the request ports of aspects; and this."""
+    ports = {port for woven in model.aspects if woven.model for port in woven.model.requests.values()}
+    told = [(*send[:4], own_token(send[4])) for send in recorded_sends]
+    inside = [send for send in told if send[2].removesuffix(".output") in ports]
+    return [send for send in told if send not in inside], inside
+
+
+def requested(token: Any) -> Any:
+    """A request as Ptolemy's is told here."""
+    if isinstance(token, FiringRequest):
+        return token.port, token.execution_time
+    return (token.port, token.token) if isinstance(token, Request) else token
+
+
 QUANTITY_MANAGER = "CompositeQM"
+REFIRING = "RefiringActorInDE"
 OTHER_MICROSTEPS = ("ScheduleEmbeddedActors",)
 """The cases in which times and order are Ptolemy's, and microsteps are not; docs/ptolemy.md tells why."""
 REFUSED = "DEFixedPointLimitation"
@@ -134,13 +152,9 @@ def test_an_aspect_that_is_a_model() -> None:
     In Epicycle it comes in at once.  So what passes the aspect at the first tag is a microstep earlier here, also when
     its delay of 1 s is over, and all that follows comes at the same tag.
     """
-    model, expected = load(QUANTITY_MANAGER), recorded(QUANTITY_MANAGER)
-    ports = {port for woven in model.aspects if woven.model for port in woven.model.requests.values()}
-    came_in = [send for send in expected if send[2].removesuffix(".output") in ports]
-    expected = [(*send[:4], own_token(send[4])) for send in expected if send not in came_in]
-    found = [
-        (*send[:4], (send[4].port, send[4].token) if isinstance(send[4], Request) else send[4]) for send in sends(model)
-    ]
+    model = load(QUANTITY_MANAGER)
+    expected, inside = came_in(model, recorded(QUANTITY_MANAGER))
+    found = [(*send[:4], requested(send[4])) for send in sends(model)]
     assert [send for send in found if send[0] >= 2] == [send for send in expected if send[0] >= 2]
 
     def ptolemys(send: tuple[float, int, str, int, Any]) -> tuple[float, int, str, int, Any]:
@@ -150,7 +164,28 @@ def test_an_aspect_that_is_a_model() -> None:
         return time, microstep + late, port, channel, value
 
     assert sorted(map(ptolemys, found), key=repr) == sorted(expected, key=repr)
-    assert sorted(map(ptolemys, requests(model))) == [(*send[:4], own_token(send[4])[1]) for send in sorted(came_in)]
+    assert sorted(map(ptolemys, requests(model))) == sorted(inside)
+
+
+def test_aspects_that_are_models_of_communication_and_of_execution() -> None:
+    """The same difference: in Ptolemy, a request that comes after an aspect's turn waits for the next microstep.
+
+    So does what comes at the first tag, and each firing that is asked for when the aspect has let another one happen.
+    """
+    model = load(REFIRING)
+    expected, inside = came_in(model, recorded(REFIRING))
+    found = [(*send[:4], requested(send[4])) for send in sends(model)]
+    asked = requests(model)
+    for ours, theirs in ((found, expected), (asked, inside)):
+        assert len(ours) == len(theirs) > 70
+        for port in {send[2] for send in theirs}:
+            (mine, other) = ([send for send in each if send[2] == port] for each in (ours, theirs))
+            assert [(send[0], *send[3:]) for send in mine] == [(send[0], *send[3:]) for send in other]
+            for (time, microstep, _, _, value), send in zip(mine, other, strict=True):
+                first = time == 0 and port.startswith("communication.")
+                follows = time > 1 and port.startswith("execution.") and value != 0 and "server.output" not in port
+                after_ramp = time > 1 and port == "communication.request_port2.output"
+                assert send[1] - microstep == (first or follows or after_ramp), (port, time)
 
 
 def test_a_loop_that_ptolemy_refuses() -> None:
@@ -162,9 +197,9 @@ def test_a_loop_that_ptolemy_refuses() -> None:
 
 
 def test_every_case_is_here() -> None:
-    assert {path.stem for path in (HERE / "models").glob("*.yaml")} == {*CASES, QUANTITY_MANAGER, REFUSED}
-    assert {path.stem for path in (HERE / "sends").glob("*.csv")} == {*CASES, QUANTITY_MANAGER, REFUSED}
-    assert len({*CASES, QUANTITY_MANAGER, REFUSED, *LATER}) == 24
+    assert {path.stem for path in (HERE / "models").glob("*.yaml")} == {*CASES, QUANTITY_MANAGER, REFIRING, REFUSED}
+    assert {path.stem for path in (HERE / "sends").glob("*.csv")} == {*CASES, QUANTITY_MANAGER, REFIRING, REFUSED}
+    assert len({*CASES, QUANTITY_MANAGER, REFIRING, REFUSED}) == 24
 
 
 def test_the_document_tells_the_same() -> None:
@@ -173,8 +208,8 @@ def test_the_document_tells_the_same() -> None:
     results = {case: row[2] for row in rows if len(row) == 3 for case in row[0].split(", ")}
     assert all("match" in results[case] for case in CASES)
     assert "from 2 s on" in results[QUANTITY_MANAGER]
+    assert "matches" in results[REFIRING]
     assert "refused" in results[REFUSED]
-    assert all("waits" in results[case] for case in LATER)
     actors = [line.strip("| ").split(" | ") for line in text[text.index("## Actors") :].splitlines() if "` | " in line]
     named = {name for row in actors for name in re.findall(r"`([A-Z]\w+)`", row[0 if row[1] == "the same" else 1])}
     assert len(named) > 40
