@@ -102,19 +102,27 @@ def _settings(node: Node, problems: Problems) -> list[Setting]:
     return []
 
 
-def add_disturbance(text: ModelText, name: str, problems: Problems) -> list[Setting]:
-    """Add what a disturbance holds to a model; what it sets of the model's own parameters is returned.
+def add_disturbances(text: ModelText, names: Iterable[str], problems: Problems) -> list[Setting]:
+    """Add what disturbances hold to a model; what they set of the model's own parameters is returned.
 
-    Its parameters join the model's, so that ``--set`` and expressions know them by their names.  Its aspects come after
-    the model's own, but one that has the name of another stands in its place.
+    Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
+    after the model's own, but one that has the name of another stands in its place.
     """
-    disturbance = load_disturbance(name, problems)
-    if disturbance is None:
-        return []
-    _add_parameters(disturbance.text, text.root, problems)
-    for part in disturbance.text.aspects.values():
-        put_aspect(text, part)
-    return disturbance.settings
+    settings: list[Setting] = []
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            problems.add(f"the disturbance {name} is given twice", None, "leave one of them out")
+            continue
+        seen.add(name)
+        disturbance = load_disturbance(name, problems)
+        if disturbance is None:
+            continue
+        _add_parameters(disturbance.text, text.root, problems)
+        for part in disturbance.text.aspects.values():
+            put_aspect(text, part)
+        settings += disturbance.settings
+    return settings
 
 
 def _add_parameters(disturbance: CompositeText, root: CompositeText, problems: Problems) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
-from .disturbance import add_disturbance
+from .disturbance import add_disturbances
 from .document import Mapping as MappingNode
 from .document import read
 from .elaborate import Elaborator
@@ -87,7 +87,7 @@ def load_model(
     composites, broken = inherit(declared, catalogue.actors, problems)
     check_usage(text, declared, composites, catalogue.actors, problems)
     # What disturbances set comes first, for the last one wins.
-    settings = [each for given in _several(disturb) for each in add_disturbance(text, str(given), problems)] + settings
+    settings = add_disturbances(text, map(str, _several(disturb)), problems) + settings
     for change in without_aspects:
         without(text, change, problems)
     for change in aspects:
