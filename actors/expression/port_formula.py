@@ -24,10 +24,11 @@ class PortFormula:
 
     A reference is the path of an output port, with the fields that lead to a part of its token: ``main.state`` or
     ``main.state.position``.  A name in ``given`` stands for itself: its value, of which fields can be named as well,
-    comes with each call.  Raises ``ExpressionError`` if the text is no such expression.
+    comes with each call; ``given_fields`` are those, as ``("token.speed", ("speed",))``.  Raises ``ExpressionError`` if
+    the text is no such expression.
     """
 
-    __slots__ = ("_formula", "_given", "_paths", "_ports", "references", "source")
+    __slots__ = ("_formula", "_given", "_paths", "_ports", "given_fields", "references", "source")
 
     def __init__(self, source: str, given: Sequence[str] = ()) -> None:
         names: dict[str, str] = {}
@@ -51,6 +52,7 @@ class PortFormula:
         self._ports = {path: name for path, name in names.items() if path.split(".")[0] not in given}
         self._given = {name: path.split(".") for path, name in names.items() if path not in self._ports}
         self.references = tuple(self._ports)
+        self.given_fields = tuple((".".join(path), tuple(path[1:])) for path in self._given.values() if path[1:])
 
     def __call__(self, values: Sequence[object], **given: object) -> Any:
         """The value for those of the references, in their order, and of the given names; raises ``EpicycleError``."""

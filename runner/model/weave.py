@@ -148,6 +148,8 @@ class Weaving:
             if isinstance(formula, PortFormula):
                 position = position_of(name)
                 woven.readings[formula] = [self._reading(name, each, position) for each in formula.references]
+                for reference, fields in formula.given_fields:
+                    self._check_given(name, reference, fields, woven.ports, position)
         chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
         woven.reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return woven
@@ -401,10 +403,18 @@ class Weaving:
             self._problem(f"{name}: {reference!r} names no output port{near}", position)
         return reference, ()
 
+    def _check_given(
+        self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position | None
+    ) -> None:
+        """Whether the tokens that pass the aspect have the field; of ports that lack it, the first is told."""
+        for port in ports:
+            if not self._check_fields(name, f"{reference} at {port}", port, fields, position):
+                return
+
     def _check_fields(
         self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position | None
-    ) -> None:
-        """Whether the tokens of a port have the field, where their type tells."""
+    ) -> bool:
+        """Whether the tokens of a port have the field, where their type tells; if not, that is a problem."""
         for source in self.graph.source_of(port) if fields else ():
             if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
                 names = [each.name for each in dataclasses.fields(source.type)]
@@ -415,7 +425,8 @@ class Weaving:
                         position,
                         f"its fields: {', '.join(names)}",
                     )
-                return
+                    return False
+        return True
 
     def _fits(self, port: str) -> bool:
         """Whether the aspect can stand there."""

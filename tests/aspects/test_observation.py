@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors.expression import ExpressionError, PortFormula
-from epicycle.runner import ActorError, ModelError
+from epicycle.runner import ActorError, ModelError, load_model
 from epicycle.runner.engine import Results
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
@@ -146,9 +146,21 @@ def test_wrong_observers(aspect: str, message: str) -> None:
     assert message in str(caught.value)
 
 
+def test_fields_of_tokens_are_known_before_the_run() -> None:
+    with pytest.raises(ModelError) as caught:
+        load_model(
+            "collision_avoidance", aspects=["safe=Assert,at=*.state,that=token.sped < 3 and token.position[0] < 9"]
+        )
+    assert str(caught.value).splitlines()[0::3] == [
+        "command line:1:38: error: aspect safe: that: token.sped at obstacle.state: BodyState has no field 'sped'",
+        "   help: its fields: position, velocity",
+    ]
+
+
 def test_formula_over_a_token_and_ports() -> None:
     formula = PortFormula("token.x[0] + a.b.c * token['y'] < token.x[1]", ["token"])
     assert formula.references == ("a.b.c",)
+    assert formula.given_fields == (("token.x", ("x",)),)
     assert formula([2.0], token={"x": [1, 8], "y": 3}) is True
     assert formula([2.0], token={"x": [1, 7], "y": 3}) is False
     assert PortFormula("tokens.x + token", ["token"]).references == ("tokens.x",)
