@@ -2,6 +2,7 @@
 
 A chain of actors runs beside another part that carries one token.  Compared with the same model without aspects:
 
+- again: the same model, which tells how far chance goes;
 - off: ten aspects that are declared and disabled (`enabled: false`);
 - nowhere: ten whose pointcut selects the ports of a replica of which there are none;
 - elsewhere: one that stands at a port of the other part;
@@ -49,6 +50,7 @@ run: {{stop: {stop}}}
 LOSS = "type: PacketLoss, probability: 0"
 PLACES = {
     "bare": "",
+    "again": "",
     "off": ", ".join(f"a{n}: {{{LOSS}, enabled: false, at: 'link[*].input'}}" for n in range(10)),
     "nowhere": ", ".join(f"a{n}: {{{LOSS}, at: 'spare[*].input'}}" for n in range(10)),
     "elsewhere": f"a: {{{LOSS}, at: end.input}}",
