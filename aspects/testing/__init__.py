@@ -20,11 +20,11 @@ from .interference import (
     assert_silent_at_zero,
     assert_streams_are_its_own,
 )
-from .trial import Event, Trial, Woven
+from .trial import Event, RunModel, Woven
 
 __all__ = [
     "Event",
-    "Trial",
+    "RunModel",
     "Woven",
     "assert_observes_only",
     "assert_order_of_unrelated_aspects_is_free",

@@ -9,14 +9,14 @@ import numpy as np
 
 from epicycle.aspects import Aspect
 
-from .trial import Event, Trial, Woven
+from .trial import Event, RunModel, Woven
 from .visits import Visits
 
 NAME = "tested"
 OTHER = "other"
 
 
-def assert_silent_at_zero(aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**") -> None:
+def assert_silent_at_zero(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
     """With a strength of zero the event log is, to the bit, the one of the model without the aspect.
 
     ``aspect`` is made with that strength: ``Noise(deviation=0)``.
@@ -27,7 +27,7 @@ def assert_silent_at_zero(aspect: Aspect, trial: Trial, at: str | Sequence[str] 
     _compare(f"{aspect!r} at {at} is not silent", trial(), "without it", log, "with it")
 
 
-def assert_observes_only(aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**") -> None:
+def assert_observes_only(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
     """The event log without the aspect's own events is, to the bit, the one of the model without the aspect."""
     visits = Visits(aspect)
     log = [event for event in trial(Woven(NAME, visits.aspect, at)) if event.aspect != NAME]
@@ -37,7 +37,7 @@ def assert_observes_only(aspect: Aspect, trial: Trial, at: str | Sequence[str] =
 
 
 def assert_removal_moves_nothing(
-    aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**", beside: Sequence[Woven] = ()
+    aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**", beside: Sequence[Woven] = ()
 ) -> None:
     """Adding or removing the aspect moves no random stream of an actor or of an aspect of the model or ``beside`` it.
 
@@ -53,7 +53,7 @@ def assert_removal_moves_nothing(
     _compare(what, trial(*beside), "without it", log, "with it", microstep=False)
 
 
-def assert_streams_are_its_own(aspect: Aspect, trial: Trial, at: str | Sequence[str] = "**") -> None:
+def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
     """Each join point has a random stream of its own, which nothing moves, and no randomness comes from elsewhere.
 
     No two join points share a stream; at each one, the stream, and what the aspect decides, stay the same when the
@@ -91,7 +91,7 @@ def assert_streams_are_its_own(aspect: Aspect, trial: Trial, at: str | Sequence[
         _compare(what, acts, f"at {at}", acts_of_half, "at half of that")
 
 
-def assert_order_of_unrelated_aspects_is_free(first: Woven, second: Woven, trial: Trial) -> None:
+def assert_order_of_unrelated_aspects_is_free(first: Woven, second: Woven, trial: RunModel) -> None:
     """Two aspects that stand at different ports can be declared in either order: the event log is the same."""
     visits = Visits(first.aspect), Visits(second.aspect)
     woven = Woven(first.name, visits[0].aspect, first.at), Woven(second.name, visits[1].aspect, second.at)

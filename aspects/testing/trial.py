@@ -1,4 +1,4 @@
-"""Trial: how a test of an aspect runs a model, and what it gets from there."""
+"""How a test of an aspect runs a model, and what it gets from there."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Event(Protocol):
         """All of it, to the bit; with ``microstep`` false but for that."""
 
 
-class Trial(Protocol):
+class RunModel(Protocol):
     """Runs a model with some aspects woven in addition to its own, and returns the records of the event log."""
 
     def __call__(self, *woven: Woven) -> Sequence[Event]: ...
