@@ -12,6 +12,7 @@ from .core import (
     Selection,
     Weaver,
 )
+from .decoration import Decoration, class_decorations, decorations
 from .execution import ActorPoint, ExecutionAspect, Job
 from .firing import ExecutionTime, SkipFiring
 from .measurement import (
@@ -46,6 +47,7 @@ __all__ = [
     "CompositeExecutionAspect",
     "Corrupt",
     "Count",
+    "Decoration",
     "Drift",
     "Duplicate",
     "ExecutionAspect",
@@ -85,4 +87,6 @@ __all__ = [
     "StuckAt",
     "Throttle",
     "Weaver",
+    "class_decorations",
+    "decorations",
 ]

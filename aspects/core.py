@@ -28,6 +28,8 @@ import numpy as np
 from epicycle.actors import Configurable, EpicycleError, Parameter, Tag, random_stream, to_nanoseconds, to_seconds
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand, value_at
 
+from .decoration import Decoration, decoration
+
 Reading = tuple[str, tuple[str, ...]]  # an output port, and the fields that lead to a part of its token
 Selection = Mapping[str, Sequence[str]]  # patterns, and the full paths that they select
 
@@ -199,6 +201,14 @@ class Aspect(Configurable):
         if self.every is not None and (self.until is None or self.every < self.until - self.from_):
             wanted = "a time 'until' as well" if self.until is None else "at least the time from 'from' to 'until'"
             raise EpicycleError(f"every {self.every:g} s needs {wanted}")
+
+    def at(self, *ports: str, name: str = "") -> Decoration:
+        """Let it come with actors: ``@Noise(deviation=0.1).at("output")`` before a class, or called with an instance.
+
+        It then stands at these ports of every actor of the class, or of this one; an aspect of execution stands at the
+        actor itself, without ports.  The ``name`` is that of the type unless given.  Raises ``EpicycleError``.
+        """
+        return decoration(self, ports, name)
 
     def is_due(self, time: int) -> bool:
         """Whether ``from``, ``until`` and ``every`` let it act at this time (ns)."""

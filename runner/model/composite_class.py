@@ -55,7 +55,7 @@ class CompositeInstance:
             elaborator.graph = graph
             aspects = elaborator.instance(path, part)
             problems.raise_if_any()
-        model.aspects += aspects
+        model.enlist(aspects)
 
     def __repr__(self) -> str:
         return f"<{self.composite.name} {self.path}>"

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from epicycle.actors import ParameterError, declared_parameters, unknown_parameter
+from epicycle.actors import Configurable, ParameterError, declared_parameters, unknown_parameter
 
 from .declarations import CompositeText
 from .document import Entry, Mapping, Node
@@ -77,6 +77,20 @@ class Configurator:
         """The setting for a parameter, if there is one."""
         self.settable[full] = None
         return self.settings.find(full)
+
+    def _set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
+        """The parameters of something that is made already which are set from outside, with their new values."""
+        changed: dict[str, object] = {}
+        for name, parameter in declared_parameters(type(part)).items():
+            setting = self._setting(f"{path}.{name}")
+            value = None if setting is None else self.values.of(setting.node, {}, f"{path}.{name}")
+            if setting is None or value is self.values.missing:
+                continue
+            try:
+                changed[name] = parameter.convert(value)
+            except ParameterError as error:
+                self.problems.add(f"{path}.{name}: {error}", _place(setting.node, error))
+        return changed
 
     def _configuration(
         self,

@@ -7,7 +7,6 @@ computed from it is not judged; an actor that cannot be made leaves its ports in
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from typing import Any
 
 from epicycle.actors import (
@@ -19,14 +18,13 @@ from epicycle.actors import (
     plain,
     to_nanoseconds,
 )
-from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect
 
 from .catalogue import Catalogue, CatalogueError
 from .checks import check
-from .composite_aspect import OWN, ModelWeaving, as_actor, check_nesting, detours
-from .configuration import Configurator
-from .declarations import CompositeText, ModelText, PartText, PointcutText, PortText
+from .composite_aspect import as_actor
+from .declarations import CompositeText, ModelText, PartText, PortText
 from .document import Entry
+from .elaborate_aspects import AspectElaborator
 from .graph import ModelGraph
 from .model import Model
 from .observation import Observation
@@ -34,20 +32,19 @@ from .patterns import PathIndex
 from .port_types import PortTypeError, read_type, token_types
 from .problems import Position, Problems, did_you_mean
 from .settings import Settings
-from .weave import Weaving, WovenAspect, check_processors
+from .weave import WovenAspect, check_processors
 from .wiring import Child, Wiring
 
 MAX_COUNT = 100_000
 MAX_INSTANCES = 200_000  # of actors and composites together
 MAX_DEPTH = 50
-MAX_SHOWN = 12  # types in one message
 
 
 class TooLargeError(Exception):
     """The model has too many parts to go on; the reason has been noted."""
 
 
-class Elaborator(Configurator):
+class Elaborator(AspectElaborator):
     """Unfolds one model; problems are collected, and the model is good only if there are none."""
 
     def __init__(
@@ -59,14 +56,8 @@ class Elaborator(Configurator):
         catalogue: Catalogue,
         broken: Collection[str] = (),
     ) -> None:
-        super().__init__(settings, problems)
+        super().__init__(composites, settings, problems, catalogue, broken)
         self.text = text
-        self.composites = composites
-        self.broken = broken  # composites that are there, but lack what they extend
-        self.catalogue = catalogue
-        self.aspects: list[WovenAspect] = []
-        # Aspects are woven when all ports exist: (name, scope, declaration, names).
-        self._to_weave: list[tuple[str, str, PartText, dict[str, object]]] = []
         self.made: set[str] = set()  # the composite classes of which there are instances
         self._instances = 0
         self._port_types: dict[str, Any] = {}
@@ -126,20 +117,6 @@ class Elaborator(Configurator):
             return []
         self._weave()
         return self.aspects
-
-    def _valid_types(self, kind: str, asked: str) -> str:
-        """Which types there are: their names, or how to see them if they are too many for a message."""
-        is_actor = kind == "actor"
-        types: Collection[str] = self.catalogue.actors if is_actor else self.catalogue.aspects
-        others: Collection[str] = self.catalogue.aspects if is_actor else self.catalogue.actors
-        if asked in others:
-            other = "aspect" if is_actor else "actor"
-            return f"{asked} is an {other}: it belongs under '{other}s'"
-        composites = sorted(self.composites) if is_actor else []
-        if len(composites) + len(types) <= MAX_SHOWN:
-            return f"valid types: {', '.join(sorted([*composites, *types]))}"
-        own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
-        return f"valid types: {f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
 
     # -- the inside of a composite --------------------------------------------------------------------------------
 
@@ -362,6 +339,7 @@ class Elaborator(Configurator):
         if values is not None:
             try:
                 actor = actor_type(path, **values)
+                self._actors.append(actor)
                 self.graph.add_actor(actor, part.position)
                 return actor
             except (EpicycleError, ValueError) as error:  # what an actor's own __init__ has against it
@@ -370,14 +348,6 @@ class Elaborator(Configurator):
         return None
 
     # -- aspects ------------------------------------------------------------------------------------
-
-    def _weave(self) -> None:
-        """Let all aspects stand where they are to, now that all ports exist."""
-        ports = PathIndex(self.graph.ports.nodes)
-        for name, scope, part, names in self._to_weave:
-            self._aspect(name, scope, part, names, ports)
-        if check_nesting(self.aspects, self.graph, self.problems):
-            self.graph.detours = detours(self.graph, self.aspects)
 
     def _aspect_model(
         self, path: str, composite: CompositeText, part: PartText, names: dict[str, object], within: tuple[str, ...]
@@ -399,117 +369,6 @@ class Elaborator(Configurator):
         del self._to_weave[mark:]
         self.graph.unknown.add(full)
         return None
-
-    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], all_ports: PathIndex) -> None:
-        cls = self._aspect_type(name, scope, part)
-        if cls is None:
-            return
-        is_model = cls in (CompositeAspect, CompositeExecutionAspect)
-        given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        values = self._configuration(f"aspect {name}", cls, given, names, part.position, name, scope)
-        if not part.at:
-            self.problems.add(
-                f"aspect {name} does not say where it stands",
-                part.position,
-                "add 'at:' with ports or patterns",
-                scope=scope,
-            )
-        self.graph.positions[f"aspect {name}"] = part.position
-        weaving = Weaving(self.graph, all_ports, name, cls, scope, self.problems)
-        if is_model and name in self.graph.composites:
-            weaving = ModelWeaving(self.graph, all_ports, name, name, scope, self.problems, part.position, cls)
-            part = replace(part, at=[self._timed(pointcut, name, scope, names) for pointcut in part.at])
-        is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
-        try:
-            aspect = None if values is None else cls(**values)
-        except (EpicycleError, ValueError) as error:
-            self.problems.add(f"aspect {name}: {error}", part.position, scope=scope)
-            aspect = None
-        if aspect is None:
-            weaving.select(part.at)  # for what is wrong with it
-            if isinstance(weaving, ModelWeaving):
-                self.graph.leave_open(name)
-            return
-        woven = weaving.weave(
-            aspect, part.at, lambda name: part.values[name].value.position if name in part.values else None
-        )
-        if isinstance(weaving, ModelWeaving):
-            weaving.check(woven)
-            weaving.connect(woven)
-        if is_enabled:
-            self.aspects.append(woven)
-
-    def _aspect_type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
-        known, wanted = self.catalogue.aspects, part.type.text
-        if wanted in self.broken:
-            return None
-        try:
-            cls = known.get(wanted)
-        except CatalogueError as error:
-            self.problems.add(f"aspect {name}: {error.message}", part.type.position, *error.help, scope=scope)
-            return None
-        if wanted in self.composites:
-            if cls is not None:
-                self.problems.add(
-                    f"aspect {name}: {wanted} is an aspect type and a composite",
-                    part.type.position,
-                    "give the composite another name",
-                    scope=scope,
-                )
-                return None
-            timed = [pointcut.time is not None for pointcut in part.at if not pointcut.exclude]
-            if any(timed) and not all(timed):
-                where = next(each for each in part.at if not each.exclude and each.time is None)
-                self.problems.add(
-                    f"aspect {name}: it stands at ports here, and elsewhere at actors",
-                    where.position,
-                    "give every place a time, or none: actors have one, the execution time of their firings",
-                    scope=scope,
-                )
-                self.graph.leave_open(name)
-                return None
-            return CompositeExecutionAspect if any(timed) else CompositeAspect
-        if cls is None:
-            self.problems.add(
-                f"aspect {name}: there is no aspect type {wanted!r}{did_you_mean(wanted, [*known, *self.composites])}",
-                part.type.position,
-                self._valid_types("aspect", wanted),
-                scope=scope,
-            )
-            return None
-        for pointcut in part.at:
-            for key, said in (("request", pointcut.request), ("time", pointcut.time)):
-                if said is not None:
-                    self.problems.add(
-                        f"aspect {name}: {wanted} is no composite, so a pointcut of it has no {key!r}",
-                        said.position,
-                        scope=scope,
-                    )
-        return cls
-
-    def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
-        """The pointcut with its execution time in s."""
-        if pointcut.time is None:
-            return pointcut
-        label = f"aspect {name}: time"
-        value = self.values.of(pointcut.time, names, label, scope)
-        try:
-            seconds = 0.0 if value is self.values.missing else Parameter(float, unit="s", min=0.0).convert(value)
-        except ParameterError as error:
-            self.problems.add(f"{label}: {error}", pointcut.time.position, scope=scope)
-            return pointcut
-        return replace(pointcut, seconds=seconds or 0.0)
-
-    def _is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
-        if part.enabled is None:
-            return True
-        label = f"aspect {name}.enabled"
-        value = self.values.of(part.enabled, names, label, scope)
-        try:
-            return value is self.values.missing or bool(Parameter(bool).convert(value))
-        except ParameterError as error:
-            self.problems.add(f"{label}: {error}", part.enabled.position, scope=scope)
-            return True
 
 
 def _shown(value: object, unit: str) -> object:

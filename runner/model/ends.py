@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
+from epicycle.aspects import Aspect
 
 from .problems import ModelError, Position, Problem, Problems
 
@@ -64,6 +65,17 @@ def clock_of(
     except ParameterError as error:
         problems.add(f"{path}: director.drift: {error}", position)
     return begin, speed
+
+
+def seconds_of(time: float | str | None, aspect: object, position: Position, problems: Problems) -> float | None:
+    """An execution time in s; None: the aspect does not stand at actors, or not as a model."""
+    if time is not None and isinstance(aspect, Aspect):
+        problems.add(f"{type(aspect).__name__} is no composite, so 'time' is not for weave() to say", position)
+    try:
+        return None if time is None else Parameter(float, unit="s", min=0.0).convert(time)
+    except ParameterError as error:
+        problems.add(f"time: {error}", position)
+        return None
 
 
 def each_of(ends: Ends | Places) -> list[Any]:

@@ -11,6 +11,7 @@ from ..tables import Table, as_html, as_text, short
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .declarations import REDUCTIONS, MetricText
+from .decorated import arranged
 from .ends import Port
 from .graph import ModelGraph
 from .observation import Metric, Observation, checked_seed, nanoseconds
@@ -92,7 +93,7 @@ class Model(Scope):
         from .disturbance import disturb
 
         found = disturb(self, str(disturbance), set or {}, types, call_site())
-        self.aspects += found
+        self.enlist(found)
         return found
 
     # -- what is watched ------------------------------------------------------------------------------------------
@@ -156,6 +157,10 @@ class Model(Scope):
         """Engine: the composite at a path."""
         self.scopes.update()
         return self.scopes.at(path)
+
+    def enlist(self, aspects: Iterable[WovenAspect]) -> None:
+        """Engine: these aspects stand in the model from now on."""
+        self.aspects = arranged([*self.aspects, *aspects], self.graph)
 
     def changed(self) -> None:
         """Engine: what was checked before may no longer hold."""

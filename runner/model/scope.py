@@ -11,13 +11,14 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, accepts, type_name
+from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect
 
 from .composite_aspect import ModelWeaving, check_nesting
 from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
+from .decorated import weave_decorations
 from .document import Scalar
-from .ends import CompositePort, Ends, Instance, Places, clock_of, each_of, mistake, raising
+from .ends import CompositePort, Ends, Instance, Places, clock_of, each_of, mistake, raising, seconds_of
 from .graph import Hop
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
@@ -76,6 +77,12 @@ class Scope:
         if isinstance(part, Actor):
             part.move(full)
             self._model.graph.add_actor(part, position)
+            try:
+                with raising() as problems:
+                    self._model.enlist(weave_decorations(part, self._model.graph, problems, position))
+            except Exception:
+                self._model.forget(full)
+                raise
         else:
             part.unfold(full, self._model, position)
         if priority:
@@ -376,13 +383,13 @@ class Scope:
                 problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
-            seconds = _seconds(time, aspect, position, problems)
+            seconds = seconds_of(time, aspect, position, problems)
         if isinstance(aspect, Aspect):
             with raising() as problems:
                 pointcuts = self._pointcuts(at, type(aspect), position, problems)
                 weaving = Weaving(self._model.graph, self._ports, full, type(aspect), self.path, problems)
                 woven = weaving.weave(aspect, pointcuts, lambda _: position)
-            self._model.aspects.append(woven)
+            self._model.enlist([woven])
             return woven
         model, kind = self._model, CompositeAspect if seconds is None else CompositeExecutionAspect
         composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
@@ -403,7 +410,7 @@ class Scope:
             raise
         detour.connect(woven)
         model.graph.positions.setdefault(f"aspect {full}", position)
-        model.aspects.append(woven)
+        model.enlist([woven])
         model.changed()
         return woven
 
@@ -493,14 +500,3 @@ class Composite(Scope):
     def __repr__(self) -> str:
         inputs, outputs = ", ".join(self._text.inputs) or "none", ", ".join(self._text.outputs) or "none"
         return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
-
-
-def _seconds(time: float | str | None, aspect: object, position: Position, problems: Problems) -> float | None:
-    """An execution time in s; None: the aspect does not stand at actors, or not as a model."""
-    if time is not None and isinstance(aspect, Aspect):
-        problems.add(f"{type(aspect).__name__} is no composite, so 'time' is not for weave() to say", position)
-    try:
-        return None if time is None else Parameter(float, unit="s", min=0.0).convert(time)
-    except ParameterError as error:
-        problems.add(f"time: {error}", position)
-        return None

@@ -48,8 +48,9 @@ class WovenAspect:
     """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
 
     ``actors`` are those at which it stands, and what was aimed at: the actor, or a composite around it.  ``model`` is
-    its composite if it is a model itself.  ``readings`` are what its expressions over ports ask for, ``selections``
-    what its parameters with patterns select, ``reads`` the ports that it looks at otherwise.
+    its composite if it is a model itself, ``comes_with_actor`` tells that the actor's class or instance was decorated.
+    ``readings`` are what its expressions over ports ask for, ``selections`` what its parameters with patterns select,
+    ``reads`` the ports that it looks at otherwise.
     """
 
     name: str
@@ -61,6 +62,7 @@ class WovenAspect:
     selections: dict[str, Selection] = field(default_factory=dict)
     reads: list[str] = field(default_factory=list)
     model: AspectModel | None = None
+    comes_with_actor: bool = False
 
     @property
     def kind(self) -> str:

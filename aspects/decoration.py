@@ -1,0 +1,99 @@
+"""Aspects that come with an actor: ``@Noise(deviation=0.1).at("output")`` before a class, or called with an instance.
+
+They are the same objects that a model declares.  Those of a class stand at every instance of it, in every model; each
+instance has random streams and counts of its own, under the name ``PATH.NAME`` (``robot[2].sensor.noise``).  To all
+others they are a part of the actor: at an output they stand before the aspects of the model, at an input or at the
+actor's firings behind these.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from epicycle.actors import Actor, EpicycleError, declared_ports, did_you_mean, has_own_ports
+
+if TYPE_CHECKING:
+    from .core import Aspect
+
+T = TypeVar("T")
+
+_ATTRIBUTE = "_decorations"
+
+
+@dataclass(frozen=True)
+class Decoration:
+    """An aspect, its name, and the ports of an actor at which it is to stand; none: at the actor's firings."""
+
+    aspect: Aspect
+    name: str
+    ports: tuple[str, ...]
+
+    def __call__(self, target: T) -> T:
+        """Let the aspect stand at an actor, or at all actors of a class; returns what was given.
+
+        Raises ``EpicycleError`` if it cannot stand there.
+        """
+        if isinstance(target, Actor):
+            if target.home is not None:
+                raise EpicycleError(
+                    f"{target.path} is part of a model: weave it there, with model.weave({self.name!r}, ..., at=...)"
+                )
+            known, where = decorations(target), target.path
+            directions = {n: p.direction for n, p in {**target.inputs, **target.outputs}.items()}
+            self._check_ports(where, directions)
+        elif isinstance(target, type) and issubclass(target, Actor):
+            known, where = class_decorations(target), target.__name__
+            if not has_own_ports(target):
+                self._check_ports(where, {name: port.direction for name, port in declared_ports(target).items()})
+        else:
+            raise EpicycleError(f"{target!r} is neither an actor nor a class of actors")
+        if any(each.name == self.name for each in known):
+            raise EpicycleError(
+                f"{where} has an aspect {self.name!r} already: give this one another name with name=..."
+            )
+        own: tuple[Decoration, ...] = vars(target).get(_ATTRIBUTE, ())
+        setattr(target, _ATTRIBUTE, (*own, self))
+        return target
+
+    def _check_ports(self, where: str, directions: dict[str, str]) -> None:
+        """Whether the aspect can stand at its ports, of those that there are."""
+        kind, stands_at = type(self.aspect).__name__, self.aspect.stands_at
+        for port in self.ports:
+            if port not in directions:
+                raise EpicycleError(
+                    f"{kind}: {where} has no port {port!r}{did_you_mean(port, directions)}; "
+                    f"its ports: {', '.join(directions) or 'none'}"
+                )
+            if directions[port] not in stands_at:
+                at = f"{' or '.join(sorted(stands_at))}{'s' if 'actor' in stands_at else ' ports'}"
+                raise EpicycleError(f"{kind} stands at {at}, but {port} is an {directions[port]} port of {where}")
+        if len({directions[port] for port in self.ports}) > 1:
+            raise EpicycleError(
+                f"{kind} stands at inputs or at outputs of {where}, not at both: decorate it twice, with two names"
+            )
+
+
+def decoration(aspect: Aspect, ports: tuple[str, ...], name: str) -> Decoration:
+    """What ``Aspect.at`` gives; raises ``EpicycleError``."""
+    kind = type(aspect).__name__
+    if bool(ports) == ("actor" in aspect.stands_at):
+        raise EpicycleError(
+            f"{kind} stands at actors: write at() without ports" if ports else f"{kind} stands at ports: say at which"
+        )
+    name = name or re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind).lower()
+    if not name.isidentifier() or not name.isascii():
+        raise EpicycleError(f"{name!r} is not a name: use letters, digits and _, no digit first")
+    return Decoration(aspect, name, ports)
+
+
+def class_decorations(cls: type) -> tuple[Decoration, ...]:
+    """The aspects that come with an actor class, those of its bases first, in the order in which they were given."""
+    return tuple(each for base in reversed(cls.__mro__) for each in vars(base).get(_ATTRIBUTE, ()))
+
+
+def decorations(actor: Actor) -> tuple[Decoration, ...]:
+    """The aspects that come with an actor, those of its class first."""
+    own: tuple[Any, ...] = vars(actor).get(_ATTRIBUTE, ())
+    return (*class_decorations(type(actor)), *own)
