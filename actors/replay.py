@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from bisect import bisect_left
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -38,6 +39,10 @@ class Replay(Actor):
     def initialize(self) -> None:
         self._times, self._values = self._read()
         self._row = 0
+        self._wake_up()
+
+    def restart(self) -> None:
+        self._row = bisect_left(self._times, self.tag.time)
         self._wake_up()
 
     def _wake_up(self) -> None:

@@ -154,5 +154,9 @@ class SingleEvent(Actor):
     def initialize(self) -> None:
         self.wake_at(self.time)
 
+    def restart(self) -> None:
+        if to_nanoseconds(self.time) >= self.tag.time:
+            self.initialize()
+
     def fire(self) -> None:
         self.output.send(self.value)

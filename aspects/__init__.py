@@ -13,7 +13,8 @@ from .core import (
     Weaver,
 )
 from .decoration import Decoration, class_decorations, decorations
-from .execution import ActorPoint, ExecutionAspect, Job
+from .crash import CrashRestart
+from .execution import ActorPoint, ExecutionAspect, Job, Unit
 from .firing import ExecutionTime, SkipFiring
 from .measurement import (
     Alteration,
@@ -47,6 +48,7 @@ __all__ = [
     "CompositeExecutionAspect",
     "Corrupt",
     "Count",
+    "CrashRestart",
     "Decoration",
     "Drift",
     "Duplicate",
@@ -86,6 +88,7 @@ __all__ = [
     "SkipFiring",
     "StuckAt",
     "Throttle",
+    "Unit",
     "Weaver",
     "class_decorations",
     "decorations",

@@ -235,6 +235,9 @@ class Aspect(Configurable):
         """What becomes of a token while the aspect is not active: it goes on, untouched."""
         point.forward(token)
 
+    def forget(self, point: JoinPoint) -> None:
+        """The actor at which it stands has lost its state in a crash: what it had begun will never be over."""
+
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
         """The figures that it ``reports``, from ``point.shared`` and the time (ns) at which the run ended.
 

@@ -8,8 +8,9 @@ time at which it fires, and what it sends leaves then.  A job that is never forw
 Tokens that come, and wake-ups that fall due, while a job waits are jobs of their own.  An aspect keeps the jobs of one
 actor in their order.  Where several aspects stand at one actor, the first declared is the first to get a job.
 
-An aspect that is aimed at a composite stands at all the actors in it; ``point.unit`` is that composite.  Actors that
-are processes (``run``) are fired by their waits and reads; where they wait for an event of SimPy's (a resource, a
+An aspect that is aimed at a composite stands at all the actors in it, and ``point.unit`` is one for all of them: what
+concerns the composite as a whole, such as a crash, has its stream, memory and events there.  Actors that are
+processes (``run``) are fired by their waits and reads; where they wait for an event of SimPy's (a resource, a
 timeout), no firing resumes them, and so no aspect can hold that up.
 """
 
@@ -18,11 +19,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
-from epicycle.actors import Actor, InputPort, Tag, Wake
+from epicycle.actors import Actor, InputPort, Tag, Wake, random_stream
 
-from .core import Aspect, JoinPoint
+from .core import Aspect, JoinPoint, Weaver
 
 
 @dataclass(eq=False)
@@ -40,6 +41,7 @@ class Job:
     arrivals: dict[InputPort[Any], tuple[list[Any], list[int]]]
     wakes: tuple[Wake, ...] = ()
     watch: Callable[[float], None] | None = None
+    life: int = 0  # how many crashes of the actor were before it; one that comes after it makes an end of it
 
     @property
     def tokens(self) -> dict[str, tuple[Any, ...]]:
@@ -52,15 +54,70 @@ class Job:
         return bool(self.arrivals) or not all(wake.cancelled for wake in self.wakes)
 
 
-class ActorPoint(JoinPoint):
-    """An actor that an aspect stands at; ``unit`` is the path that was aimed at, the actor's or a composite's."""
+class Keeper(Protocol):
+    """What the engine can do with an actor as a whole."""
 
-    unit = ""
+    def suspend(self, point: ActorPoint, keeps: Callable[[Job, ActorPoint], bool]) -> None:
+        """Let the actor not fire until ``resume``; ``keeps`` says whether a job that falls due meanwhile waits."""
+
+    def resume(self, point: ActorPoint) -> None:
+        """Let the actor fire again: first for what was forwarded meanwhile, then for what fell due."""
+
+    def kill(self, actor: Actor) -> None:
+        """Cancel the actor's wake-ups and drop its jobs; its state no longer counts."""
+
+    def restart(self, actor: Actor) -> None:
+        """Let the actor begin anew."""
+
+
+class ActorPoint(JoinPoint):
+    """An actor that an aspect stands at; ``unit`` is what was aimed at, this actor or a composite around it."""
+
+    actor: Actor
+    unit: Unit
 
     @property
     def owner(self) -> str:
         """The path of the actor."""
         return self.port
+
+
+class Unit(JoinPoint):
+    """What an execution aspect was aimed at, as a whole: the ``points`` of the actors that it stands at for it."""
+
+    def __init__(self, path: str, first: ActorPoint, weaver: Weaver, keeper: Keeper) -> None:
+        super().__init__(first.aspect, path, weaver, lambda job: None, first.shared)
+        self.random = random_stream(weaver.seed, path, f"aspect {first.aspect} as a whole")
+        self.points: list[ActorPoint] = []
+        self._readings = first._readings
+        self._keeper = keeper
+
+    @property
+    def owner(self) -> str:
+        """The path of the actor or composite."""
+        return self.port
+
+    def suspend(self, keeps: Callable[[Job, ActorPoint], bool]) -> None:
+        """From now on its actors do not fire.  What is forwarded to them waits; so does a job that falls due, before
+        any aspect gets it, if it ``keeps`` that job.
+        """
+        for point in self.points:
+            self._keeper.suspend(point, keeps)
+
+    def resume(self) -> None:
+        """From now on its actors fire again, at first for the jobs that wait."""
+        for point in self.points:
+            self._keeper.resume(point)
+
+    def kill(self) -> None:
+        """Let its actors lose their state, their wake-ups and what they had begun."""
+        for point in self.points:
+            self._keeper.kill(point.actor)
+
+    def restart(self) -> None:
+        """Let its actors begin anew, in the order of their declaration."""
+        for point in self.points:
+            self._keeper.restart(point.actor)
 
 
 class ExecutionAspect(Aspect, ABC):
@@ -71,6 +128,9 @@ class ExecutionAspect(Aspect, ABC):
 
     stands_at: ClassVar[frozenset[str]] = frozenset({"actor"})
     is_processor: ClassVar[bool] = False
+
+    def begin(self, unit: Unit) -> None:
+        """Called once before the first tag for all that it was aimed at: for what it does of its own accord."""
 
     @abstractmethod
     def schedule(self, job: Job, point: ActorPoint) -> None:

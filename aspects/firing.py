@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from epicycle.actors import Distribution, EpicycleError, Parameter, to_nanoseconds, to_seconds
+from epicycle.actors import EpicycleError, Parameter, to_nanoseconds, to_seconds
 
+from .core import JoinPoint
+from .duration import DurationParameter, drawn
 from .execution import ActorPoint, ExecutionAspect, Job
 from .measured import MeasuredTimes
 
@@ -16,9 +18,9 @@ WAIT, SKIP = "wait", "skip"
 class ExecutionTime(ExecutionAspect):
     """Lets the firings of an actor take time: it fires when that is over, with the tokens that came at the beginning.
 
-    A firing takes ``scale`` * (``time`` + a number from ``distribution`` + the next of the measured ``times``), and at
-    least 0.  An actor does one thing after the other: what falls due meanwhile waits for its turn, or is skipped; a
-    firing for a wake-up always waits, for an actor that misses one may never ask for the next.
+    A firing takes ``scale`` * (``time`` + the next of the measured ``times``).  An actor does one thing after the
+    other: what falls due meanwhile waits for its turn, or is skipped; a firing for a wake-up always waits, for an actor
+    that misses one may never ask for the next.
 
     With ``measure`` nothing is delayed.  Instead the time that each firing takes to compute here and now is recorded as
     the signal ``NAME@ACTOR``, and the ``signals.parquet`` of that run can be given as ``times`` from then on: the run
@@ -29,10 +31,7 @@ class ExecutionTime(ExecutionAspect):
 
     events: ClassVar[tuple[str, ...]] = ("delayed", "skipped")
 
-    time = Parameter(float, 0.0, min=0.0, unit="s", doc="fixed part of the execution time")
-    distribution: Parameter[Distribution | None] = Parameter(
-        Distribution, None, unit="s", doc="law of the random part; one time is drawn for every firing"
-    )
+    time = DurationParameter(0.0, doc="execution time, or a distribution from which one is drawn for every firing")
     times: Parameter[Path | None] = Parameter(
         Path,
         None,
@@ -44,7 +43,7 @@ class ExecutionTime(ExecutionAspect):
 
     def __init__(self, **values: object) -> None:
         super().__init__(**values)
-        if self.measure and (self.time or self.distribution is not None or self.times is not None):
+        if self.measure and (self.time != 0.0 or self.times is not None):
             raise EpicycleError("it cannot measure execution times where they are given: leave one or the other out")
         self._measured = None if self.times is None else MeasuredTimes(self.times)
 
@@ -53,16 +52,17 @@ class ExecutionTime(ExecutionAspect):
             job.watch = point.record
             point.forward(job)
             return
-        seconds = self.time
-        if self.distribution is not None:
-            seconds += float(self.distribution.draw(point.random))
+        seconds = drawn(self.time, point.random)
         if self._measured is not None:
             number = point.memory["number"] = point.memory.get("number", -1) + 1
             seconds += self._measured.of(point.port, number)
-        self._occupy(job, point, to_nanoseconds(max(0.0, self.scale * seconds)))
+        self._occupy(job, point, to_nanoseconds(self.scale * seconds))
 
     def pass_by(self, job: Job, point: ActorPoint) -> None:  # type: ignore[override]
         self._occupy(job, point, 0)  # though it still waits for those before it
+
+    def forget(self, point: JoinPoint) -> None:
+        point.memory.pop("free", None)
 
     def _occupy(self, job: Job, point: ActorPoint, duration: int) -> None:
         now = point.tag.time

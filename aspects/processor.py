@@ -7,26 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from epicycle.actors import Distribution, Parameter, ParameterError, to_nanoseconds, to_seconds
+from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
+from .core import JoinPoint
+from .duration import Duration, DurationParameter, drawn
 from .execution import ActorPoint, ExecutionAspect, Job
 from .selection import ByActorParameter
 
 FCFS, PRIORITY, EDF = "fcfs", "priority", "edf"
-
-
-class _DurationParameter(Parameter[float | Distribution]):
-    """A time in seconds, or a distribution of such."""
-
-    def __init__(self) -> None:
-        super().__init__(float, min=0.0, unit="s")
-
-    def convert(self, value: object) -> float | Distribution | None:
-        if isinstance(value, (Mapping, Distribution)):
-            return Parameter(Distribution, unit="s").convert(value)
-        if isinstance(value, str) and not any(letter.isdigit() for letter in value):
-            raise ParameterError(f"{value!r} is not a time in s, nor a distribution {{type: ..., ...}}")
-        return super().convert(value)
 
 
 class Processor(ExecutionAspect):
@@ -58,9 +46,9 @@ class Processor(ExecutionAspect):
 
     policy = Parameter(str, FCFS, choices=(FCFS, PRIORITY, EDF), doc="which of the firings that are due goes first")
     preemptive = Parameter(bool, True, doc="whether a more urgent firing interrupts the one that goes on")
-    time = Parameter(float, 0.0, min=0.0, unit="s", doc="time that a firing needs, for actors not named in times")
+    time = DurationParameter(0.0, doc="time that a firing needs, or a distribution, for actors not named in times")
     times = ByActorParameter(
-        _DurationParameter(),
+        DurationParameter(),
         words="times or distributions",
         doc="time that a firing needs (s), by actor: {pattern: time or distribution}",
     )
@@ -85,6 +73,10 @@ class Processor(ExecutionAspect):
         else:
             point.forward(job)
 
+    def forget(self, point: JoinPoint) -> None:
+        assert isinstance(point, ActorPoint)
+        self._core(point).remove(point)
+
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
         core: _Core = shared.get("core", _Core())
         return {
@@ -99,10 +91,8 @@ class Processor(ExecutionAspect):
         return core
 
     def _duration(self, point: ActorPoint) -> int:
-        given = self._of(self.times, "times", point)
-        if given is None:
-            given = self.time
-        return to_nanoseconds(max(0.0, given.draw(point.random)) if isinstance(given, Distribution) else given)
+        given: Duration | None = self._of(self.times, "times", point)
+        return to_nanoseconds(drawn(self.time if given is None else given, point.random))
 
     def _task(self, job: Job, point: ActorPoint, duration: int) -> _Task:
         now, limit = point.tag.time, self._of(self.deadlines, "deadlines", point)
@@ -156,6 +146,16 @@ class _Core:
     def busy_until(self, end: int) -> int:
         """How long it has worked before ``end``, which is not before the present."""
         return self._busy + (end - self._begun if self._running is not None else 0)
+
+    def remove(self, point: ActorPoint) -> None:
+        """Drop the firings of an actor that will never be over, now."""
+        now = point.tag.time
+        self._waiting = [task for task in self._waiting if task.point is not point]
+        heapq.heapify(self._waiting)
+        if self._running is not None and self._running.point is point:
+            self._busy += now - self._begun
+            self._running = None
+            self._go_on(now)
 
     def arrive(self, task: _Task, *, preemptive: bool) -> None:
         """Take in a firing, now."""

@@ -151,6 +151,20 @@ class Actor(Configurable):
     def wrapup(self) -> None:
         """Called once after the last tag."""
 
+    def restart(self) -> None:
+        """Called when the actor starts again in the middle of a run, after a crash that cost it its state.
+
+        Its wake-ups have been cancelled then, and its random streams go on.  It begins as before the first tag, by
+        ``initialize``; an actor whose wake-ups keep to times counted from the start of the run looks which are over.
+        """
+        for port in self.inputs.values():
+            if isinstance(port, ParameterPort):
+                port.reset()
+        self.initialize()
+
+    def halt(self) -> None:
+        """Called when a crash costs the actor its state: nothing that it has begun may go on."""
+
     def enter(self, context: Context) -> None:
         """Engine: the actor becomes part of a run."""
         self._context = context

@@ -47,6 +47,14 @@ class Process(Actor):
             self.failure = error  # SimPy raises a copy of it later, from which the actor cannot be told
             raise
 
+    def halt(self) -> None:
+        process = self.process
+        if not process.is_alive:
+            return
+        if process.target.callbacks is not None:
+            process.target.callbacks.remove(process._resume)
+        process._generator.close()  # which leaves its `with` blocks: a resource that it had or waited for is free
+
     @property
     def environment(self) -> Any:
         """The SimPy environment, for resources, conditions and interrupts; its time is in nanoseconds."""

@@ -12,9 +12,9 @@ from time import perf_counter
 from typing import Any
 
 from epicycle.actors import Actor, Tag, Wake
-from epicycle.aspects import Job
+from epicycle.aspects import ActorPoint, Job
 
-from .director import Director
+from .director import ActorError, Director, describe
 from .trace import Arrival, Tracer, TracingDirector
 
 Turn = tuple[int, int, int]  # time (ns), microstep, rank
@@ -30,10 +30,52 @@ class ExecutingDirector(Director):
         self._wakes_due: list[Wake] = []
         self._turn: Turn = (0, 0, 0)  # the latest one
         self._open: tuple[Actor, int] | None = None  # whose turn it is, while the actor itself does nothing
+        # Of the actors that are suspended: by whom, what is to be executed, and what has fallen due.
+        self._gates: dict[Actor, dict[ActorPoint, Callable[[Job, ActorPoint], bool]]] = {}
+        self._held: dict[Actor, list[Job]] = {}
+        self._waiting: dict[Actor, list[Job]] = {}
+        self._forget: dict[Actor, Callable[[], None]] = {}
+        self._lives: dict[Actor, int] = {}  # how often each has been killed
 
-    def weave(self, actor: Actor, way: Callable[[Job], None]) -> None:
-        """Hand the jobs of an actor to aspects, behind which ``execute`` stands."""
+    def weave(self, actor: Actor, way: Callable[[Job], None], forget: Callable[[], None]) -> None:
+        """Hand the jobs of an actor to aspects, behind which ``execute`` stands; ``forget`` tells them of a crash."""
         self._ways[actor] = way
+        self._forget[actor] = forget
+        self._lives[actor] = 0
+
+    def suspend(self, point: ActorPoint, keeps: Callable[[Job, ActorPoint], bool]) -> None:
+        """Let an actor not fire until ``resume``; ``keeps`` says whether a job that falls due meanwhile waits."""
+        gates = self._gates.setdefault(point.actor, {})
+        gates[point] = keeps
+
+    def resume(self, point: ActorPoint) -> None:
+        """Let an actor fire again: first for what it was to do meanwhile, then for what fell due."""
+        actor, gates = point.actor, self._gates[point.actor]
+        del gates[point]
+        if gates:
+            return
+        del self._gates[actor]
+        for job in self._held.pop(actor, ()):
+            self.execute(job)
+        for job in self._waiting.pop(actor, ()):
+            self._ways[actor](job)
+
+    def kill(self, actor: Actor) -> None:
+        """Cancel an actor's wake-ups and drop its jobs."""
+        self._lives[actor] += 1
+        own = self._rank[actor.path]
+        for (_, _, rank), wakes in self._wakes.items():
+            for wake in wakes if rank == own else ():
+                wake.cancel()
+        actor.halt()
+        self._forget[actor]()
+
+    def restart(self, actor: Actor) -> None:
+        """Let an actor begin anew."""
+        try:
+            actor.restart()
+        except Exception as error:
+            raise ActorError(actor.path, self.tag, "restart()", describe(error)) from error
 
     def execute(self, job: Job) -> None:
         """Let the actor fire for a job: at once if it is its turn, or else in the next turn that it can have."""
@@ -63,8 +105,15 @@ class ExecutingDirector(Director):
         try:
             for each in self._ready.pop(turn, ()):
                 self._execute(each)
-            if job.is_wanted:
+            if not job.is_wanted:
+                return
+            gates = self._gates.get(actor)
+            if gates is None:
                 way(job)
+                return
+            kept = [keeps(job, point) for point, keeps in gates.items()]  # all of them are told
+            if all(kept):
+                self._waiting.setdefault(actor, []).append(job)
         finally:
             self._open = None
 
@@ -74,11 +123,19 @@ class ExecutingDirector(Director):
         ports = [port for port in actor.inputs.values() if port.present and port not in later]
         for wake in self._wakes_due:
             wake.due = False
-        return Job(actor, rank, self.last, {port: port.take() for port in ports}, tuple(self._wakes_due))
+        taken = {port: port.take() for port in ports}
+        return Job(actor, rank, self.last, taken, tuple(self._wakes_due), life=self._lives[actor])
 
     def _execute(self, job: Job) -> None:
-        if not job.is_wanted:
+        if job.life != self._lives[job.actor] or not job.is_wanted:
             return
+        if job.actor in self._gates:
+            self._held.setdefault(job.actor, []).append(job)
+        else:
+            self._release(job)
+
+    def _release(self, job: Job) -> None:
+        """Put everything back, and let the actor fire."""
         for wake in job.wakes:
             wake.due = not wake.cancelled
         for port, taken in job.arrivals.items():
@@ -106,10 +163,10 @@ class ExecutingTracingDirector(ExecutingDirector, TracingDirector):
         self._causes[job] = [arrival for arrival in waiting if arrival.port in taken], self._due
         return job
 
-    def _execute(self, job: Job) -> None:
+    def _release(self, job: Job) -> None:
         arrivals, self._due = self._causes.pop(job)
         self._arrivals[job.actor.path] = [*arrivals, *self._arrivals.get(job.actor.path, [])]
-        super()._execute(job)
+        super()._release(job)
 
 
 def director_for(order: dict[str, int], seed: int, tracer: Tracer | None, *, executing: bool) -> Director:

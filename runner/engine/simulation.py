@@ -121,6 +121,7 @@ class Simulation:
             for actor in actors:
                 self._call(actor, "initialize")
                 begun.append(actor)
+            self._wiring.begin()
             # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
             self._wiring.open()
             stopped = director.run(stop, actors, progress, pace)

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag, counted
-from epicycle.aspects import ActorPoint, JoinPoint, Medium
+from epicycle.aspects import ActorPoint, ExecutionAspect, JoinPoint, Medium, Unit
 
 from ..model import Hop, Model, WovenAspect
 from .director import ActorError, Director, LoopError, describe
@@ -39,6 +39,8 @@ class Wiring:
         self.director = director
         self.log = log
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
+        self._aspects = model.aspects
+        self._units: dict[tuple[str, str], Unit] = {}
         self._listeners = listeners
         self._signals = signals
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
@@ -67,7 +69,8 @@ class Wiring:
         if isinstance(director, ExecutingDirector):
             for path, actor in self.graph.actors.items():
                 if path in self._woven_at:
-                    director.weave(actor, self._woven(path, path, director.execute))
+                    way = self._woven(path, path, director.execute)
+                    director.weave(actor, way, partial(self._forget, path))
 
     def director_of(self, path: str) -> Director | LocalDirector:
         """The director that an actor or composite stands under, with its time."""
@@ -258,13 +261,40 @@ class Wiring:
         kind = ActorPoint if is_actor else JoinPoint
         point = kind(name, path, weaver, onward, self.shared(woven), place, woven.readings, source, woven.selections)
         if isinstance(point, ActorPoint):
-            point.unit = woven.actors[path]
+            self._join(point, woven, weaver)
         first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)
         else:  # another connection of the same port: one stream, one memory
             point.random, point.memory, point.counts = first.random, first.memory, first.counts
         return point
+
+    def _join(self, point: ActorPoint, woven: WovenAspect, weaver: Loom) -> None:
+        """Make the join point of an actor part of what the aspect was aimed at."""
+        assert isinstance(self.director, ExecutingDirector)
+        aimed = woven.name, woven.actors[point.port]
+        if aimed not in self._units:
+            self._units[aimed] = Unit(aimed[1], point, weaver, self.director)
+            self.points[woven.name].append(self._units[aimed])
+        point.actor, point.unit = self.graph.actors[point.port], self._units[aimed]
+        point.unit.points.append(point)
+
+    def _forget(self, path: str) -> None:
+        """Tell the aspects at an actor that it has lost its state."""
+        for woven in self._woven_at[path]:
+            woven.aspect.forget(self._points_at[woven.name, path])
+
+    def begin(self) -> None:
+        """Let the aspects begin that act of their own accord."""
+        for woven in self._aspects:
+            for (name, path), unit in self._units.items():
+                if name == woven.name and isinstance(woven.aspect, ExecutionAspect):
+                    try:
+                        woven.aspect.begin(unit)
+                    except (ActorError, LoopError):
+                        raise
+                    except Exception as error:
+                        raise self._error(woven, f"begin() at {path}", error) from error
 
 
 class Loom:

@@ -10,6 +10,7 @@ from epicycle.aspects import (
     Bias,
     Bus,
     Corrupt,
+    CrashRestart,
     Drift,
     Duplicate,
     ExecutionAspect,
@@ -67,6 +68,7 @@ AT_ZERO: list[Aspect] = [
     ExecutionTime(measure=True),
     SkipFiring(probability=0),
     Processor(),
+    CrashRestart(),
     Processor(policy="edf", preemptive=False),
 ]
 
@@ -95,6 +97,7 @@ AT_WORK: list[Aspect] = [
     ExecutionTime(time="1.5 ms"),
     SkipFiring(probability=0.5),
     Processor(time="0.1 ms"),
+    CrashRestart(mtbf="5 ms", repair="2 ms", until="1 s"),
 ]
 
 
