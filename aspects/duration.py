@@ -22,6 +22,9 @@ class DurationParameter(Parameter[Duration]):
     def describe_type(self) -> str:
         return "time or distribution"
 
+    def _expected(self) -> str:
+        return "a time in s >= 0, or a distribution"
+
     def convert(self, value: object) -> Duration | None:
         if isinstance(value, (Mapping, Configurable)):
             return self._of_law.convert(value)

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from epicycle.aspects import Aspect, JoinPoint
+from epicycle.aspects import Aspect, ExecutionAspect, JoinPoint, Unit
 
 
 class Visits:
@@ -27,6 +27,8 @@ class Visits:
         self._points: dict[JoinPoint, JoinPoint] = {}
         setattr(self.aspect, "pass_token", self._pass_token)  # noqa: B010 (they are methods)
         setattr(self.aspect, "pass_by", self._pass_by)  # noqa: B010
+        if isinstance(aspect, ExecutionAspect):
+            setattr(self.aspect, "begin", self._begin)  # noqa: B010
 
     def demand_some(self, at: str | Sequence[str]) -> None:
         """Raise ``AssertionError`` if nothing has passed."""
@@ -44,6 +46,12 @@ class Visits:
     def _pass_by(self, token: Any, point: JoinPoint) -> None:
         self._do(self._original.pass_by, token, point)
 
+    def _begin(self, unit: Unit) -> None:
+        assert isinstance(self._original, ExecutionAspect)
+        muted = self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart"))
+        assert isinstance(muted, Unit)
+        self._original.begin(muted)
+
     def _do(self, method: Callable[[Any, JoinPoint], None], token: Any, point: JoinPoint) -> None:
         known = self._points.get(point)
         if known is None:
@@ -53,11 +61,11 @@ class Visits:
         if not self._acts:
             point.forward(token)
 
-    def _muted(self, point: JoinPoint) -> JoinPoint:
+    def _muted(self, point: JoinPoint, more: Sequence[str] = ()) -> JoinPoint:
         if not self._mutes:
             return point
         muted = copy.copy(point)
-        for method in self._mutes:
+        for method in (*self._mutes, *more):
             setattr(muted, method, _do_nothing)
         if not self._acts:
             setattr(muted, "hold", lambda token: _do_nothing)  # noqa: B010

@@ -283,7 +283,7 @@ run: {{stop: 1 s}}
         ),
         (
             "more: {type: Processor, at: a, times: {a: -1}}",
-            "7:41: error: aspect more.times: a: -1 is out of bounds, expected a number in s >= 0",
+            "7:41: error: aspect more.times: a: -1 is out of bounds, expected a time in s >= 0, or a distribution",
         ),
         (
             "more: {type: Processor, at: a, priorities: [1]}",
