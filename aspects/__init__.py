@@ -12,8 +12,8 @@ from .core import (
     Selection,
     Weaver,
 )
-from .decoration import Decoration, class_decorations, decorations
 from .crash import CrashRestart
+from .decoration import Decoration, class_decorations, decorations
 from .execution import ActorPoint, ExecutionAspect, Job, Unit
 from .firing import ExecutionTime, SkipFiring
 from .measurement import (
