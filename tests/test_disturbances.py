@@ -14,7 +14,8 @@ from scipy import stats
 
 from epicycle.runner import ModelError, Results, Simulation, load_model
 from epicycle.runner.cli import main
-from epicycle.runner.model import packaged_disturbances
+from epicycle.runner.model import Problems, packaged_disturbances
+from epicycle.runner.model.disturbance import load_disturbance
 
 NAMES = sorted(packaged_disturbances())
 
@@ -22,8 +23,6 @@ NAMES = sorted(packaged_disturbances())
 @pytest.mark.parametrize("observers", [0, 4])
 @pytest.mark.parametrize("name", NAMES)
 def test_disturbance_acts_on_the_scenario(name: str, observers: int) -> None:
-    text = packaged_disturbances()[name].read_text(encoding="utf-8")
-    assert f"disturbance: {name}\n" in text
     model = load_model("collision_avoidance", set={"observers": observers}, disturb=name)
     plain = load_model("collision_avoidance", set={"observers": observers})
     own = {woven.name for woven in model.aspects} - {woven.name for woven in plain.aspects}
@@ -35,6 +34,20 @@ def test_disturbance_acts_on_the_scenario(name: str, observers: int) -> None:
     for path, signal in results.signals.items():
         if path.endswith(".state"):
             assert all(math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_disturbance_says_what_it_is(name: str) -> None:
+    problems = Problems()
+    disturbance = load_disturbance(name, problems)
+    assert disturbance is not None
+    assert len(problems) == 0
+    assert disturbance.text.name == name
+    assert len(disturbance.text.doc) > 50
+    assert [each.name for each in disturbance.text.parameters.values() if not (each.doc and each.value)] == []
+    # Why a parameter has its value is said in a comment before it.
+    text = packaged_disturbances()[name].read_text(encoding="utf-8")
+    assert "parameters:\n  #" in text
 
 
 def test_all_of_them_together() -> None:
@@ -147,6 +160,29 @@ def test_sensors_drop_out_in_runs() -> None:
     error = stats.norm.ppf(0.9995) * math.sqrt(1 - 1 / 5) * 5 / math.sqrt(len(lengths))
     assert abs(np.mean(lengths) - 5) < error
     assert np.mean(lengths) > 2.5  # more than the 2 of independent failures
+
+
+def test_a_crashed_robot_is_silent_and_moves_on() -> None:
+    """Meanwhile nothing comes from it but its motion; what it believes begins with the prior again."""
+    settings = {"observers": 7, "mtbf": "2 s", "restart_time": "550 ms", "**.controller.horizon": 3}
+    model = load_model("collision_avoidance", set=settings, disturb="robot_crash")
+    results = Simulation(model, seed=1, keep_log=True).run(until=3)
+    down: dict[str, list[tuple[float, float]]] = {}
+    for record in results.log.records:
+        if record.event == "restarted":
+            down.setdefault(record.actor, []).append((record.tag.seconds - record.value, record.tag.seconds))
+    assert len(down) >= 3
+    for robot, times in down.items():
+        assert list(values(results, f"{robot}.vehicle", "state")) == list(range(31))
+        for actor, port in (("sensor", "measurement"), ("controller", "plan"), ("estimator", "estimate")):
+            said = values(results, f"{robot}.{actor}", port)
+            for begin, end in times:
+                assert end - begin == pytest.approx(0.55)
+                assert [tick for tick in said if begin < tick / 10 < end] == []
+        estimates = values(results, f"{robot}.estimator", "estimate")
+        for begin, end in times:  # from one measurement the filter cannot learn a speed, of which the variance was 4
+            assert estimates[math.ceil(end * 10)].covariance[2, 2] == pytest.approx(4.0)
+            assert estimates[math.floor(begin * 10)].covariance[2, 2] < 3.9
 
 
 def test_a_controller_that_is_ready_by_the_next_tick_is_fast_enough() -> None:
