@@ -1,5 +1,6 @@
 """What can be woven around a model: aspects, and the join points that they act at."""
 
+from .clock import ClockAspect, ClockDrift, ClockOffset
 from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
 from .composite import CompositeAspect, CompositeExecutionAspect, FiringRequest, Request
 from .core import (
@@ -43,6 +44,9 @@ __all__ = [
     "Bias",
     "Bus",
     "ByActorParameter",
+    "ClockAspect",
+    "ClockDrift",
+    "ClockOffset",
     "CommunicationAspect",
     "CompositeAspect",
     "CompositeExecutionAspect",

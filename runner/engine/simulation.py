@@ -112,7 +112,7 @@ class Simulation:
         actors = list(self.model.graph.actors.values())
         director = self.director
         for actor in actors:
-            actor.enter(self._wiring.director_of(actor.path))
+            actor.enter(self._wiring.context_of(actor.path))
             for port in actor.inputs.values():
                 port.clear()  # of what a failed run has left there
         self._started = time.perf_counter()

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag, counted
-from epicycle.aspects import ActorPoint, ExecutionAspect, JoinPoint, Medium, Unit
+from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag, counted, random_stream
+from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint, Medium, Unit
 
-from ..model import Hop, Model, WovenAspect
+from ..model import Clock, Hop, Model, WovenAspect
 from .director import ActorError, Director, LoopError, describe
 from .execution import ExecutingDirector
 from .local import Deliver, LocalDirector, Passage
@@ -50,7 +50,7 @@ class Wiring:
         self._shared: dict[object, dict[Any, Any]] = {}
         self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
         for woven in model.aspects:
-            for path in (*woven.ports, *woven.actors):
+            for path in (*woven.ports, *(() if isinstance(woven.aspect, ClockAspect) else woven.actors)):
                 self._woven_at.setdefault(path, []).append(woven)
             for connection in woven.connections:
                 self._woven_on.setdefault(connection, []).append(woven)
@@ -75,6 +75,18 @@ class Wiring:
     def director_of(self, path: str) -> Director | LocalDirector:
         """The director that an actor or composite stands under, with its time."""
         return self._directors[self.graph.director_of(path)]
+
+    def context_of(self, path: str) -> Director | LocalDirector:
+        """The director as an actor sees it, by its own clock if that is wrong."""
+        clock = before = self.graph.clocks[self.graph.director_of(path)]
+        for woven in self._aspects:
+            if isinstance(woven.aspect, ClockAspect) and path in woven.actors:
+                random = random_stream(self.director.seed, woven.actors[path], f"aspect {woven.name}")
+                ahead, speed = woven.aspect.error(random)
+                clock = Clock(clock.start + ahead, clock.rate * speed)
+        if clock == before:
+            return self.director_of(path)
+        return self.director if clock.is_global else LocalDirector(self.director, clock)
 
     def open(self) -> None:
         """From now on tokens can be sent."""

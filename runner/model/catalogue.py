@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 import epicycle.actors
 import epicycle.aspects
 from epicycle.actors import Actor, Configurable, EpicycleError, Process
-from epicycle.aspects import Aspect
+from epicycle.aspects import Aspect, ClockAspect
 
 GROUPS: dict[type, str] = {Actor: "epicycle.actors", Aspect: "epicycle.aspects"}
 _ENTRY = re.compile(r"[A-Za-z_][\w.]*\s*:\s*[A-Za-z_][\w.]*\s*(\[.*\])?\Z", re.ASCII)
@@ -162,8 +162,12 @@ class Catalogue:
 def built_in() -> Catalogue:
     """What Epicycle's public faces offer; bases that define no behaviour are left out."""
     actors = {name: each for name, each in _public(epicycle.actors, Actor) if each not in (Actor, Process)}
-    aspects = {n: each for n, each in _public(epicycle.aspects, Aspect) if each.pass_token is not Aspect.pass_token}
+    aspects = {name: each for name, each in _public(epicycle.aspects, Aspect) if _does_something(each)}
     return Catalogue(actors, aspects)
+
+
+def _does_something(aspect: type[Aspect]) -> bool:
+    return aspect.pass_token is not Aspect.pass_token or issubclass(aspect, ClockAspect)
 
 
 @cache
