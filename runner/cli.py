@@ -17,14 +17,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command: Callable[[argparse.Namespace, list[str]], int] = options.command
     from epicycle.actors import EpicycleError
 
-    from .engine import ActorError, LoopError
-
     try:
         return command(options, given)
-    except (ActorError, LoopError) as error:
-        complain(f"error: {error}")
-        return FAILED
     except EpicycleError as error:
+        from .engine import ActorError, LoopError  # here, for many commands do without the engine
+
+        if isinstance(error, (ActorError, LoopError)):
+            complain(f"error: {error}")
+            return FAILED
         text = str(error)
         complain(text if ": error: " in text or text.startswith("error: ") else f"error: {text}")
         return BAD_INPUT

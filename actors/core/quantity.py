@@ -128,7 +128,10 @@ class Quantity(float):
 
 
 def _times(number: float, factor: Fraction, pi_power: int) -> float:
-    return float(Fraction(number) * factor * Fraction(math.pi) ** pi_power) if math.isfinite(number) else number
+    if not math.isfinite(number) or (factor == 1 and not pi_power):
+        return number
+    exact = Fraction(number) * factor
+    return float(exact * Fraction(math.pi) ** pi_power if pi_power else exact)
 
 
 def _in(number: float, unit: str, sign: str, other: float) -> float:

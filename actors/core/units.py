@@ -53,7 +53,7 @@ class Unit:
 
 
 def _with_pi(scale: Fraction, pi_power: int) -> float:
-    return float(scale * Fraction(math.pi) ** pi_power)
+    return float(scale * Fraction(math.pi) ** pi_power if pi_power else scale)
 
 
 # --- the units we know --------------------------------------------------------------------------------
@@ -292,12 +292,11 @@ def _split(text: str) -> tuple[Fraction, str] | None:
 
 def convert(value: str | int | float, unit: str) -> float:
     """Return a value counted in `unit`: a bare number is so already, a text may bring its own unit."""
-    wanted = parse_unit(unit)
     try:
         if isinstance(value, str):
-            return _convert_text(value, unit, wanted)
+            return _convert_text(value, unit)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise UnitError(f"{value!r} is not a number, {_expected(unit, wanted)}")
+            raise UnitError(f"{value!r} is not a number, {_expected(unit, parse_unit(unit))}")
         return float(value)
     except OverflowError:
         raise UnitError(f"{_short(value)} is too large for a float") from None
@@ -315,8 +314,9 @@ def in_si(text: str) -> float | None:
         raise UnitError(f"{_short(text)} is too large for a float") from None
 
 
-def _convert_text(text: str, unit: str, wanted: Unit) -> float:
-    split = _split(text)
+@functools.lru_cache(maxsize=4096)  # the copies of an actor have the same quantities
+def _convert_text(text: str, unit: str) -> float:
+    split, wanted = _split(text), parse_unit(unit)
     if split is None:
         raise UnitError(f"{_short(text)} is not a number with a unit, {_expected(unit, wanted)}")
     number, own_text = split

@@ -96,7 +96,6 @@ def seconds(option: str, text: str) -> float:
 def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, dict[str, Any]]:
     """The model that the options describe, and its figures; warnings are printed, or with ``strict`` raised."""
     from ..model import ModelError, Problems, load_model
-    from ..show import figures_of
 
     model = load_model(
         options.model,
@@ -112,6 +111,10 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, d
             complain(str(warning))
     elif model.warnings:
         raise ModelError(replace(warning, severity="error") for warning in model.warnings)
+    if not model.figures:
+        return model, {}
+    from ..show import figures_of
+
     problems = Problems()
     figures = figures_of(model, problems)
     problems.raise_if_any()

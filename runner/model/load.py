@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import gc
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from .catalogue import installed
@@ -44,6 +46,18 @@ def find_library(path: Path) -> Path:
     return next((each for each in (path, *packaged) if each.is_file()), path)
 
 
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Keep the garbage collector from looking through a model again and again while it grows: all of it is kept."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
 def load_model(
     name: str | Path,
     *,
@@ -66,7 +80,29 @@ def load_model(
     problems = Problems()
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += _settings(set, problems)
-    path = find_model(str(name), problems)
+    with _without_collection():
+        text, path, reader = _read_model(str(name), problems)
+        declared = included_composites(text, path, reader, problems)
+        catalogue = installed().with_types(types)
+        composites, broken = inherit(declared, catalogue.actors, problems)
+        check_usage(text, declared, composites, catalogue.actors, problems)
+        # What disturbances set comes first, for the last one wins.
+        settings = add_disturbances(text, map(str, _several(disturb)), problems) + settings
+        for change in without_aspects:
+            without(text, change, problems)
+        for change in aspects:
+            change_aspect(text, change, problems)
+        elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken)
+        model = elaborator.model()
+        try_classes(composites, elaborator.made, problems, catalogue, broken)
+        problems.raise_if_any()
+        model.is_checked = True
+        return model
+
+
+def _read_model(name: str, problems: Problems) -> tuple[ModelText, Path, DeclarationReader]:
+    """The declarations of a model's file, which file that is, and what reads those of the files that it includes."""
+    path = find_model(name, problems)
     if path is None:
         problems.raise_if_any()
         raise AssertionError("a model that is not found is a problem")
@@ -82,22 +118,7 @@ def load_model(
     if text is None:
         problems.raise_if_any()
         raise AssertionError("a model that is no mapping is a problem")
-    declared = included_composites(text, path, reader, problems)
-    catalogue = installed().with_types(types)
-    composites, broken = inherit(declared, catalogue.actors, problems)
-    check_usage(text, declared, composites, catalogue.actors, problems)
-    # What disturbances set comes first, for the last one wins.
-    settings = add_disturbances(text, map(str, _several(disturb)), problems) + settings
-    for change in without_aspects:
-        without(text, change, problems)
-    for change in aspects:
-        change_aspect(text, change, problems)
-    elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken)
-    model = elaborator.model()
-    try_classes(composites, elaborator.made, problems, catalogue, broken)
-    problems.raise_if_any()
-    model.is_checked = True
-    return model
+    return text, path, reader
 
 
 def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:

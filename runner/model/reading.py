@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import Position, Problems, did_you_mean, nearest
@@ -123,13 +124,18 @@ def within(text: Text, part: str) -> Position:
 def split(text: str, sign: str) -> list[tuple[int, int]]:
     """Where the parts begin and end that ``sign`` divides, inside of brackets left aside."""
     parts, depth, start = [], 0, 0
-    for index, character in enumerate(text):
-        if character in "[{(":
+    for found in _divider(sign).finditer(text):
+        if found[0] in ("[", "{", "("):
             depth += 1
-        elif character in "]})":
+        elif found[0] in ("]", "}", ")"):
             depth -= 1
-        elif depth == 0 and text.startswith(sign, index):
-            parts.append((start, index))
-            start = index + len(sign)
+        elif depth == 0:
+            parts.append((start, found.start()))
+            start = found.start() + len(sign)
     parts.append((start, len(text)))
     return parts
+
+
+@lru_cache(maxsize=16)
+def _divider(sign: str) -> re.Pattern[str]:
+    return re.compile(rf"[\[{{(\]}})]|(?={re.escape(sign)})")
