@@ -27,6 +27,7 @@ from .measurement import (
     Quantise,
     Saturate,
     StuckAt,
+    Transform,
 )
 from .media import Bus, Medium
 from .observation import Assert, Count, InvariantError, Probe
@@ -92,6 +93,7 @@ __all__ = [
     "SkipFiring",
     "StuckAt",
     "Throttle",
+    "Transform",
     "Unit",
     "Weaver",
     "class_decorations",

@@ -175,14 +175,16 @@ class Aspect(Configurable):
 
     ``stands_at`` says which ports it can be woven around: inputs (communication), outputs (measurement), or both.
     ``events`` names what it may note, so that summaries show a zero where nothing happened; ``reports`` names the
-    figures that it tells at the end of a run, with their units.  ``in_model_time``: it goes by the time of the model,
-    and not by the clocks of the composites in which it stands.
+    figures that it tells at the end of a run, with their units.  ``alters_parameters``: it may also stand at parameters
+    that are numbers, which it gets as tokens whenever their actors fire.  ``in_model_time``: it goes by the time of the
+    model, and not by the clocks of the composites in which it stands.
     """
 
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled"})
     stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
     events: ClassVar[tuple[str, ...]] = ()
     reports: ClassVar[dict[str, str]] = {}
+    alters_parameters: ClassVar[bool] = False
     in_model_time: ClassVar[bool] = False
 
     from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")

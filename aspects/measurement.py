@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epicycle.actors import EpicycleError, Parameter, texts_parameter
+from epicycle.actors.expression import PortFormulaParameter
 
 from .core import JoinPoint, MeasurementAspect
 from .loss import is_bad, loses, spared
@@ -59,12 +60,13 @@ class MeasurementFailure(MeasurementAspect):
 
 
 class Alteration(MeasurementAspect, ABC):
-    """Base of the aspects that replace the numbers in a measurement: write ``alter``.
+    """Base of the aspects that replace the numbers in a measurement, or a parameter: write ``alter``.
 
     Event: ``replaced``, with the new measurement.  A measurement that stays the same leaves no trace.
     """
 
     events: ClassVar[tuple[str, ...]] = ("replaced",)
+    alters_parameters: ClassVar[bool] = True
 
     fields = texts_parameter((), doc="fields of the measurement that are altered; none: all numbers in it")
 
@@ -138,6 +140,31 @@ class Drift(Alteration):
         walked = walked + math.sqrt(step) * point.random.normal(size=numbers.shape)
         point.memory[place] = walked
         return numbers + self.rate * (point.now - start) + self.walk * walked
+
+
+class Transform(Alteration):
+    """Replaces each number by an expression of it, of the time and of what ports have sent last.
+
+    NaN stays as it is, and so do all numbers as long as one of the ports has sent nothing.
+    """
+
+    to = PortFormulaParameter(
+        given=("value", "time"),
+        doc="expression over the number (value), the time in s (time) and ports, such as value * (1 + 0.01 * time)",
+    )
+
+    def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
+        assert self.to is not None
+        known = ~np.isnan(numbers)
+        new = [point.value_of(self.to, value=float(number), time=point.now) for number in numbers[known]]
+        for each in new:
+            if each is None:  # a port that has sent nothing
+                return numbers
+            if isinstance(each, bool) or not isinstance(each, (int, float)):
+                raise EpicycleError(f"{self.to.source!r} gives {each!r}, which is no number")
+        result = numbers.copy()
+        result[known] = new
+        return result
 
 
 class Outlier(Alteration):

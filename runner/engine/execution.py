@@ -26,6 +26,7 @@ class ExecutingDirector(Director):
     def __init__(self, order: dict[str, int], seed: int, *more: Any) -> None:
         super().__init__(order, seed, *more)
         self._ways: dict[Actor, Callable[[Job], None]] = {}
+        self._refresh: dict[Actor, list[Callable[[], None]]] = {}
         self._ready: dict[Turn, list[Job]] = {}  # what is to be executed in a turn
         self._wakes_due: list[Wake] = []
         self._turn: Turn = (0, 0, 0)  # the latest one
@@ -77,6 +78,10 @@ class ExecutingDirector(Director):
         except Exception as error:
             raise ActorError(actor.path, self.tag, "restart()", describe(error)) from error
 
+    def refresh(self, actor: Actor, refresh: Callable[[], None]) -> None:
+        """Call something before each firing of an actor, when that happens."""
+        self._refresh.setdefault(actor, []).append(refresh)
+
     def execute(self, job: Job) -> None:
         """Let the actor fire for a job: at once if it is its turn, or else in the next turn that it can have."""
         if self._open == (job.actor, job.rank):
@@ -98,6 +103,8 @@ class ExecutingDirector(Director):
         self._turn = turn = (self.last.time, self.last.microstep, rank)
         way = self._ways.get(actor)
         if way is None:
+            for refresh in self._refresh.get(actor, ()):
+                refresh()
             super()._fire(actor, rank)
             return
         job = self._take(actor, rank)
@@ -140,6 +147,8 @@ class ExecutingDirector(Director):
             wake.due = not wake.cancelled
         for port, taken in job.arrivals.items():
             port.give(taken)
+        for refresh in self._refresh.get(job.actor, ()):
+            refresh()
         turn, self._open = self._open, None
         start = perf_counter()
         super()._fire(job.actor, job.rank)

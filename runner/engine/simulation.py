@@ -52,7 +52,7 @@ class Simulation:
         order = firing_order(model.graph)
         keeps = keep_log.keeps if keep_log else None
         self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
-        executing = any(woven.actors for woven in model.aspects)
+        executing = any(woven.actors or woven.parameters for woven in model.aspects)
         self.director = director_for(order, self.seed, tracer, executing=executing)
         self.signals = {name: Signal(name) for name in model.recorded}
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]

@@ -6,7 +6,16 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from epicycle.actors import EpicycleError, InputPort, OutputPort, PortError, Tag, counted, random_stream
+from epicycle.actors import (
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    PortError,
+    Tag,
+    counted,
+    declared_parameters,
+    random_stream,
+)
 from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint, Medium, Unit
 
 from ..model import Clock, Hop, Model, WovenAspect
@@ -14,6 +23,7 @@ from .director import ActorError, Director, LoopError, describe
 from .execution import ExecutingDirector
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog
+from .parameters import VaryingParameter
 from .requests import Requests
 from .signal import Signal
 
@@ -66,11 +76,29 @@ class Wiring:
             for paths in self.graph.borders(composite):
                 self._passages.update({path: Passage(path, director) for path in paths})
         self._emits = self._find()
+        self._varying: list[VaryingParameter] = []
         if isinstance(director, ExecutingDirector):
+            self._vary_parameters(model, director)
             for path, actor in self.graph.actors.items():
                 if path in self._woven_at:
                     way = self._woven(path, path, director.execute)
                     director.weave(actor, way, partial(self._forget, path))
+
+    def _vary_parameters(self, model: Model, director: ExecutingDirector) -> None:
+        """Let the aspects that stand at a parameter change it before each firing of its actor."""
+        standing: dict[str, list[WovenAspect]] = {}
+        for woven in model.aspects:
+            for path in woven.parameters:
+                standing.setdefault(path, []).append(woven)
+        for path, aspects in standing.items():
+            owner, _, name = path.rpartition(".")
+            actor = self.graph.actors[owner]
+            varying = VaryingParameter(actor, declared_parameters(type(actor))[name])
+            entry: Deliver = varying.set
+            for woven in reversed(aspects):
+                entry = self._through(woven, path, path, entry)
+            director.refresh(actor, partial(entry, varying.nominal))
+            self._varying.append(varying)
 
     def director_of(self, path: str) -> Director | LocalDirector:
         """The director that an actor or composite stands under, with its time."""
@@ -97,6 +125,8 @@ class Wiring:
         """From now on none can."""
         for output, _ in self._emits:
             output.disconnect()
+        for varying in self._varying:
+            varying.restore()
 
     def _find(self) -> list[tuple[OutputPort[Any], Emit]]:
         # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.

@@ -12,7 +12,7 @@ from .patterns import PatternError, select
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
 from .scope import Composite
-from .weave import WovenAspect, extent
+from .woven import WovenAspect, extent
 
 __all__ = [
     "Clock",

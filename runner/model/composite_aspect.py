@@ -20,7 +20,8 @@ from .declarations import PartText, PointcutText
 from .graph import Detour, ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
-from .weave import AspectModel, Weaving, WovenAspect
+from .weave import Weaving
+from .woven import AspectModel, WovenAspect
 
 BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
 OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: not the composite's matter

@@ -34,7 +34,7 @@ DIRECTOR_KEYS = ("start", "drift")
 PARAMETER_KEYS = ("value", "unit", "min", "max", "choices", "doc")
 PORT_KEYS = ("type", "doc")
 CONNECTION_KEYS = ("from", "to", "all", "delay")
-POINTCUT_KEYS = ("at", "type", "tag", "port", "request", "time")
+POINTCUT_KEYS = ("at", "type", "tag", "port", "parameter", "request", "time")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
 METRIC_KEYS = ("of", "take", "unit", "doc")
 
@@ -80,6 +80,7 @@ class PointcutText:
     type: Text | None = None
     tag: Text | None = None
     port: Text | None = None
+    parameter: Text | None = None
     request: Text | None = None
     time: Node | None = None
     seconds: float = 0.0

@@ -10,7 +10,8 @@ from epicycle.aspects import Aspect, Decoration, decorations
 from .graph import ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems
-from .weave import Weaving, WovenAspect
+from .weave import Weaving
+from .woven import WovenAspect
 
 Change = Callable[[str, Aspect], Mapping[str, object]]
 

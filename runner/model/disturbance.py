@@ -17,7 +17,7 @@ from .problems import Position, Problems, did_you_mean
 from .settings import Setting, Settings, put_aspect, settings_in
 from .site import node_of
 from .usage import check_own_usage
-from .weave import WovenAspect
+from .woven import WovenAspect
 
 if TYPE_CHECKING:
     from .model import Model

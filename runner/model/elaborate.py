@@ -32,8 +32,8 @@ from .patterns import PathIndex
 from .port_types import PortTypeError, read_type, token_types
 from .problems import Position, Problems, did_you_mean
 from .settings import Settings
-from .weave import WovenAspect, check_processors
 from .wiring import Child, Wiring
+from .woven import WovenAspect, check_processors
 
 MAX_COUNT = 100_000
 MAX_INSTANCES = 200_000  # of actors and composites together

@@ -16,7 +16,8 @@ from .decorated import arranged, weave_decorations
 from .patterns import PathIndex
 from .problems import Problems, did_you_mean
 from .settings import Settings
-from .weave import Weaving, WovenAspect
+from .weave import Weaving
+from .woven import WovenAspect
 
 MAX_SHOWN = 12  # types in one message
 

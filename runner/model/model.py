@@ -21,7 +21,7 @@ from .scope import Composite, Scope
 from .scopes import Scopes, is_within
 from .site import call_site
 from .values import Values
-from .weave import WovenAspect, check_processors
+from .woven import WovenAspect, check_processors
 
 
 class Model(Scope):
@@ -173,6 +173,7 @@ class Model(Scope):
         for woven in self.aspects:
             woven.ports = [port for port in woven.ports if not is_within(port, path)]
             woven.actors = {actor: unit for actor, unit in woven.actors.items() if not is_within(actor, path)}
+            woven.parameters = [each for each in woven.parameters if not is_within(each, path)]
             woven.connections = [ends for ends in woven.connections if not any(is_within(end, path) for end in ends)]
         self.aspects = [
             woven

@@ -75,6 +75,7 @@ class TypeReference:
     has_own_ports: bool
     stands_at: tuple[str, ...]
     events: tuple[str, ...]
+    alters_parameters: bool
     reports: dict[str, str]  # figures at the end of a run, and their units
 
     @property
@@ -108,6 +109,7 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
         has_own_ports=issubclass(cls, Actor) and has_own_ports(cls),
         stands_at=tuple(sorted(cls.stands_at)) if issubclass(cls, Aspect) else (),
         events=tuple(cls.events) if issubclass(cls, Aspect) else (),
+        alters_parameters=issubclass(cls, Aspect) and cls.alters_parameters,
         reports=dict(cls.reports) if issubclass(cls, Aspect) else {},
     )
 

@@ -222,6 +222,7 @@ _POINTCUT: dict[str, tuple[Schema, str]] = {
     "type": (_ref("text"), "The type of the actors and composites at which, or at whose ports, it stands."),
     "tag": (_ref("text"), "A tag of the actors and composites at which, or at whose ports, it stands."),
     "port": (_ref("text"), "The name of the port; none: all ports where it can stand."),
+    "parameter": (_ref("text"), "The name of a parameter of the actors, for an aspect that alters numbers."),
     "request": (_ref("text"), "For an aspect that is a composite: the input by which these tokens come in."),
     "time": (_number("number", 0.0, unit="s"), "For a composite at actors: how long their firings take."),
 }

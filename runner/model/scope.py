@@ -25,8 +25,9 @@ from .problems import Position, Problems, did_you_mean
 from .reading import NAME, Text, within
 from .site import call_site, node_of
 from .values import Values
-from .weave import Weaving, WovenAspect
+from .weave import Weaving
 from .wiring import Child, Wiring
+from .woven import WovenAspect
 
 if TYPE_CHECKING:
     from .model import Model

@@ -10,99 +10,23 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
 from typing import Any
 
-from epicycle.actors import counted, declared_parameters
+from epicycle.actors import declared_parameters
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
-    CompositeExecutionAspect,
-    ExecutionAspect,
     PortsParameter,
     Reading,
-    Selection,
     SelectionParameter,
 )
 
 from .declarations import PointcutText
 from .graph import ModelGraph
 from .patterns import PathIndex, PatternError, matches
-from .problems import Position, Problems, did_you_mean
+from .problems import Position, Problems, did_you_mean, nearest
 from .reading import Text
-
-
-@dataclass
-class AspectModel:
-    """The composite that an aspect is, the port from which it answers, and the port by which each place asks it."""
-
-    path: str
-    kind: str
-    response: str
-    requests: dict[str, str]
-    times: dict[str, float] = field(default_factory=dict)  # how long the firings of an actor take, in s
-
-
-@dataclass
-class WovenAspect:
-    """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
-
-    ``actors`` are those at which it stands, and what was aimed at: the actor, or a composite around it.  ``model`` is
-    its composite if it is a model itself, ``comes_with_actor`` tells that the actor's class or instance was decorated.
-    ``readings`` are what its expressions over ports ask for, ``selections`` what its parameters with patterns select,
-    ``reads`` the ports that it looks at otherwise.
-    """
-
-    name: str
-    aspect: Aspect
-    ports: list[str]
-    connections: list[tuple[str, str]] = field(default_factory=list)
-    actors: dict[str, str] = field(default_factory=dict)
-    readings: dict[PortFormula, list[Reading]] = field(default_factory=dict)
-    selections: dict[str, Selection] = field(default_factory=dict)
-    reads: list[str] = field(default_factory=list)
-    model: AspectModel | None = None
-    comes_with_actor: bool = False
-
-    @property
-    def kind(self) -> str:
-        """The name of its type."""
-        return type(self.aspect).__name__ if self.model is None else self.model.kind
-
-    @property
-    def places(self) -> list[str]:
-        """Where it stands, in words."""
-        connections = (f"{source} -> {destination}" for source, destination in self.connections)
-        return [*self.ports, *connections, *self.actors]
-
-    @property
-    def looks_at(self) -> list[str]:
-        """All ports whose latest tokens it needs to know."""
-        return [*self.reads, *(port for readings in self.readings.values() for port, _ in readings)]
-
-
-def extent(aspects: Iterable[WovenAspect]) -> str:
-    """At how many ports and actors some aspects stand, in words."""
-    places = [(place, "actor" if place in woven.actors else "port") for woven in aspects for place in woven.places]
-    numbers = [(sum(kind == word for _, kind in places), word) for word in ("port", "actor")]
-    said = [counted(number, noun) for number, noun in numbers if number]
-    return " and ".join(said) or "no place"
-
-
-def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> None:
-    """An actor runs on one processor at most."""
-    taken: dict[str, str] = {}
-    for woven in aspects:
-        aspect = woven.aspect
-        if not (isinstance(aspect, (ExecutionAspect, CompositeExecutionAspect)) and aspect.is_processor):
-            continue
-        if twice := [actor for actor in woven.actors if actor in taken]:
-            problems.add(
-                f"aspect {woven.name}: {twice[0]} runs on the processor {taken[twice[0]]!r} already",
-                graph.positions.get(f"aspect {woven.name}"),
-                f"an actor has one processor: leave it out here, with '!{twice[0]}', or there",
-            )
-        taken.update(dict.fromkeys(woven.actors, woven.name))
+from .woven import WovenAspect
 
 
 class Weaving:
@@ -117,6 +41,7 @@ class Weaving:
         self.cls = cls
         self.scope = scope
         self.problems = problems
+        self._parameters: dict[str, bool] = {}  # those that pointcuts select, and whether they are left out again
         self._left_out: set[str] = set()  # ports, which counts for the connections to them, too
         self._is_excused = False  # whether a pointcut selects nothing because there is nothing now
 
@@ -134,6 +59,7 @@ class Weaving:
         """
         before = len(self.problems)
         woven = WovenAspect(self.name, aspect, *self.select(pointcuts))
+        woven.parameters = [path for path, is_left_out in self._parameters.items() if not is_left_out]
         if pointcuts and not woven.places and not self._is_excused and len(self.problems) == before:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
@@ -171,6 +97,8 @@ class Weaving:
 
     def _of(self, pointcut: PointcutText) -> list[str]:
         """The ports at which the aspect can stand, of those that one pointcut selects."""
+        if self._stands_at_parameters(pointcut):
+            return []
         found: list[str] | None = None
         if pointcut.text:
             found = self._matching(pointcut)
@@ -189,6 +117,68 @@ class Weaving:
             )
         return fitting
 
+    def _stands_at_parameters(self, pointcut: PointcutText) -> bool:
+        """Whether a pointcut is aimed at parameters of actors: it says so, or fits no port where it could stand.
+
+        A pattern must name the parameter in full: ``sensor.*`` are ports.
+        """
+        said, pattern = pointcut.parameter, self._full(pointcut.text)
+        owner, _, name = pattern.rpartition(".")
+        if said is None and (not pointcut.text or not owner or "*" in name):
+            return False
+        if not self.cls.alters_parameters:
+            if said is not None:
+                self._problem(f"{self.kind} alters no parameters", said, "leave 'parameter' out")
+            return said is not None
+        if said is not None:
+            chosen, name = self._chosen_owners(pointcut), said.text
+            actors = None if chosen is None else [path for path in self.graph.actors if path in chosen]
+        else:
+            try:
+                if any(self._fits(port) for port in self.ports.select(pattern)):
+                    return False
+                actors = PathIndex(self.graph.actors).select(owner)
+            except PatternError:
+                return False  # which is told of it as a pattern of ports
+        having = [path for path in actors or () if name in declared_parameters(type(self.graph.actors[path]))]
+        if said is not None and actors is not None and not having:
+            names = sorted({each for path in actors for each in declared_parameters(type(self.graph.actors[path]))})
+            self._problem(
+                f"no {_asked(pointcut)} has a parameter {name!r}{did_you_mean(name, names)}",
+                said,
+                f"their parameters: {', '.join(names) or 'none'}",
+            )
+        for path in having:
+            self._enter_parameter(path, name, pointcut)
+        return bool(having) or said is not None
+
+    def _parameter_meant(self, pattern: str) -> tuple[str, ...]:
+        """The parameter of an actor that a pattern nearly names, as advice."""
+        owner, _, name = pattern.rpartition(".")
+        if not self.cls.alters_parameters or owner not in self.graph.actors:
+            return ()
+        meant = nearest(name, declared_parameters(type(self.graph.actors[owner])))
+        return () if meant is None else (f"{owner} has a parameter {meant!r}",)
+
+    def _enter_parameter(self, actor: str, name: str, pointcut: PointcutText) -> None:
+        """Take a parameter of an actor, if it holds numbers that nothing else changes."""
+        path, parameter = f"{actor}.{name}", declared_parameters(type(self.graph.actors[actor]))[name]
+        if pointcut.exclude:
+            self._parameters[path] = True
+        elif parameter.type not in (int, float, int | float):
+            self._problem(f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut)
+        elif vars(self.graph.actors[actor])[name] is None:
+            self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut)
+        elif path in self.graph.ports and self.graph.incoming(path):
+            sender = self.graph.incoming(path)[0].source
+            self._problem(
+                f"{path} gets its values over a connection",
+                pointcut,
+                f"let the aspect stand at {sender!r}, where they come from",
+            )
+        else:
+            self._parameters.setdefault(path, False)
+
     def _matching(self, pointcut: PointcutText) -> list[str] | None:
         """What a pattern selects."""
         full = self._full(pointcut.text)
@@ -201,7 +191,7 @@ class Weaving:
         if not found and not self._excuses(full):
             near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
             advice = self.ports.advice(pointcut.text, self.scope, self._fits)
-            self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, *advice)
+            self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, *advice, *self._parameter_meant(full))
         return found
 
     def _chosen(self, pointcut: PointcutText) -> list[str] | None:

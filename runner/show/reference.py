@@ -108,15 +108,16 @@ def weaving(model: Model) -> RenderableType:
 
 
 def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
-    """For each port and actor where aspects stand, their names, types and given parameters, the outermost first."""
+    """For each place where aspects stand, their names, types and given parameters, the outermost first."""
     found: dict[str, list[tuple[str, str, str]]] = {}
     for woven in model.aspects:
         written = as_written(woven.aspect)
         given = {name: value for name, value in written.items() if name != "type"} if isinstance(written, dict) else {}
         parameters = ", ".join(f"{name}: {shown(value)}" for name, value in given.items())
-        for path in (*woven.ports, *woven.actors):
+        for path in (*woven.ports, *woven.actors, *woven.parameters):
             found.setdefault(path, []).append((woven.name, woven.kind, parameters))
-    return {path: found[path] for path in (*model.graph.ports.nodes, *model.graph.actors) if path in found}
+    places = dict.fromkeys((*model.graph.ports.nodes, *model.graph.actors, *found))  # parameters come last
+    return {path: found[path] for path in places if path in found}
 
 
 # -- as Markdown ----------------------------------------------------------------------------------------------------
@@ -183,7 +184,7 @@ def facts(reference: TypeReference) -> list[str]:
     found = ["Further ports follow from its parameters."] if reference.has_own_ports else []
     if reference.stands_at:
         where = "actors" if "actor" in reference.stands_at else f"{' and '.join(reference.stands_at)} ports"
-        found.append(f"Stands at {where}.")
+        found.append(f"Stands at {where}{', and at parameters' if reference.alters_parameters else ''}.")
     if reference.events:
         found.append(f"Events: {', '.join(reference.events)}.")
     if reference.reports:

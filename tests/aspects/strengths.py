@@ -34,6 +34,7 @@ from epicycle.aspects import (
     SkipFiring,
     StuckAt,
     Throttle,
+    Transform,
 )
 
 AT_ZERO: list[Aspect] = [
@@ -58,6 +59,7 @@ AT_ZERO: list[Aspect] = [
     Noise(deviation=0),
     Bias(by=0),
     Drift(),
+    Transform(to="value"),
     Outlier(probability=0, deviation=3),
     Outlier(probability=0.5, deviation=0),
     Quantise(step=0),
@@ -90,6 +92,7 @@ AT_WORK: list[Aspect] = [
     Noise(deviation=1),
     Bias(by=1),
     Drift(rate=1, walk=1),
+    Transform(to="value + 0.1 * time + 1"),
     Outlier(probability=0.5, deviation=3),
     Quantise(step=0.4),
     Saturate(low=0, high=3),
