@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 
 import networkx as nx
 
-from epicycle.actors import InputPort, accepts, type_name
+from epicycle.actors import InputPort, accepts, counted, type_name
 
 from .graph import Detour, Hop, ModelGraph, Wire
 from .problems import Position, Problems
@@ -125,9 +126,13 @@ def check_connections(graph: ModelGraph, problems: Problems) -> None:
                     f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
                 )
             if len(wires) > 1 and not port.multi:
-                writers = ", ".join(wire.source.path for wire in wires)
+                times = Counter(wire.source.path for wire in wires)
+                writers = ", ".join(
+                    f"{path} ({number} times)" if number > 1 else path for path, number in times.items()
+                )
+                what = f"{counted(len(times), 'sender')} write{'s' if len(times) == 1 else ''}"
                 problems.add(
-                    f"{port.path} takes one connection, but {len(wires)} senders write to it: {writers}",
+                    f"{port.path} takes one connection, but {what} to it: {writers}",
                     wires[1].hops[-1].position,
                     *_first_connection(wires),
                     "connect one of them, or send through an actor that merges them",

@@ -16,7 +16,16 @@ from .problems import Position, Problems, did_you_mean, nearest
 from .settings import Setting, Settings
 from .values import Values
 
-_INDEX = re.compile(r"\[\d+\]")
+_INDEX = re.compile(r"\[(\d+|\*)\]")
+# What people may try to set, and how it is done.
+_NO_PARAMETERS = {
+    "seed": "the seed of a run is the option --seed",
+    "stop": "the time at which a run ends is the option --until",
+    "count": "let the model have a parameter for it: 'count: ${n}'",
+    "priority": "let the model have a parameter for it: 'priority: ${p}'",
+    "enabled": "an aspect is taken out by --without, or let the model have a parameter for it: 'enabled: ${on}'",
+    "at": "an aspect is aimed anew by --aspect name=Type,at=...",
+}
 
 
 class Configurator:
@@ -145,16 +154,29 @@ class Configurator:
         """A setting that no parameter took, unless it is meant for an array that is empty now."""
         if self.graph.is_excused(setting.path):
             return
-        known = list(self.settable)
-        if "[*]" in setting.path:
-            known = list(dict.fromkeys(_INDEX.sub("[*]", path) for path in known))
+        known = list(dict.fromkeys(_in_terms_of(setting.path, path) for path in self.settable))
         owner, _, last = setting.path.rpartition(".")
         beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
-        # The nearest one of the same owner, or else the nearest of all.
-        near = did_you_mean(last, beside).replace("mean '", f"mean '{owner}." if owner else "mean '")
+        if last in _NO_PARAMETERS and last not in beside:
+            self.problems.add(f"{setting.path!r} sets no parameter", setting.position, _NO_PARAMETERS[last])
+            return
+        # One that differs in indices alone, or the nearest one of the same owner, or else the nearest of all.
+        alike = [path for path in known if _INDEX.sub("", path) == _INDEX.sub("", setting.path)]
+        near = did_you_mean(setting.path, alike)
+        near = near or did_you_mean(last, beside).replace("mean '", f"mean '{owner}." if owner else "mean '")
         near = near or did_you_mean(setting.path, known)
         valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
         self.problems.add(f"{setting.path!r} sets no parameter{near}", setting.position, *(() if near else valid))
+
+
+def _in_terms_of(pattern: str, path: str) -> str:
+    """The path with ``[*]`` where the pattern has it, or leaves an index out: ``a[*].b[0]`` for ``a[2].b[0]``."""
+    asked, parts = pattern.split("."), path.split(".")
+    for place, (wanted, part) in enumerate(zip(asked, parts, strict=False)):
+        name, bracket, _ = part.partition("[")
+        if bracket and (wanted == name or wanted.endswith("[*]")):
+            parts[place] = f"{name}[*]"
+    return ".".join(parts)
 
 
 def _place(node: Node, error: ParameterError) -> Position:

@@ -9,8 +9,8 @@ from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
-from .problems import Position, did_you_mean
-from .reading import NAME, NodeReader, Text, inside, split
+from .problems import Position, did_you_mean, nearest
+from .reading import NAME, SURE, NodeReader, Text, inside, split
 
 REDUCTIONS = ("last", "first", "min", "max", "sum", "mean", "count")
 
@@ -345,7 +345,12 @@ class DeclarationReader(NodeReader):
         values = dict(entry.value.entries)
         kind_entry = values.pop("type", None)
         if (kind_entry is None and not derived) or (kind_entry is not None and _is_empty(kind_entry.value)):
-            self.problems.add(f"{kind} {name!r} has no type", entry.key.position, "add 'type: ...'")
+            meant = None if kind_entry is not None else nearest("type", values, SURE)
+            near = f", did you mean 'type' by {meant!r}?" if meant is not None else ""
+            at = entry.key if meant is None else values[meant].key
+            self.problems.add(
+                f"{kind} {name!r} has no type{near}", at.position, *(() if near else ("add 'type: ...'",))
+            )
             return None
         named = entry.key if kind_entry is None else kind_entry.value
         type_name = "" if kind_entry is None else self.text(kind_entry.value, f"the type of {name!r}")

@@ -61,7 +61,8 @@ def _range(left: str, right: str, item: str, array: str, count: int, value: Call
         start = max(start + count, 0)
     if from_end[1]:
         end += count
-    if end < start and (any(from_end) or end == start - 1):
+    is_written = all(_NUMBER.fullmatch(each) for each in (left, right))
+    if end < start and (any(from_end) or (end == start - 1 and not is_written)):
         return range(0)
     if end < start:
         raise BadIndexError(f"{array}[{item}]: the range {start}..{end} runs backwards")

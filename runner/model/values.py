@@ -11,6 +11,7 @@ from epicycle.actors.expression import ExpressionError, check_names, interpolate
 from .declarations import ParameterText
 from .document import Mapping, Node, Scalar, Sequence
 from .problems import Position, Problems
+from .reading import inside
 
 
 class _Missing:
@@ -103,8 +104,6 @@ class Values:
 
 
 def _inside(node: Scalar, error: ExpressionError) -> Position:
-    """Where in the file an expression went wrong; the whole scalar if it is quoted or folded."""
-    at = node.position
-    if node.plain and at.source[at.column - 1 :].startswith(node.text):
-        return Position(at.file, at.line, at.column + error.offset, max(1, error.length), at.source)
-    return at
+    """Where in the file an expression went wrong; the whole scalar if it is folded or has escapes."""
+    part = node.text[error.offset :][: error.length]
+    return inside(node, node.text, error.offset, part or " ")
