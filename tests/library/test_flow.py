@@ -69,7 +69,7 @@ ALIKE = "they must have equally many, for each channel of the input leads to one
         ("Switch", [("input", [[0, 1]]), ("control", [[0, 2]])],
          "it.control is 2, but output has 2 channels, counted from 0"),
         ("Select", [("input", [[0, 1]]), ("control", [[0, -1]])],
-         "it.control is -1, but input has 1 channels, counted from 0"),
+         "it.control is -1, but input has 1 channel, counted from 0"),
         ("Synchronizer", [("input", []), ("input", []), ("input", [])],
          f"it.input has 3 channels and it.output has 2; {ALIKE}"),
         ("Repeat", [("input", [[0, 1]]), ("times", [[0, -1]])],
