@@ -63,7 +63,10 @@ class Parameter(Generic[T]):
     units; the ``unit`` of a ``Configurable`` class is that of the parameters in it that have none of their own.
     ``shape`` makes it an array of floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and
     ``object``, ``(None,)`` a tuple.  ``int | float`` is a number that stays an integer if it is one.
+    A parameter that takes values of several kinds names one parameter for each kind as its ``forms``.
     """
+
+    forms: tuple[Parameter[Any], ...] = ()
 
     def __init__(
         self,

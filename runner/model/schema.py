@@ -420,6 +420,8 @@ def _value(parameter: Parameter[Any]) -> Schema:
 
 
 def _plain_value(parameter: Parameter[Any]) -> Schema:
+    if parameter.forms:
+        return {"anyOf": [_plain_value(form) for form in parameter.forms]}
     if type(parameter).convert is not Parameter.convert:
         return {}  # what a parameter with a conversion of its own takes, only the conversion knows
     if is_part(parameter):
