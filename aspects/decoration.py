@@ -9,10 +9,11 @@ actor's firings behind these.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from epicycle.actors import Actor, EpicycleError, declared_ports, did_you_mean, has_own_ports
+from epicycle.actors import Actor, EpicycleError, declared_parameters, declared_ports, did_you_mean, has_own_ports
 
 if TYPE_CHECKING:
     from .core import Aspect
@@ -24,7 +25,7 @@ _ATTRIBUTE = "_decorations"
 
 @dataclass(frozen=True)
 class Decoration:
-    """An aspect, its name, and the ports of an actor at which it is to stand; none: at the actor's firings."""
+    """An aspect, its name, and the ports (or parameter) of an actor where it is to stand; none: at its firings."""
 
     aspect: Aspect
     name: str
@@ -42,11 +43,12 @@ class Decoration:
                 )
             known, where = decorations(target), target.path
             directions = {n: p.direction for n, p in {**target.inputs, **target.outputs}.items()}
-            self._check_ports(where, directions)
+            self._check_ports(where, directions, declared_parameters(type(target)))
         elif isinstance(target, type) and issubclass(target, Actor):
             known, where = class_decorations(target), target.__name__
             if not has_own_ports(target):
-                self._check_ports(where, {name: port.direction for name, port in declared_ports(target).items()})
+                directions = {name: port.direction for name, port in declared_ports(target).items()}
+                self._check_ports(where, directions, declared_parameters(target))
         else:
             raise EpicycleError(f"{target!r} is neither an actor nor a class of actors")
         if any(each.name == self.name for each in known):
@@ -57,9 +59,12 @@ class Decoration:
         setattr(target, _ATTRIBUTE, (*own, self))
         return target
 
-    def _check_ports(self, where: str, directions: dict[str, str]) -> None:
-        """Whether the aspect can stand at its ports, of those that there are."""
+    def _check_ports(self, where: str, directions: dict[str, str], parameters: Iterable[str]) -> None:
+        """Whether the aspect can stand at its ports, of those that there are, or at a parameter."""
         kind, stands_at = type(self.aspect).__name__, self.aspect.stands_at
+        elsewhere = set(parameters) - set(directions)
+        if self.aspect.alters_parameters and len(self.ports) == 1 and self.ports[0] in elsewhere:
+            return
         for port in self.ports:
             if port not in directions:
                 raise EpicycleError(

@@ -7,9 +7,11 @@ from collections.abc import Callable, Mapping
 from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import Aspect, Decoration, decorations
 
+from .declarations import PointcutText
 from .graph import ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems
+from .reading import Text
 from .weave import Weaving
 from .woven import WovenAspect
 
@@ -17,7 +19,7 @@ Change = Callable[[str, Aspect], Mapping[str, object]]
 
 
 def weave_decorations(
-    actor: Actor, graph: ModelGraph, problems: Problems, position: Position | None, change: Change | None = None
+    actor: Actor, graph: ModelGraph, problems: Problems, position: Position, change: Change | None = None
 ) -> list[WovenAspect]:
     """The aspects that come with an actor; ``change`` tells the parameters that are set from outside."""
     before: list[WovenAspect] = []
@@ -36,12 +38,13 @@ def _weave(
     decoration: Decoration,
     graph: ModelGraph,
     problems: Problems,
-    position: Position | None,
+    position: Position,
     change: Change | None,
 ) -> WovenAspect | None:
     name, aspect = f"{actor.path}.{decoration.name}", decoration.aspect
     own = {**actor.inputs, **actor.outputs}
-    missing = [port for port in decoration.ports if port not in own]
+    at_parameter = [each for each in decoration.ports if each not in own and each in declared_parameters(type(actor))]
+    missing = [port for port in decoration.ports if port not in own and port not in at_parameter]
     if missing:
         ports = ", ".join(own) or "none"
         problems.add(f"aspect {name}: {actor.path} has no port {missing[0]!r}", position, f"its ports: {ports}")
@@ -55,12 +58,13 @@ def _weave(
             problems.add(f"aspect {name}: {error}", position)
             return None
     index = PathIndex(port.path for port in own.values())
-    woven = Weaving(graph, index, name, type(aspect), actor.path, problems).weave(aspect, [], lambda _: position)
-    woven.ports = [own[port].path for port in decoration.ports]
+    pointcuts = [PointcutText.of(Text(each, position)) for each in at_parameter]
+    weaving = Weaving(graph, index, name, type(aspect), actor.path, problems)
+    woven = weaving.weave(aspect, pointcuts, lambda _: position)
+    woven.ports = [own[port].path for port in decoration.ports if port in own]
     woven.actors = {} if decoration.ports else {actor.path: actor.path}
     woven.comes_with_actor = True
-    if position is not None:
-        graph.positions.setdefault(f"aspect {name}", position)
+    graph.positions.setdefault(f"aspect {name}", position)
     return woven
 
 

@@ -50,7 +50,7 @@ class AspectElaborator(Configurator):
         decorated = {cls for cls in set(map(type, self._actors)) if class_decorations(cls)}
         for actor in self._actors:
             if type(actor) in decorated and self.graph.actors.get(actor.path) is actor:
-                position = self.graph.positions.get(actor.path)
+                position = self.graph.positions[actor.path]
                 self.aspects += weave_decorations(actor, self.graph, self.problems, position, self._set_from_outside)
         self.aspects = arranged(self.aspects, self.graph)
         if check_nesting(self.aspects, self.graph, self.problems):

@@ -23,6 +23,15 @@ class AspectModel:
     requests: dict[str, str]
     times: dict[str, float] = field(default_factory=dict)  # how long the firings of an actor take, in s
 
+    def at(self, place: str) -> dict[str, object]:
+        """What a model file would say of a place: the request port, if there are several, and the time."""
+        said: dict[str, object] = {}
+        if len(set(self.requests.values())) > 1:
+            said["request"] = self.requests[place].rpartition(".")[2]
+        if place in self.times:
+            said["time"] = self.times[place]
+        return said
+
 
 @dataclass
 class WovenAspect:

@@ -113,10 +113,11 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
     for woven in model.aspects:
         written = as_written(woven.aspect)
         given = {name: value for name, value in written.items() if name != "type"} if isinstance(written, dict) else {}
-        parameters = ", ".join(f"{name}: {shown(value)}" for name, value in given.items())
-        for path in (*woven.ports, *woven.actors, *woven.parameters):
+        for path in woven.places:
+            here = {**given, **({} if woven.model is None else woven.model.at(path))}
+            parameters = ", ".join(f"{name}: {shown(value)}" for name, value in here.items())
             found.setdefault(path, []).append((woven.name, woven.kind, parameters))
-    places = dict.fromkeys((*model.graph.ports.nodes, *model.graph.actors, *found))  # parameters come last
+    places = dict.fromkeys((*model.graph.ports.nodes, *model.graph.actors, *found))  # the others come last
     return {path: found[path] for path in places if path in found}
 
 

@@ -15,6 +15,7 @@ from epicycle.aspects import PacketLoss, Request
 from epicycle.runner import ActorError, ModelError, Simulation, load_composite, load_model
 from epicycle.runner.engine import Results
 from epicycle.runner.model import Model
+from epicycle.runner.show import aspects_at
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
 import engine_parts
@@ -336,6 +337,16 @@ def test_a_firing_that_is_not_answered_does_not_happen() -> None:
     )
     assert results.aspects["net"] == {"requested": 3, "executed": 0}
     assert not sends(results, "a.output")
+
+
+def test_the_list_of_aspects_says_where_each_comes_in() -> None:
+    crossing = "net: {type: Crossing, at: [{at: a.input, request: east}, {at: t.output -> b.input, request: west}]}"
+    model = firing_pair(f"{crossing}, cpu: {{type: Cpu, at: {{at: b, time: 5 ms}}}}")
+    assert aspects_at(model) == {
+        "a.input": [("net", "Crossing", "request: east")],
+        "b": [("cpu", "Cpu", "time: 0.005")],
+        "t.output -> b.input": [("net", "Crossing", "request: west")],
+    }
 
 
 # -- what cannot be -------------------------------------------------------------------------------------------------

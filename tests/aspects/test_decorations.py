@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, random_stream
-from epicycle.aspects import Bias, ExecutionTime, Latency, MeasurementFailure, Noise, PacketLoss
+from epicycle.aspects import Bias, Drift, ExecutionTime, Latency, MeasurementFailure, Noise, PacketLoss
 from epicycle.runner import Model, ModelError, Simulation
 from epicycle.runner.cli import main
 from epicycle.runner.engine import Results
@@ -119,6 +119,23 @@ def test_at_firings() -> None:
     assert [time for time, _ in sent(run(plain(Slow, "s")), "s")] == [0.1, 1.1, 2.1, 3.1]
 
 
+class Fresh(Scale):
+    """For what is tried on a class."""
+
+
+@Drift(rate=2.0).at("factor")
+class Ageing(Scale):
+    """Its factor grows."""
+
+
+def test_at_parameters() -> None:
+    results = run(plain(Ageing, "s"))
+    assert [value for _, value in sent(results, "s")] == [0.0, 3.0, 10.0, 21.0, 36.0]
+    assert results.aspects == {"s.drift": {"replaced": 4}}
+    with pytest.raises(EpicycleError, match="PacketLoss: Fresh has no port 'factor'; its ports: input, output"):
+        PacketLoss(probability=0.0).at("factor")(Fresh)
+
+
 def test_parameters_from_outside() -> None:
     model = load(
         YAML.format("Skewed"), types=TYPES, set=["s[*].bias.by=5", "s[0].noise.deviation=0", "s[1].bias.from=2 s"]
@@ -143,10 +160,6 @@ def test_the_command_line_shows_them(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert main(["aspects", str(tmp_path / "m.yaml"), "--types", str(tmp_path / "own.py")]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines[1:] == [[f"s[{i}].output", f"s[{i}].bias", "Bias", "by:", "2"] for i in range(2)]
-
-
-class Fresh(Scale):
-    """For what is tried on a class."""
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from typing import Any
 
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 
-from ...model import Model
+from ...model import Model, WovenAspect
 from ...model.clock import Clock
 from ...model.graph import Hop
 
@@ -115,7 +115,7 @@ class _Outliner:
         self.graph = model.graph
         self.standing: dict[str, list[str]] = {}
         for woven in model.aspects:
-            for path in (*woven.ports, *woven.actors):
+            for path in dict.fromkeys((*woven.ports, *woven.actors, *map(_owner, woven.parameters))):
                 self.standing.setdefault(path, []).append(woven.name)
         self.children: dict[str, list[str]] = {"": []}
         self.ports: dict[str, list[str]] = {}
@@ -264,9 +264,7 @@ class _Outliner:
         if path and box.is_composite and depth == 0:
             box.is_closed = True
             within = [
-                woven
-                for woven in self.model.aspects
-                if any(_is_within(owner, path) for owner in (*map(_owner, woven.ports), *woven.actors))
+                woven for woven in self.model.aspects if any(_is_within(each, path) for each in _disturbed(woven))
             ]
             box.aspects = tuple(dict.fromkeys(short_name(woven.name) for woven in within))
         elif box.is_composite:
@@ -338,6 +336,11 @@ def _clock(clock: Clock) -> str:
 def _is_parameter(port: Any) -> bool:
     """Whether a port is that of a parameter, and need not be seen unless something is connected to it."""
     return port is not None and isinstance(getattr(type(port.actor), port.name, None), PortParameter)
+
+
+def _disturbed(woven: WovenAspect) -> list[str]:
+    """The actors and composites at which, or at whose ports and parameters, an aspect stands."""
+    return [*map(_owner, (*woven.ports, *woven.parameters)), *woven.actors]
 
 
 def _owner(path: str) -> str:
