@@ -289,9 +289,10 @@ class DeclarationReader(NodeReader):
     def parameter(self, name: str, entry: Entry) -> ParameterText:
         """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
         result = ParameterText(name, entry.key.position)
-        if name in CONSTANTS or name in FUNCTIONS or iskeyword(name):
+        if name in CONSTANTS or name in FUNCTIONS or name == "index" or iskeyword(name):
+            meaning = "which instance of an array it is" if name == "index" else "something else"
             self.problems.add(
-                f"a parameter cannot be called {name!r}: in expressions, that name means something else",
+                f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}",
                 entry.key.position,
                 "give it another name",
             )

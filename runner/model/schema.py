@@ -164,7 +164,10 @@ _BODY: dict[str, tuple[Schema, str]] = {
     "parameters": (
         {
             **_named("parameter"),
-            "propertyNames": {"pattern": f"^{NAME}$", "not": {"enum": sorted({*CONSTANTS, *FUNCTIONS, *kwlist})}},
+            "propertyNames": {
+                "pattern": f"^{NAME}$",
+                "not": {"enum": sorted({"index", *CONSTANTS, *FUNCTIONS, *kwlist})},
+            },
         },
         "Parameters: 'name: value' or 'name: {value, unit, min, max, choices, doc}'.",
     ),

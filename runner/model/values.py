@@ -83,11 +83,26 @@ class Values:
         return self.missing
 
     def _convert(self, parameter: ParameterText, value: Any) -> Any:
-        default = parameter.value.value if isinstance(parameter.value, Scalar) else None
-        if value is None and isinstance(parameter.value, Scalar) and default is None:
+        default = parameter.value
+        if isinstance(default, (Sequence, Mapping)):
+            kind, word = (list, "list") if isinstance(default, Sequence) else (dict, "mapping")
+            if not isinstance(value, kind):
+                missing = f"a value is missing, expected a {word}"
+                raise ParameterError(missing if value is None else f"{value!r} is not a {word}")
+            return self._each(parameter, None, value)
+        literal = None if default is None else default.value
+        if value is None and default is not None and literal is None:
             return None  # a parameter that may be left empty
+        if isinstance(literal, (int, float)):
+            return self._scalar(parameter, literal, value)
+        return self._each(parameter, literal, value)
+
+    def _each(self, parameter: ParameterText, default: object, value: Any) -> Any:
         if isinstance(value, list):
-            return [self._convert(parameter, item) for item in value]
+            return [self._each(parameter, default, item) for item in value]
+        return self._scalar(parameter, default, value)
+
+    def _scalar(self, parameter: ParameterText, default: object, value: Any) -> Any:
         if parameter.choices:
             return Parameter(str, choices=parameter.choices).convert(value)
         bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}

@@ -109,8 +109,15 @@ def test_ranges_are_slices_with_both_ends(count: int, start: int | None, end: in
     bounds = [each for each in (start, end) if each is not None]
     closed = len(bounds) == 2 and min(bounds) >= 0
     beyond = any(each >= count for each in bounds) and (closed or start is None or expected)
-    if count and ((closed and bounds[1] < bounds[0] - 1) or (beyond and not (closed and bounds[1] == bounds[0] - 1))):
+    if count and (beyond or (closed and bounds[1] < bounds[0])):
         with pytest.raises(BadIndexError):
             resolve(text, "a", count, lambda _: None)
     else:
         assert resolve(text, "a", count, lambda _: None) == (expected, True)
+
+
+@pytest.mark.parametrize(("ends", "expected"), [("1..${0}", []), ("${2}..1", []), ("${1}..${2}", [1, 2])])
+def test_a_range_that_is_computed_may_be_empty(ends: str, expected: list[int]) -> None:
+    assert resolve(ends, "a", 3, lambda text: int(text[2:-1])) == (expected, True)
+    with pytest.raises(BadIndexError, match=r"^a\[\$\{2\}..0\]: the range 2..0 runs backwards$"):
+        resolve("${2}..0", "a", 3, lambda text: int(text[2:-1]))
