@@ -63,18 +63,18 @@ class Keeper(Protocol):
     def resume(self, point: ActorPoint) -> None:
         """Let the actor fire again: first for what was forwarded meanwhile, then for what fell due."""
 
-    def kill(self, actor: Actor) -> None:
+    def kill(self) -> None:
         """Cancel the actor's wake-ups and drop its jobs; its state no longer counts."""
 
-    def restart(self, actor: Actor) -> None:
+    def restart(self) -> None:
         """Let the actor begin anew."""
 
 
 class ActorPoint(JoinPoint):
     """An actor that an aspect stands at; ``unit`` is what was aimed at, this actor or a composite around it."""
 
-    actor: Actor
     unit: Unit
+    keeper: Keeper
 
     @property
     def owner(self) -> str:
@@ -85,12 +85,11 @@ class ActorPoint(JoinPoint):
 class Unit(JoinPoint):
     """What an execution aspect was aimed at, as a whole: the ``points`` of the actors that it stands at for it."""
 
-    def __init__(self, path: str, first: ActorPoint, weaver: Weaver, keeper: Keeper) -> None:
+    def __init__(self, path: str, first: ActorPoint, weaver: Weaver) -> None:
         super().__init__(first.aspect, path, weaver, lambda job: None, first.shared)
         self.random = random_stream(weaver.seed, path, f"aspect {first.aspect} as a whole")
         self.points: list[ActorPoint] = []
         self._readings = first._readings
-        self._keeper = keeper
 
     @property
     def owner(self) -> str:
@@ -102,22 +101,22 @@ class Unit(JoinPoint):
         any aspect gets it, if it ``keeps`` that job.
         """
         for point in self.points:
-            self._keeper.suspend(point, keeps)
+            point.keeper.suspend(point, keeps)
 
     def resume(self) -> None:
         """From now on its actors fire again, at first for the jobs that wait."""
         for point in self.points:
-            self._keeper.resume(point)
+            point.keeper.resume(point)
 
     def kill(self) -> None:
         """Let its actors lose their state, their wake-ups and what they had begun."""
         for point in self.points:
-            self._keeper.kill(point.actor)
+            point.keeper.kill()
 
     def restart(self) -> None:
         """Let its actors begin anew, in the order of their declaration."""
         for point in self.points:
-            self._keeper.restart(point.actor)
+            point.keeper.restart()
 
 
 class ExecutionAspect(Aspect, ABC):

@@ -6,6 +6,7 @@ A chain of actors runs beside another part that carries one token.  Compared wit
 - off: ten aspects that are declared and disabled (`enabled: false`);
 - nowhere: ten whose pointcut selects the ports of a replica of which there are none;
 - elsewhere: one that stands at a port of the other part;
+- around: one that stands at an actor of the other part;
 - asleep: one at a port of the chain that is never active (`from` is after the end), which costs a look at the time;
 - here: one at a port of the chain that passes every token.
 
@@ -54,6 +55,7 @@ PLACES = {
     "off": ", ".join(f"a{n}: {{{LOSS}, enabled: false, at: 'link[*].input'}}" for n in range(10)),
     "nowhere": ", ".join(f"a{n}: {{{LOSS}, at: 'spare[*].input'}}" for n in range(10)),
     "elsewhere": f"a: {{{LOSS}, at: end.input}}",
+    "around": "a: {type: SkipFiring, probability: 0, at: end}",
     "asleep": f"a: {{{LOSS}, from: 1 h, at: 'link[10].input'}}",
     "here": f"a: {{{LOSS}, at: 'link[10].input'}}",
 }

@@ -34,6 +34,7 @@ import simpy
 from simpy.events import EventPriority
 
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake
+from epicycle.aspects import Job
 
 from .pace import Pace
 
@@ -86,7 +87,7 @@ class Director:
         self.seed = seed
         self.firings = 0
         self.last = Tag(_START, 0)  # the latest tag that was handled, or is being handled
-        self._rank = order
+        self.ranks = order  # of actors and of their inputs
         # By the rank of a firing, the ports whose tokens are taken in a later firing of the same actor.
         self._later_ports: dict[int, list[InputPort[Any]]] = {}
         # (time, microstep, rank, sequence, what): deliveries have rank -1, so they come before all firings.
@@ -96,6 +97,7 @@ class Director:
         self._wakes: dict[tuple[int, int, int], list[Wake]] = {}
         self._alarms: set[int] = set()
         self._firing = False
+        self._turn = -1  # the rank of what is handled now
         self._stop_after: Tag | None = None
         self._reason = "no events left"
         self._recent: list[str] = []
@@ -113,20 +115,23 @@ class Director:
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time``; the present or past is the next microstep."""
-        tag = self._tag_at(time)
+        return self.call(actor, self._tag_at(time), self.ranks[actor.path])
+
+    def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
+        """Fire ``actor`` at a tag and rank that are still to come."""
         wake = Wake(tag)
-        key = self._want(actor, tag, self._rank[actor.path])
+        key = self._want(actor, tag, rank)
         self._wakes.setdefault(key, []).append(wake)
         return wake
 
-    def put(self, port: InputPort[Any], channel: int, token: Any) -> None:
-        """Put a token into a port at the present tag."""
+    def put(self, port: InputPort[Any], channel: int, token: Any, turn: Actor | None = None) -> None:
+        """Put a token into a port at the present tag, and fire its actor, or who has the ``turn`` in its place."""
         port.put(token, channel)
-        self._want(port.actor, self.tag, self._rank[port.path])
+        self._want(turn or port.actor, self.tag, self.ranks[port.path])
 
     def trigger(self, actor: Actor) -> None:
         """Fire ``actor`` at the present tag."""
-        self._want(actor, self.tag, self._rank[actor.path])
+        self._want(actor, self.tag, self.ranks[actor.path])
 
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
@@ -143,6 +148,18 @@ class Director:
         if self._stop_after is None:
             self._stop_after = self.tag
             self._reason = reason
+
+    def next_turn(self, rank: int) -> Tag:
+        """The first tag at which a turn of this rank is still to come."""
+        now = self.tag
+        is_over = self._firing and self._turn >= rank
+        return Tag(now.time, now.microstep + 1) if is_over else now
+
+    def set_aside(self, job: Job) -> None:
+        """A firing is put off: what it is for does not belong to the next one of its actor."""
+
+    def put_back(self, job: Job) -> None:
+        """A firing that was put off is the next one of its actor."""
 
     def _tag_at(self, time: int) -> Tag:
         """The tag of a wake-up for ``time``."""
@@ -176,6 +193,7 @@ class Director:
         try:
             while agenda and agenda[0][0] == now:
                 _, microstep, rank, _, what = heapq.heappop(agenda)
+                self._turn = rank
                 tag = self.last
                 if microstep != tag.microstep or now != tag.time:
                     tag = Tag(now, microstep)
@@ -191,7 +209,7 @@ class Director:
                 if microstep > MAX_MICROSTEPS:
                     raise LoopError(now, tuple(dict.fromkeys(self._recent)))
                 if isinstance(what, Actor):
-                    self._fire(what, rank)
+                    self.fire(what, rank)
                 else:
                     what()
         finally:
@@ -210,7 +228,8 @@ class Director:
         later = self._later_ports.get(rank, ())
         return not due and not any(port.present for port in actor.inputs.values() if port not in later)
 
-    def _fire(self, actor: Actor, rank: int) -> None:
+    def fire(self, actor: Actor, rank: int) -> None:
+        """Let an actor fire, in its turn."""
         self.firings += 1
         if self.last.microstep > MAX_MICROSTEPS - 10:
             self._recent.append(actor.path)
@@ -275,9 +294,9 @@ class Director:
 
     def _find_later_ports(self, actors: list[Actor]) -> None:
         for actor in actors:
-            ranks = {self._rank[port.path] for port in actor.inputs.values()} | {self._rank[actor.path]}
+            ranks = {self.ranks[port.path] for port in actor.inputs.values()} | {self.ranks[actor.path]}
             for rank in ranks - {max(ranks)}:
-                self._later_ports[rank] = [port for port in actor.inputs.values() if self._rank[port.path] > rank]
+                self._later_ports[rank] = [port for port in actor.inputs.values() if self.ranks[port.path] > rank]
 
     def _of_process(self, error: Exception, actors: list[Actor]) -> ActorError:
         """The error of a process that SimPy resumed: from there, no firing says whose it was."""

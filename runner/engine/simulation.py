@@ -10,15 +10,14 @@ from typing import Any
 from epicycle.actors import Actor, to_nanoseconds, to_seconds
 
 from ..model import Metric, Model, firing_order
-from .director import ActorError, describe
-from .execution import director_for
+from .director import ActorError, Director, describe
 from .local import Deliver
 from .log import EventLog
 from .log_filter import LogFilter
 from .pace import Pace
 from .results import Reduction, Results
 from .signal import Signal
-from .trace import Tracer, TracingLog
+from .trace import Tracer, TracingDirector, TracingLog
 from .wiring import Wiring
 
 
@@ -52,8 +51,7 @@ class Simulation:
         order = firing_order(model.graph)
         keeps = keep_log.keeps if keep_log else None
         self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
-        executing = any(woven.actors or woven.parameters for woven in model.aspects)
-        self.director = director_for(order, self.seed, tracer, executing=executing)
+        self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
         self.signals = {name: Signal(name) for name in model.recorded}
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
         self._has_run = False

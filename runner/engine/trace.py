@@ -10,8 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import Actor, InputPort, Tag, Wake
+from epicycle.aspects import Job
 
 from .director import Director
+from .execution import is_turn
 from .log import EventLog, Record
 
 
@@ -98,6 +100,7 @@ class TracingDirector(Director):
         self._arrivals: dict[str, list[Arrival]] = {}
         self._asked: dict[Wake, Tag | None] = {}
         self._due: list[Tag | None] = []
+        self._aside: dict[Job, tuple[list[Arrival], list[Tag | None]]] = {}
 
     def wake(self, actor: Actor, time: int) -> Wake:
         wake = super().wake(actor, time)
@@ -105,8 +108,8 @@ class TracingDirector(Director):
             self._asked[wake] = self.tag if self.last.microstep else None
         return wake
 
-    def put(self, port: InputPort[Any], channel: int, token: Any) -> None:
-        super().put(port, channel, token)
+    def put(self, port: InputPort[Any], channel: int, token: Any, turn: Actor | None = None) -> None:
+        super().put(port, channel, token, turn)
         if port.actor.path in self._tracer.actors:
             arrival = Arrival(port.name, channel, token, *self._tracer.origin)
             self._arrivals.setdefault(port.actor.path, []).append(arrival)
@@ -129,10 +132,20 @@ class TracingDirector(Director):
         self._due = [tag for wake, tag in asked if wake.due]
         return idle
 
-    def _fire(self, actor: Actor, rank: int) -> None:
-        if actor.path not in self._tracer.actors:
+    def set_aside(self, job: Job) -> None:
+        taken = {port.name for port in job.arrivals}
+        waiting = self._arrivals.pop(job.actor.path, [])
+        self._arrivals[job.actor.path] = [arrival for arrival in waiting if arrival.port not in taken]
+        self._aside[job] = [arrival for arrival in waiting if arrival.port in taken], self._due
+
+    def put_back(self, job: Job) -> None:
+        arrivals, self._due = self._aside.pop(job)
+        self._arrivals[job.actor.path] = [*arrivals, *self._arrivals.get(job.actor.path, [])]
+
+    def fire(self, actor: Actor, rank: int) -> None:
+        if actor.path not in self._tracer.actors or is_turn(actor):
             self._tracer.end()  # of a process that was resumed before
-            super()._fire(actor, rank)
+            super().fire(actor, rank)
             return
         waiting = self._arrivals.pop(actor.path, [])
         later = {port.name for port in self._later_ports.get(rank, ())}
@@ -140,6 +153,6 @@ class TracingDirector(Director):
         arrivals = [arrival for arrival in waiting if arrival.port not in later]
         self._tracer.begin(Firing(self.last, actor.path, arrivals, self._due))
         try:
-            super()._fire(actor, rank)
+            super().fire(actor, rank)
         finally:
             self._tracer.end()

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from epicycle.actors import (
+    Context,
     EpicycleError,
     InputPort,
     OutputPort,
@@ -20,7 +21,7 @@ from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint
 
 from ..model import Clock, Hop, Model, WovenAspect
 from .director import ActorError, Director, LoopError, describe
-from .execution import ExecutingDirector
+from .execution import Execution
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog
 from .parameters import VaryingParameter
@@ -49,7 +50,8 @@ class Wiring:
         self.director = director
         self.log = log
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
-        self._aspects = model.aspects
+        self._wrong_clocks = [woven for woven in model.aspects if isinstance(woven.aspect, ClockAspect)]
+        self._to_begin: list[tuple[WovenAspect, ExecutionAspect, Unit]] = []
         self._units: dict[tuple[str, str], Unit] = {}
         self._listeners = listeners
         self._signals = signals
@@ -75,16 +77,20 @@ class Wiring:
             self._directors[composite] = director if clock.is_global else LocalDirector(director, clock)
             for paths in self.graph.borders(composite):
                 self._passages.update({path: Passage(path, director) for path in paths})
+        changed = {path.rpartition(".")[0] for woven in model.aspects for path in woven.parameters}
+        self._executions = {
+            path: Execution(actor, director, self._by_clock(path))
+            for path, actor in self.graph.actors.items()
+            if path in self._woven_at or path in changed
+        }
         self._emits = self._find()
         self._varying: list[VaryingParameter] = []
-        if isinstance(director, ExecutingDirector):
-            self._vary_parameters(model, director)
-            for path, actor in self.graph.actors.items():
-                if path in self._woven_at:
-                    way = self._woven(path, path, director.execute)
-                    director.weave(actor, way, partial(self._forget, path))
+        self._vary_parameters(model)
+        for path, execution in self._executions.items():
+            execution.way = self._woven(path, path, execution.execute)
+            execution.forget = partial(self._forget, path)
 
-    def _vary_parameters(self, model: Model, director: ExecutingDirector) -> None:
+    def _vary_parameters(self, model: Model) -> None:
         """Let the aspects that stand at a parameter change it before each firing of its actor."""
         standing: dict[str, list[WovenAspect]] = {}
         for woven in model.aspects:
@@ -97,17 +103,21 @@ class Wiring:
             entry: Deliver = varying.set
             for woven in reversed(aspects):
                 entry = self._through(woven, path, path, entry)
-            director.refresh(actor, partial(entry, varying.nominal))
+            self._executions[owner].refresh.append(partial(entry, varying.nominal))
             self._varying.append(varying)
 
     def director_of(self, path: str) -> Director | LocalDirector:
         """The director that an actor or composite stands under, with its time."""
         return self._directors[self.graph.director_of(path)]
 
-    def context_of(self, path: str) -> Director | LocalDirector:
-        """The director as an actor sees it, by its own clock if that is wrong."""
+    def context_of(self, path: str) -> Context:
+        """What an actor sees of the run."""
+        return self._executions.get(path) or self._by_clock(path)
+
+    def _by_clock(self, path: str) -> Director | LocalDirector:
+        """The director by the clock of an actor, if that is wrong."""
         clock = before = self.graph.clocks[self.graph.director_of(path)]
-        for woven in self._aspects:
+        for woven in self._wrong_clocks:
             if isinstance(woven.aspect, ClockAspect) and path in woven.actors:
                 random = random_stream(self.director.seed, woven.actors[path], f"aspect {woven.name}")
                 ahead, speed = woven.aspect.error(random)
@@ -227,7 +237,10 @@ class Wiring:
         return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
 
     def _put(self, port: InputPort[Any], channel: int) -> Deliver:
-        put = self.director.put
+        put, execution = self.director.put, self._executions.get(port.actor.path)
+        if execution is not None:
+            turn = execution.turn_of(port)
+            return lambda token: put(port, channel, token, turn)
         return lambda token: put(port, channel, token)
 
     def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:
@@ -313,30 +326,29 @@ class Wiring:
 
     def _join(self, point: ActorPoint, woven: WovenAspect, weaver: Loom) -> None:
         """Make the join point of an actor part of what the aspect was aimed at."""
-        assert isinstance(self.director, ExecutingDirector)
         aimed = woven.name, woven.actors[point.port]
         if aimed not in self._units:
-            self._units[aimed] = Unit(aimed[1], point, weaver, self.director)
+            self._units[aimed] = Unit(aimed[1], point, weaver)
             self.points[woven.name].append(self._units[aimed])
-        point.actor, point.unit = self.graph.actors[point.port], self._units[aimed]
+            if isinstance(woven.aspect, ExecutionAspect):
+                self._to_begin.append((woven, woven.aspect, self._units[aimed]))
+        point.keeper, point.unit = self._executions[point.port], self._units[aimed]
         point.unit.points.append(point)
 
     def _forget(self, path: str) -> None:
         """Tell the aspects at an actor that it has lost its state."""
-        for woven in self._woven_at[path]:
+        for woven in self._woven_at.get(path, ()):
             woven.aspect.forget(self._points_at[woven.name, path])
 
     def begin(self) -> None:
         """Let the aspects begin that act of their own accord."""
-        for woven in self._aspects:
-            for (name, path), unit in self._units.items():
-                if name == woven.name and isinstance(woven.aspect, ExecutionAspect):
-                    try:
-                        woven.aspect.begin(unit)
-                    except (ActorError, LoopError):
-                        raise
-                    except Exception as error:
-                        raise self._error(woven, f"begin() at {path}", error) from error
+        for woven, aspect, unit in self._to_begin:
+            try:
+                aspect.begin(unit)
+            except (ActorError, LoopError):
+                raise
+            except Exception as error:
+                raise self._error(woven, f"begin() at {unit.port}", error) from error
 
 
 class Loom:

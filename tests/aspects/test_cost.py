@@ -33,7 +33,7 @@ def test_an_aspect_that_is_off_costs_nothing(bench: ModuleType) -> None:
     assert further(bench, "off", "25 ms") == 0
 
 
-@pytest.mark.parametrize("place", ["nowhere", "elsewhere"])
+@pytest.mark.parametrize("place", ["nowhere", "elsewhere", "around"])
 def test_an_aspect_elsewhere_costs_the_same_however_long_the_run(bench: ModuleType, place: str) -> None:
     assert 0 < further(bench, place, "25 ms") == further(bench, place, "75 ms") < 100
     assert further(bench, "here", "75 ms") > 2.5 * further(bench, "here", "25 ms") > 500 / 3
