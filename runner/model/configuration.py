@@ -67,7 +67,7 @@ class Configurator:
             if name in given:
                 node, scope, instance, later = given[name].value, outer, above, ()
             if (setting := self._setting(full)) is not None:
-                node, scope, instance, later = setting.node, {}, "", ()
+                node, scope, instance, later = setting.node, self.values.outside, "", ()
             if node is None:
                 needs = f"{label}: {composite.name} needs" if path else f"{label} needs"
                 self.problems.add(
@@ -92,7 +92,7 @@ class Configurator:
         changed: dict[str, object] = {}
         for name, parameter in declared_parameters(type(part)).items():
             setting = self._setting(f"{path}.{name}")
-            value = None if setting is None else self.values.of(setting.node, {}, f"{path}.{name}")
+            value = None if setting is None else self.values.of(setting.node, self.values.outside, f"{path}.{name}")
             if setting is None or value is self.values.missing:
                 continue
             try:
@@ -128,7 +128,7 @@ class Configurator:
             node = given[name].value if name in given else None
             scope = names
             if (setting := self._setting(f"{path}.{name}")) is not None:
-                node, scope = setting.node, {}
+                node, scope = setting.node, self.values.outside
             if node is None:
                 if parameter.required:
                     self.problems.add(

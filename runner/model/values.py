@@ -25,6 +25,7 @@ class Values:
 
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
+        self.outside: dict[str, object] = {}  # the names that a value knows which is set from outside: none
         self.of_model: Container[str] = ()  # the model's own parameters, which composites do not see
 
     def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Collection[str] = ()) -> Any:
@@ -63,13 +64,15 @@ class Values:
             return self.missing
 
     def _unseen(self, text: str, names: Container[str]) -> tuple[str, ...]:
-        """What to do about a name of the model's that is not known inside a composite."""
+        """What to do about a name of the model's that is not known inside a composite, or outside of the model."""
         try:
             unseen = sorted(name for name in names_in(text) if name not in names and name in self.of_model)
         except ExpressionError:
             return ()
         if not unseen:
             return ()
+        if names is self.outside:
+            return ("what is set from outside knows no names of the model: write out its value",)
         return (f"a composite knows its own parameters only: declare {unseen[0]!r} there, and hand it down",)
 
     def declared(self, full: str, parameter: ParameterText, value: Any, position: Position, scope: str = "") -> Any:
