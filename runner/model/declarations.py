@@ -27,7 +27,7 @@ MODEL_KEYS = (
     "metrics",
     "figures",
 )
-DISTURBANCE_KEYS = ("disturbance", "doc", "set", "parameters", "aspects")
+DISTURBANCE_KEYS = ("disturbance", "doc", "set", "parameters", "composites", "aspects")
 LIBRARY_KEYS = ("doc", "include", "composites")
 COMPOSITE_KEYS = ("doc", "extends", "parameters", "inputs", "outputs", "director", "actors", "connections", "aspects")
 DIRECTOR_KEYS = ("start", "drift")

@@ -12,6 +12,7 @@ from .catalogue import installed
 from .declarations import DISTURBANCE_KEYS, CompositeText, DeclarationReader, ModelText, ParameterText
 from .document import Mapping, Node, Scalar, read
 from .elaborate import Elaborator
+from .inheritance import inherit
 from .packaged import is_path, packaged_disturbances
 from .problems import Position, Problems, did_you_mean
 from .settings import Setting, Settings, put_aspect, settings_in
@@ -25,9 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass
 class Disturbance:
-    """A file of aspects, with parameters of their own and values for those of the model."""
+    """A file of aspects, with parameters and classes of their own and values for parameters of the model."""
 
     text: CompositeText
+    composites: dict[str, CompositeText] = field(default_factory=dict)
     settings: list[Setting] = field(default_factory=list)
 
 
@@ -84,9 +86,11 @@ def _declared(node: Node, problems: Problems) -> Disturbance | None:
     for key, entry in reader.named(entries, "aspects"):
         if (part := reader.part(key, entry, "aspect")) is not None:
             text.aspects[key] = part
+    classes = ModelText(text)
+    reader.library({key: entry for key, entry in entries.items() if key == "composites"}, classes)
     if len(problems) == before:
         check_own_usage(text, problems)
-    return Disturbance(text, settings)
+    return Disturbance(text, classes.composites, settings)
 
 
 def _settings(node: Node, problems: Problems) -> list[Setting]:
@@ -102,13 +106,11 @@ def _settings(node: Node, problems: Problems) -> list[Setting]:
     return []
 
 
-def add_disturbances(text: ModelText, names: Iterable[str], problems: Problems) -> list[Setting]:
-    """Add what disturbances hold to a model; what they set of the model's own parameters is returned.
-
-    Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
-    after the model's own, but one that has the name of another stands in its place.
-    """
-    settings: list[Setting] = []
+def load_disturbances(
+    names: Iterable[str], composites: dict[str, CompositeText], problems: Problems
+) -> list[Disturbance]:
+    """Disturbances by their names or paths; their classes join those of the model."""
+    found: list[Disturbance] = []
     seen: set[str] = set()
     for name in names:
         if name in seen:
@@ -118,6 +120,26 @@ def add_disturbances(text: ModelText, names: Iterable[str], problems: Problems) 
         disturbance = load_disturbance(name, problems)
         if disturbance is None:
             continue
+        for key, composite in disturbance.composites.items():
+            if (first := composites.get(key)) is not None:
+                problems.add(
+                    f"there is a composite {key!r} already",
+                    composite.position,
+                    f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
+                )
+            composites.setdefault(key, composite)
+        found.append(disturbance)
+    return found
+
+
+def add_disturbances(text: ModelText, disturbances: Iterable[Disturbance], problems: Problems) -> list[Setting]:
+    """Add what disturbances hold to a model; what they set of the model's own parameters is returned.
+
+    Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
+    after the model's own, but one that has the name of another stands in its place.
+    """
+    settings: list[Setting] = []
+    for disturbance in disturbances:
         _add_parameters(disturbance.text, text.root, problems)
         for part in disturbance.text.aspects.values():
             put_aspect(text, part)
@@ -164,6 +186,12 @@ def disturb(
     problems.raise_if_any()
     node = node_of(values, position)
     settings = Settings(settings_in(node, problems) if isinstance(node, Mapping) else [])
-    found = Elaborator(ModelText(root), {}, settings, problems, installed().with_types(types)).woven(model.graph)
+    catalogue = installed().with_types(types)
+    composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
+    before = set(model.graph.composites)
+    found = Elaborator(ModelText(root), composites, settings, problems, catalogue, broken).woven(model.graph)
+    if problems.found:  # then nothing has changed
+        for each in root.aspects.keys() & model.graph.composites.keys() - before:
+            model.forget(each)
     problems.raise_if_any()
     return found

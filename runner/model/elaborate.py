@@ -28,7 +28,6 @@ from .elaborate_aspects import AspectElaborator
 from .graph import ModelGraph
 from .model import Model
 from .observation import Observation
-from .patterns import PathIndex
 from .port_types import PortTypeError, read_type, token_types
 from .problems import Position, Problems, did_you_mean
 from .settings import Settings
@@ -100,9 +99,8 @@ class Elaborator(AspectElaborator):
         """The aspects that the text declares, woven around a graph that is there."""
         self.graph = graph
         names = self._parameters("", self.text.root, {}, {}, None)
-        ports = PathIndex(graph.ports.nodes)
-        for name, part in self.text.root.aspects.items():
-            self._aspect(name, "", part, names, ports)
+        self._body("", self.text.root, names, ())
+        self._weave()
         for setting in self.settings.unused():
             self._add_unused(setting)
         return self.aspects
@@ -354,8 +352,9 @@ class Elaborator(AspectElaborator):
     ) -> Child | None:
         """Make the composite that an aspect is; one that is not enabled is made for trial alone."""
         full = f"{path}.{part.name}" if path else part.name
-        clash = "an actor" if part.name in composite.actors else "a port"
-        if part.name in (*composite.actors, *composite.inputs, *composite.outputs):
+        is_port = part.name in composite.inputs or part.name in composite.outputs
+        if is_port or part.name in composite.actors or full in self.graph.actors or full in self.graph.composites:
+            clash = "a port" if is_port else "an actor"
             self.problems.add(
                 f"{full!r} is the name of {clash} and of an aspect that is a model", part.position, "rename one"
             )

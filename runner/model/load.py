@@ -9,7 +9,7 @@ from pathlib import Path
 
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
-from .disturbance import add_disturbances
+from .disturbance import add_disturbances, load_disturbances
 from .document import Mapping as MappingNode
 from .document import read
 from .elaborate import Elaborator
@@ -84,10 +84,11 @@ def load_model(
         text, path, reader = _read_model(str(name), problems)
         declared = included_composites(text, path, reader, problems)
         catalogue = installed().with_types(types)
+        disturbances = load_disturbances(map(str, _several(disturb)), declared, problems)
         composites, broken = inherit(declared, catalogue.actors, problems)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What disturbances set comes first, for the last one wins.
-        settings = add_disturbances(text, map(str, _several(disturb)), problems) + settings
+        settings = add_disturbances(text, disturbances, problems) + settings
         for change in without_aspects:
             without(text, change, problems)
         for change in aspects:

@@ -94,6 +94,7 @@ class Model(Scope):
 
         found = disturb(self, str(disturbance), set or {}, types, call_site())
         self.enlist(found)
+        self.changed()
         return found
 
     # -- what is watched ------------------------------------------------------------------------------------------

@@ -609,6 +609,47 @@ def test_a_loaded_model_can_be_changed(tmp_path: Path) -> None:
     assert run(model).digest == run(pair("")).digest
 
 
+DISTURBANCE = """
+disturbance: congestion
+parameters: {time: {value: 100 ms, doc: how long a message takes}}
+composites:
+  Line2:
+    parameters: {time: }
+    inputs: [request]
+    outputs: [response]
+    actors: {server: {type: Server, service_time: "${time}"}}
+    connections: [request -> server.input, server.output -> response]
+aspects:
+  net: {type: Line2, time: "${time}", at: [a.input, b.input]}
+"""
+
+
+def test_a_disturbance_brings_its_model_along(tmp_path: Path) -> None:
+    path = tmp_path / "congestion.yaml"
+    path.write_text(DISTURBANCE, encoding="utf-8")
+    text = PAIR.replace("{ASPECTS}", "{}")
+    loaded = load(text, disturb=path)
+    assert [time for time, *_ in acts(run(loaded), "delivered")][:2] == [0.1, 0.2]
+    assert [time for time, *_ in acts(run(load(text, disturb=path, set=["time=1 ms"])), "delivered")][:1] == [0.001]
+    later = load(text)
+    later.disturb(path)
+    assert run(later).digest == run(loaded).digest
+    later.unweave("net")
+    assert run(later).digest == run(load(text)).digest
+
+    path.write_text(DISTURBANCE.replace("b.input]", "b.inptu]"), encoding="utf-8")
+    with pytest.raises(ModelError, match=r"'b.inptu' matches no port"):
+        later.disturb(path)
+    assert run(later).digest == run(load(text)).digest
+    path.write_text(DISTURBANCE.replace("Line2", "Line"), encoding="utf-8")
+    with pytest.raises(ModelError, match=r"there is a composite 'Line' already"):
+        load(text, disturb=path)
+    path.write_text(DISTURBANCE.replace("net:", "a:"), encoding="utf-8")
+    for attempt in (lambda: later.disturb(path), lambda: load(text, disturb=path)):
+        with pytest.raises(ModelError, match=r"'a' is the name of an actor and of an aspect that is a model"):
+            attempt()
+
+
 def test_the_streams_of_a_model_in_an_aspect_are_its_own() -> None:
     """Another aspect, before or behind, moves no random number inside."""
     random = PAIR.replace('service_time: "${time}"', "distribution: {type: Exponential, mean: 0.1}")
