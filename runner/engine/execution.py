@@ -91,7 +91,7 @@ class Execution:
     def _fallen_due(self, turn: _Turn) -> Job:
         """Take the tokens out of the ports and the wake-ups back, as if they had not come yet."""
         due = [wake for wake in self._asked if wake.due] if turn is self._own else []
-        if due:
+        if self._asked:
             self._asked = [wake for wake in self._asked if not (wake.due or wake.cancelled)]
         for wake in due:
             wake.due = False

@@ -538,6 +538,49 @@ def test_an_error_in_an_aspect_names_it() -> None:
     assert str(caught.value).partition("\n")[0] == "aspect it failed in pass_token() at a at (0 s, 1): KeyError: 'x'"
 
 
+def test_a_class_that_does_without_an_actor_does_without_its_aspect() -> None:
+    text = """
+composites:
+  Pair:
+    inputs: [go]
+    actors: {one: {type: Scale}, two: {type: Scale}}
+    connections: [go -> one.input, go -> two.input]
+    aspects: {slow: {type: ExecutionTime, time: 1 s, at: [one, two]}, lazy: {type: SkipFiring, probability: 1, at: two}}
+  Single: {extends: Pair, actors: {two: null}}
+actors: {t: {type: Ticker}, single: {type: Single}}
+connections: [t.output -> single.go]
+run: {stop: 3 s}
+"""
+    model, results = simulate(text)
+    assert {woven.name: woven.actors for woven in model.aspects} == {"single.slow": {"single.one": "single.one"}}
+    assert [time for time, _ in sent(results, "single.one")] == [1, 2, 3]
+
+
+def test_wake_ups_that_are_taken_back_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A timer that every token winds up anew."""
+
+    def act(self: Plan) -> None:
+        if self.input.present:
+            if self.input.value:
+                self.wake.cancel()
+            self.wake = self.wake_in(1.5)
+        else:
+            self.output.send("over")
+
+    monkeypatch.setattr(Plan, "act", act)
+    text = """
+actors: {t: {type: Ticker, limit: 200}, plan: {type: Plan}}
+connections: [t.output -> plan.input]
+aspects: {it: {type: SkipFiring, probability: 0, at: plan}}
+run: {stop: 300 s}
+"""
+    model = load(text)
+    simulation = Simulation(model, keep_log=True)
+    results = simulation.run()
+    assert sent(results, "plan") == [(200.5, "over")]
+    assert len(simulation._wiring._executions["plan"]._asked) < 3
+
+
 def test_streams_belong_to_actors() -> None:
     both = PARTS.format('type: SkipFiring, probability: 0.5, at: "**"').replace("9 ms", "99 ms")
     one = both.replace('"**"', '"pair[1].one"')
