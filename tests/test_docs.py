@@ -20,6 +20,7 @@ import pytest
 
 from epicycle.runner import ModelError, Simulation, load_model
 from epicycle.runner.cli import main
+from epicycle.runner.model.catalogue import built_in
 
 ROOT = Path(__file__).parent.parent
 TUTORIALS = sorted((ROOT / "docs" / "tutorial").glob("*.md"))
@@ -142,6 +143,12 @@ def test_links_lead_somewhere() -> None:
         for target in re.findall(r"\]\(([^)#]+)\)", path.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (path.parent / target).exists(), f"{path.name} links to {target}"
+
+
+def test_every_aspect_is_in_the_table_of_families() -> None:
+    document = (ROOT / "docs" / "aspects.md").read_text(encoding="utf-8")
+    families = "".join(line for line in document[: document.index("\n## ")].splitlines() if line.startswith("| "))
+    assert set(re.findall(r"`([A-Z]\w+)`", families)) == set(built_in().aspects)
 
 
 def refresh(path: Path) -> None:
