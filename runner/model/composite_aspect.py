@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 import networkx as nx
 
@@ -91,9 +90,11 @@ class ModelWeaving(Weaving):
     def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         ports, connections, actors = super().select(pointcuts)
         actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
-        for known in (self.model.requests, self.model.times):
-            of_units: dict[str, Any] = dict(known) if actors else {}
-            known.update({actor: of_units[unit] for actor, unit in actors.items() if unit in of_units})
+        # What was aimed at may be left out again, and of actors it is the composite around them.
+        aimed = {place: place for place in (*ports, *(_place(*ends) for ends in connections))} | actors
+        requests, times = self.model.requests, self.model.times
+        self.model.requests = {place: requests[unit] for place, unit in aimed.items() if unit in requests}
+        self.model.times = {place: times[unit] for place, unit in aimed.items() if unit in times}
         return ports, connections, actors
 
     def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> list[str]:

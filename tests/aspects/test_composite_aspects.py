@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort
@@ -145,6 +146,38 @@ def test_receivers_wait_for_what_comes_through_an_aspect(place: str) -> None:
     ]
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_an_aspect_is_as_good_as_actors_in_the_connections(seed: int) -> None:
+    """In random networks: all fires at the same tags with the same values, if each place has an aspect of its own."""
+    random = np.random.default_rng(seed)
+    names = [f"n{i}" for i in range(8)]
+    hops: list[tuple[str, int]] = []
+    for i in range(8):
+        known = ["t", *names[:i]]
+        hops += [(known[k], i) for k in random.permutation(len(known))[: random.integers(1, 4)]]
+    chosen = [hops[k] for k in random.permutation(len(hops))[:4]]
+    actors = "".join(f"  {name}: {{type: AddSubtract}}\n" for name in names)
+
+    def text(through: list[tuple[str, int]], aspects: str, more: str) -> str:
+        ways = []
+        for k, (source, i) in enumerate(hops):
+            if (source, i) in through:
+                ways += [f"{source}.output -> i{k}.input", f"i{k}.output -> n{i}.plus"]
+            else:
+                ways.append(f"{source}.output -> n{i}.plus")
+        return (
+            f"{CLASSES}actors:\n  t: {{type: Ticker}}\n{actors}{more}connections: [{', '.join(ways)}]\n"
+            f"aspects: {{{aspects}}}\nrun: {{stop: 3 s}}"
+        )
+
+    woven = ", ".join(f"w{k}: {{type: Line, at: {a}.output -> n{i}.plus}}" for k, (a, i) in enumerate(chosen))
+    inserted = "".join(f"  i{k}: {{type: Scale, factor: -1}}\n" for k, hop in enumerate(hops) if hop in chosen)
+    results = [run(load(text([], woven, ""))), run(load(text(chosen, "", inserted)))]
+    found, expected = ([send for send in sends(each) if send[1][0] in "tn"] for each in results)
+    assert sorted(found) == sorted(expected)
+    assert len(found) == 4 * 9
+
+
 def test_request_ports() -> None:
     results = run(pair("net: {type: Crossing, at: [{at: a.input, request: east}, {at: b.input, request: west}]}"))
     assert acts(results, "delivered")[:3] == [
@@ -208,6 +241,14 @@ def test_other_ports_are_connected_and_recorded() -> None:
     results = run(load(text + "metrics: {peak: {of: net.load, take: max}}"))
     assert results.metrics == {"peak": 1}
     assert [value for *_, value in sends(results, "sink.output")] == list(results.signals["net.load"].tokens)
+
+
+def test_what_is_left_out_is_no_way_into_it() -> None:
+    """Or else the load of the desk would seem to go through the desk itself, within a tag."""
+    text = PAIR.replace("b.output -> j.input]", "b.output -> j.input, net.load -> sink.input]")
+    text = text.replace("  j: {type: Join}", "  j: {type: Join}\n  sink: {type: Scale}")
+    results = run(load(text.replace("{ASPECTS}", '{net: {type: Desk, at: ["*.input", "!sink.input", "!j.input"]}}')))
+    assert results.aspects["net"]["requested"] == 6
 
 
 TWINS = (
