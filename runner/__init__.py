@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .engine import ActorError, Results, Signal, Simulation
     from .model import Composite, Model, ModelError, load_composite, load_model
+    from .study import StudyResults, open_study
     from .trial import Trial
 
 __all__ = [
@@ -18,9 +19,11 @@ __all__ = [
     "Results",
     "Signal",
     "Simulation",
+    "StudyResults",
     "Trial",
     "load_composite",
     "load_model",
+    "open_study",
 ]
 
 _HOMES = {
@@ -34,6 +37,8 @@ _HOMES = {
     "ModelError": "model",
     "load_composite": "model",
     "load_model": "model",
+    "StudyResults": "study",
+    "open_study": "study",
 }
 
 

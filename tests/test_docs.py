@@ -21,6 +21,7 @@ import pytest
 from epicycle.runner import ModelError, Simulation, load_model
 from epicycle.runner.cli import main
 from epicycle.runner.model.catalogue import built_in
+from epicycle.runner.study import Plan, read_study
 
 ROOT = Path(__file__).parent.parent
 TUTORIALS = sorted((ROOT / "docs" / "tutorial").glob("*.md"))
@@ -68,7 +69,9 @@ def test_models_run(name: str, text: str, tmp_path: Path) -> None:
         yaml = snippets("yaml")
         text = yaml[[each for each, _ in yaml].index(name) - 1][1]
     path.write_text(text, encoding="utf-8")
-    if text.startswith("disturbance:"):
+    if text.startswith("study:"):
+        assert Plan.made(read_study(path)).size > 0
+    elif text.startswith("disturbance:"):
         assert Simulation(load_model("collision_avoidance", disturb=path)).run(until=0.5).events > 0
     else:
         assert Simulation(load_model(path, overrides=[overrides])).run().events > 0

@@ -1,4 +1,4 @@
-"""list the packaged models and disturbances"""
+"""list the packaged models, disturbances and studies"""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 
 from .options import DONE
 
-DESCRIPTION = "List the models that come with Epicycle, and the disturbances for the option --disturb."
+DESCRIPTION = "List the models that come with Epicycle, the disturbances for --disturb, and the studies."
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -14,9 +14,10 @@ def add(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
-    """Print every packaged model and disturbance with the first sentence of its doc."""
-    from ..model import Problems, load_model, packaged_disturbances, packaged_models
+    """Print every packaged model, disturbance and study with the first sentence of its doc."""
+    from ..model import Problems, load_model, packaged_disturbances, packaged_models, packaged_studies
     from ..model.disturbance import load_disturbance
+    from ..study import read_study
 
     for name, path in packaged_models().items():
         print_line(name, load_model(path).doc)
@@ -26,6 +27,9 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         disturbance = load_disturbance(name, problems)
         problems.raise_if_any()
         print_line(name, disturbance.text.doc if disturbance is not None else "")
+    print("\nstudies, to be run with epicycle study:")
+    for name in packaged_studies():
+        print_line(name, read_study(name).doc)
     return DONE
 
 

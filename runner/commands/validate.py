@@ -1,12 +1,13 @@
-"""check a model"""
+"""check a model or a study"""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from .options import DONE, add_model, load
 
-DESCRIPTION = "Check a model without running it."
+DESCRIPTION = "Check a model, or a study with all that it varies, without running it."
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -17,6 +18,36 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Load the model, and say how large it is."""
+    if is_study(options.model):
+        return check_study(options)
     model, _ = load(options, strict=options.strict)
     print(f"{options.model} is valid: {model.extent}")
+    return DONE
+
+
+def is_study(name: str) -> bool:
+    """Whether a packaged study has that name, or the file says that it is one."""
+    from ..model import is_path, packaged_models, packaged_studies
+    from ..study import is_study
+
+    if is_path(name):
+        return is_study(Path(name))
+    return name in packaged_studies() and name not in packaged_models()
+
+
+def check_study(options: argparse.Namespace) -> int:
+    """Load the model at every level of what the study varies."""
+    from epicycle.actors import EpicycleError, counted
+
+    from ..study import Plan, read_study
+
+    for option in ("overrides", "disturb", "aspect", "without"):
+        if getattr(options, option):
+            raise EpicycleError(f"--{option} is for models: a study says itself what it changes")
+    types = [Path(file) for file in options.types]
+    plan = Plan.made(read_study(options.model, set=options.set, types=types))
+    print(
+        f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
+        f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
+    )
     return DONE

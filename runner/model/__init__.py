@@ -7,7 +7,7 @@ from .graph import Hop, ModelGraph, Wire
 from .load import load_model
 from .model import Model
 from .observation import Metric
-from .packaged import packaged_disturbances, packaged_models
+from .packaged import is_path, packaged_disturbances, packaged_models, packaged_studies
 from .patterns import PatternError, select
 from .problems import ModelError, Position, Problem, Problems, did_you_mean
 from .schedule import firing_order
@@ -34,9 +34,11 @@ __all__ = [
     "did_you_mean",
     "extent",
     "firing_order",
+    "is_path",
     "load_composite",
     "load_model",
     "packaged_disturbances",
     "packaged_models",
+    "packaged_studies",
     "select",
 ]

@@ -28,6 +28,22 @@ MODEL_KEYS = (
     "figures",
 )
 DISTURBANCE_KEYS = ("disturbance", "doc", "set", "parameters", "composites", "aspects")
+STUDY_KEYS = (
+    "study",
+    "doc",
+    "model",
+    "set",
+    "vary",
+    "disturb",
+    "replications",
+    "seed",
+    "paired",
+    "until",
+    "metrics",
+)
+RANGE_KEYS = ("from", "to", "step")
+HYPERCUBE_KEYS = ("size", "seed", "ranges")
+UNTIL_KEYS = ("metric", "half_width", "batch", "at_most")
 LIBRARY_KEYS = ("doc", "include", "composites")
 COMPOSITE_KEYS = ("doc", "extends", "parameters", "inputs", "outputs", "director", "actors", "connections", "aspects")
 DIRECTOR_KEYS = ("start", "drift")

@@ -1,7 +1,11 @@
-"""Files that a model names: found from where the name is written, and never outside of it."""
+"""Files that a model names: found from where the name is written, and never outside of it; and which were read."""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from epicycle.actors import ParameterError
@@ -9,6 +13,24 @@ from epicycle.actors import ParameterError
 from .problems import Position, did_you_mean
 
 COMMAND_LINE = "command line"  # the file of a position in an option
+_noted: ContextVar[dict[str, str] | None] = ContextVar("noted", default=None)
+
+
+@contextmanager
+def noting_files() -> Iterator[dict[str, str]]:
+    """The SHA-256 of every file that loading a model reads, by path, filled as it goes."""
+    found: dict[str, str] = {}
+    token = _noted.set(found)
+    try:
+        yield found
+    finally:
+        _noted.reset(token)
+
+
+def note(path: Path, data: bytes) -> None:
+    """A file has been read, with these contents."""
+    if (noted := _noted.get()) is not None:
+        noted[str(path)] = hashlib.sha256(data).hexdigest()
 
 
 def data_file(name: Path, position: Position) -> Path:
@@ -26,6 +48,8 @@ def data_file(name: Path, position: Position) -> Path:
                 f"{str(name)!r} cannot be read: a file named in a model lies in or below the folder of its YAML file"
             )
         if target.is_file():
+            if _noted.get() is not None:
+                note(target, target.read_bytes())
             return target
         if target.is_dir():
             raise ParameterError(f"{str(name)!r} is a folder, not a file")

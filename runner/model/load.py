@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from .catalogue import installed
@@ -61,7 +62,7 @@ def _without_collection() -> Iterator[None]:
 def load_model(
     name: str | Path,
     *,
-    set: Iterable[str] | Mapping[str, object] = (),
+    set: Iterable[str | Setting] | Mapping[str, object] = (),
     overrides: str | Path | Iterable[str | Path] = (),
     aspects: Iterable[str] = (),
     without_aspects: Iterable[str] = (),
@@ -111,6 +112,9 @@ def _read_model(name: str, problems: Problems) -> tuple[ModelText, Path, Declara
     if node is None:
         problems.raise_if_any()
         raise AssertionError("a file that cannot be read is a problem")
+    if isinstance(node, MappingNode) and "study" in node.entries:
+        problems.add(f"{name} is a study, not a model", None, f"run it: epicycle study {name}")
+        problems.raise_if_any()
     if isinstance(node, MappingNode) and "disturbance" in node.entries and "model" not in node.entries:
         problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
         problems.raise_if_any()
@@ -126,9 +130,10 @@ def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:
     return [given] if isinstance(given, (str, Path)) else list(given)
 
 
-def _settings(given: Iterable[str] | Mapping[str, object], problems: Problems) -> list[Setting]:
+def _settings(given: Iterable[str | Setting] | Mapping[str, object], problems: Problems) -> list[Setting]:
     if not isinstance(given, Mapping):
-        return [found for text in given if (found := parse_setting(text, problems)) is not None]
+        read = (parse_setting(each, problems) if isinstance(each, str) else replace(each) for each in given)
+        return [setting for setting in read if setting is not None]
     node = node_of(given, call_site())
     assert isinstance(node, MappingNode)
     return settings_in(node, problems)

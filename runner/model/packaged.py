@@ -1,4 +1,4 @@
-"""What comes with Epicycle in YAML: models, and disturbances to be added to them."""
+"""What comes with Epicycle in YAML: models, disturbances to be added to them, and studies of them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,15 @@ def packaged_disturbances() -> dict[str, Path]:
     return _yaml_files([folder / "disturbances" for folder in model_folders()])
 
 
+def packaged_studies() -> dict[str, Path]:
+    """The packaged studies by name."""
+    return _yaml_files([folder / "studies" for folder in model_folders()])
+
+
 def _yaml_files(folders: list[Path]) -> dict[str, Path]:
     return {path.stem: path for folder in folders for path in sorted(folder.glob("*.yaml"))}
 
 
 def is_path(name: str) -> bool:
-    """Whether the name of a model or disturbance is a path, and not that of a packaged one."""
+    """Whether the name of a model, disturbance or study is a path, and not that of a packaged one."""
     return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name

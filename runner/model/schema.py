@@ -1,4 +1,4 @@
-"""A JSON Schema of model files and disturbances, made from what is declared: the language's keys, a catalogue's types.
+"""A JSON Schema of model files, disturbances and studies, made from what is declared: the language's keys and types.
 
 An editor's YAML language server completes, explains and checks with it while somebody types.  It knows one file at a
 time: what it refuses, ``epicycle validate`` refuses too, but not the other way round.  Wherever a value may be
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from keyword import kwlist
 from pathlib import Path
 from typing import Any
@@ -23,13 +23,11 @@ from .catalogue import Catalogue
 from .elaborate import MAX_COUNT
 from .observation import MAX_SEED
 from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
-
-Schema = dict[str, Any]
+from .schema_parts import QUANTITY, TEXT, Schema, mapping, one_or_more, ref, text
+from .study_schema import STUDY_RULES, dimension, study
 
 NAME = "[A-Za-z_][A-Za-z0-9_]*"
 EXPRESSION = r"\$\{"
-NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
-QUANTITY = rf"^\s*{NUMBER}\s*([A-Za-z%°µμ1(].*)?$"
 _BOUND = r"(-?[0-9]{1,9}|\$\{[^}]*\})"
 _INDEX = rf"\s*(\*|{_BOUND}|{_BOUND}?\s*\.\.\s*{_BOUND}?)\s*"
 _ENDPOINT = rf"({NAME}(\[{_INDEX}(,{_INDEX})*\])?\.)?{NAME}"
@@ -41,33 +39,33 @@ _PATH = rf"{_SEGMENT}(\.{_SEGMENT})*"
 PATTERN = f"^{_PATH}$"
 POINTCUT = rf"^\s*!?\s*{_PATH}(\s*->\s*{_PATH})?\s*$"
 
-TEXT: Schema = {"type": ["string", "number", "boolean", "null"]}
-
 
 def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]]) -> Schema:
-    """The schema of model files, of files of composites that are included, and of disturbances."""
+    """The schema of model files, of files of composites that are included, of disturbances, and of studies."""
     actors, aspects = dict(sorted(catalogue.actors.items())), dict(sorted(catalogue.aspects.items()))
     parts = parts_of([*actors.values(), *aspects.values(), *figures.values()])
     definitions: Schema = {
-        "name": {"type": "string", **_text(f"^{NAME}$", "a name has letters, digits and _, no digit first")},
+        "name": {"type": "string", **text(f"^{NAME}$", "a name has letters, digits and _, no digit first")},
         "text": TEXT,
+        "texts": one_or_more({"type": "string"}),
         "expression": {"type": "string", "pattern": EXPRESSION},
         "port": {
             "type": "string",
-            **_text(
+            **text(
                 f"^{_ENDPOINT}$", "expected actor.port, array[*].port, array[0].port, array[1..3].port or an own port"
             ),
         },
-        "ports": {"anyOf": [_ref("port"), {"type": "array", "items": _ref("port"), "minItems": 1}]},
-        "patterns": _one_or_more(_PATTERN),
-        "pointcuts": _one_or_more(
-            {"anyOf": [_POINTCUT_TEXT, {**_mapping(language.POINTCUT_KEYS, _POINTCUT, None), "type": "object"}]}
+        "ports": {"anyOf": [ref("port"), {"type": "array", "items": ref("port"), "minItems": 1}]},
+        "patterns": one_or_more(_PATTERN),
+        "pointcuts": one_or_more(
+            {"anyOf": [_POINTCUT_TEXT, {**mapping(language.POINTCUT_KEYS, _POINTCUT, None), "type": "object"}]}
         ),
         "parameter": _parameter_declaration(),
         "connection": _connection(),
         "metric": _metric(),
-        "run": _mapping(language.RUN_KEYS, _RUN, "How long a run takes, and what it records."),
-        "director": _mapping(language.DIRECTOR_KEYS, _DIRECTOR, "A director of its own, with a local clock."),
+        "run": mapping(language.RUN_KEYS, _RUN, "How long a run takes, and what it records."),
+        "dimension": dimension(),
+        "director": mapping(language.DIRECTOR_KEYS, _DIRECTOR, "A director of its own, with a local clock."),
         "composite": _composite(),
         "port_declaration": _port_declaration(),
         "changed_actor": _changed("actor", Actor.reserved),
@@ -92,15 +90,19 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Epicycle model",
-        "description": "A model, a file of composite classes that models include, or a disturbance.",
+        "description": "A model, a file of composite classes that models include, a disturbance, or a study.",
         "type": "object",
         "minProperties": 1,
-        "if": {"required": ["disturbance"]},
-        "then": _disturbance(),
+        "if": {"required": ["study"]},
+        "then": study(),
         "else": {
-            **_mapping(language.MODEL_KEYS, _BODY, None),
-            # Without a name it is a file to be included, which has composites only.
-            "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
+            "if": {"required": ["disturbance"]},
+            "then": _disturbance(),
+            "else": {
+                **mapping(language.MODEL_KEYS, _BODY, None),
+                # Without a name it is a file to be included, which has composites only.
+                "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
+            },
         },
         "$defs": definitions,
     }
@@ -114,32 +116,18 @@ def schema_text(schema: Schema) -> str:
 # -- what stands under each key of the language ---------------------------------------------------------------------
 
 
-def _ref(name: str) -> Schema:
-    return {"$ref": f"#/$defs/{name}"}
-
-
-def _one_or_more(item: Schema) -> Schema:
-    """One, or a list; empty entries are left out."""
-    return {"anyOf": [item, {"type": "array", "items": {"anyOf": [item, {"type": "null"}]}}, {"type": "null"}]}
-
-
-def _text(pattern: str, message: str) -> Schema:
-    """What a text must look like; the message is what editors show, which would be the pattern otherwise."""
-    return {"pattern": pattern, "patternErrorMessage": message}
-
-
 def _named(definition: str) -> Schema:
     """A mapping from names; nothing at all counts as empty."""
-    return {"type": ["object", "null"], "propertyNames": _ref("name"), "additionalProperties": _ref(definition)}
+    return {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": ref(definition)}
 
 
 def _number(kind: str, low: float | None = None, high: float | None = None, unit: str = "") -> Schema:
     """A number within bounds, a text with a unit, or an expression."""
     article = "an" if kind == "integer" else "a"
-    found: Schema = {"type": [kind, "string"], **_text(EXPRESSION, f"expected {article} {kind}")}
+    found: Schema = {"type": [kind, "string"], **text(EXPRESSION, f"expected {article} {kind}")}
     if unit or kind == "number":
         where = "" if unit in ("", "1") else f" in {unit}"
-        found |= _text(f"{EXPRESSION}|{QUANTITY}", f"expected {article} {kind}{where}, alone or with its unit")
+        found |= text(f"{EXPRESSION}|{QUANTITY}", f"expected {article} {kind}{where}, alone or with its unit")
     for key, bound in (("minimum", low), ("maximum", high)):
         if bound is not None and math.isfinite(bound):
             found[key] = as_written(bound)
@@ -148,19 +136,19 @@ def _number(kind: str, low: float | None = None, high: float | None = None, unit
 
 _PATTERN: Schema = {
     "type": "string",
-    **_text(PATTERN, "expected a port as a dotted path; * is one segment, name[*] all of an array, ** any segments"),
+    **text(PATTERN, "expected a port as a dotted path; * is one segment, name[*] all of an array, ** any segments"),
 }
 _POINTCUT_TEXT: Schema = {
     "type": "string",
-    **_text(POINTCUT, "expected ports or actors as a pattern, a connection 'a.out -> b.in', or one of these after a !"),
+    **text(POINTCUT, "expected ports or actors as a pattern, a connection 'a.out -> b.in', or one of these after a !"),
 }
-_FLAG: Schema = {"type": ["boolean", "string"], **_text(EXPRESSION, "expected true or false")}
+_FLAG: Schema = {"type": ["boolean", "string"], **text(EXPRESSION, "expected true or false")}
 _BODY: dict[str, tuple[Schema, str]] = {
-    "model": (_ref("name"), "The name of the model."),
-    "disturbance": (_ref("name"), "The name of the disturbance."),
-    "doc": (_ref("text"), "What it shows or does."),
+    "model": (ref("name"), "The name of the model."),
+    "disturbance": (ref("name"), "The name of the disturbance."),
+    "doc": (ref("text"), "What it shows or does."),
     "set": ({"type": ["object", "null"]}, "Values for parameters of the model: 'path: value', as for --set."),
-    "include": (_one_or_more({"type": "string"}), "Files of composite classes, in or below this folder."),
+    "include": (one_or_more({"type": "string"}), "Files of composite classes, in or below this folder."),
     "parameters": (
         {
             **_named("parameter"),
@@ -172,31 +160,31 @@ _BODY: dict[str, tuple[Schema, str]] = {
         "Parameters: 'name: value' or 'name: {value, unit, min, max, choices, doc}'.",
     ),
     "composites": (_named("composite"), "Composite classes, for the types of actors."),
-    "extends": (_ref("name"), "The composite class that this one takes over and changes."),
+    "extends": (ref("name"), "The composite class that this one takes over and changes."),
     "inputs": (
-        {"anyOf": [_one_or_more(_ref("name")), _named("port_declaration")]},
+        {"anyOf": [one_or_more(ref("name")), _named("port_declaration")]},
         "The input ports: a list of names, or 'name: type' or 'name: {type, doc}'.",
     ),
     "outputs": (
-        {"anyOf": [_one_or_more(_ref("name")), _named("port_declaration")]},
+        {"anyOf": [one_or_more(ref("name")), _named("port_declaration")]},
         "The output ports: a list of names, or 'name: type' or 'name: {type, doc}'.",
     ),
-    "director": (_ref("director"), "A director of its own: the composite fires as one actor, in local time."),
+    "director": (ref("director"), "A director of its own: the composite fires as one actor, in local time."),
     "actors": (_named("actor"), "The actors of the graph: 'name: {type, count, <parameter>: <value>, ...}'."),
     "connections": (
-        {"type": ["array", "null"], "items": _ref("connection")},
+        {"type": ["array", "null"], "items": ref("connection")},
         "Wires: 'actor.port -> actor.port, actor.port', '=>' for all to all; or {from, to, all, delay}.",
     ),
     "aspects": (_named("aspect"), "What is woven around ports: 'name: {type, at, enabled, <parameter>: <value>}'."),
-    "run": (_ref("run"), "How long a run takes, and what it records."),
+    "run": (ref("run"), "How long a run takes, and what it records."),
     "metrics": (_named("metric"), "Numbers taken from what ports send: 'name: {of, take, unit, doc}'."),
     "figures": (_named("figure"), "Pictures of a run: 'name: {type, ...}'."),
 }
 _RUN: dict[str, tuple[Schema, str]] = {
     "stop": (_number("number", 0.0, unit="s"), "Time at which a run ends, such as 30 s."),
-    "stop_when": (_ref("patterns"), "Output ports that end the run when they send true or a number other than 0."),
+    "stop_when": (ref("patterns"), "Output ports that end the run when they send true or a number other than 0."),
     "seed": (_number("integer", 0, MAX_SEED), "Seed of all random streams."),
-    "record": (_ref("patterns"), "Output ports whose tokens are kept, as patterns."),
+    "record": (ref("patterns"), "Output ports whose tokens are kept, as patterns."),
 }
 _DIRECTOR: dict[str, tuple[Schema, str]] = {
     "start": (_number("number", unit="s"), "The local time when the run begins (default: as around it)."),
@@ -204,36 +192,36 @@ _DIRECTOR: dict[str, tuple[Schema, str]] = {
 }
 _PARAMETER: dict[str, tuple[Schema, str]] = {
     "value": ({}, "The default; without one, a value must be given."),
-    "unit": (_ref("text"), "What numbers count in, such as m/s; 1 for a pure number."),
+    "unit": (ref("text"), "What numbers count in, such as m/s; 1 for a pure number."),
     "min": ({"type": "number"}, "The smallest value."),
     "max": ({"type": "number"}, "The greatest value."),
-    "choices": (_one_or_more(TEXT), "The texts to choose from."),
-    "doc": (_ref("text"), "What it is."),
+    "choices": (one_or_more(TEXT), "The texts to choose from."),
+    "doc": (ref("text"), "What it is."),
 }
 _CONNECTION: dict[str, tuple[Schema, str]] = {
-    "from": (_ref("ports"), "The sending ports."),
-    "to": (_ref("ports"), "The receiving ports."),
+    "from": (ref("ports"), "The sending ports."),
+    "to": (ref("ports"), "The receiving ports."),
     "all": ({"type": "boolean"}, "Each to all, as with '=>'; otherwise several and several are connected in pairs."),
     "delay": (_number("number", 0.0, unit="s"), "How long a token takes, such as 100 ms; 0 is the next microstep."),
 }
 _PORT: dict[str, tuple[Schema, str]] = {
-    "type": (_ref("text"), "What travels through it, such as float, 'float | int', array[2] or a token class."),
-    "doc": (_ref("text"), "What it is."),
+    "type": (ref("text"), "What travels through it, such as float, 'float | int', array[2] or a token class."),
+    "doc": (ref("text"), "What it is."),
 }
 _POINTCUT: dict[str, tuple[Schema, str]] = {
     "at": (_POINTCUT_TEXT, "Ports or actors, as a pattern, or a connection."),
-    "type": (_ref("text"), "The type of the actors and composites at which, or at whose ports, it stands."),
-    "tag": (_ref("text"), "A tag of the actors and composites at which, or at whose ports, it stands."),
-    "port": (_ref("text"), "The name of the port; none: all ports where it can stand."),
-    "parameter": (_ref("text"), "The name of a parameter of the actors, for an aspect that alters numbers."),
-    "request": (_ref("text"), "For an aspect that is a composite: the input by which these tokens come in."),
+    "type": (ref("text"), "The type of the actors and composites at which, or at whose ports, it stands."),
+    "tag": (ref("text"), "A tag of the actors and composites at which, or at whose ports, it stands."),
+    "port": (ref("text"), "The name of the port; none: all ports where it can stand."),
+    "parameter": (ref("text"), "The name of a parameter of the actors, for an aspect that alters numbers."),
+    "request": (ref("text"), "For an aspect that is a composite: the input by which these tokens come in."),
     "time": (_number("number", 0.0, unit="s"), "For a composite at actors: how long their firings take."),
 }
 _METRIC: dict[str, tuple[Schema, str]] = {
     "of": (_PATTERN, "The output port (or a pattern for several)."),
     "take": ({"enum": list(language.REDUCTIONS)}, "What is taken from the numbers that it sends (default: last)."),
-    "unit": (_ref("text"), "What the number counts in."),
-    "doc": (_ref("text"), "What it is."),
+    "unit": (ref("text"), "What the number counts in."),
+    "doc": (ref("text"), "What it is."),
 }
 # What stands beside the parameters of an actor, aspect or figure.
 _BESIDE: dict[str, tuple[Schema, str]] = {
@@ -243,10 +231,10 @@ _BESIDE: dict[str, tuple[Schema, str]] = {
         "Of two actors that could fire at the same tag and depth, the smaller one is first.",
     ),
     "at": (
-        _ref("pointcuts"),
+        ref("pointcuts"),
         "Where it stands: patterns of ports or actors, 'a.out -> b.in', {type, port} or {tag, port}; not at !pattern.",
     ),
-    "tags": (_one_or_more(_ref("text")), "Names by which aspects can choose it: 'at: {tag: ...}'."),
+    "tags": (one_or_more(ref("text")), "Names by which aspects can choose it: 'at: {tag: ...}'."),
     "enabled": (_FLAG, "Whether it does anything (default: true)."),
 }
 # A key of the language that is missing here is allowed to hold anything; a test says so.
@@ -262,32 +250,23 @@ RULES = {
     "PORT_KEYS": _PORT,
     "POINTCUT_KEYS": _POINTCUT,
     "METRIC_KEYS": _METRIC,
+    **STUDY_RULES,
 }
 
 
-def _mapping(keys: Iterable[str], rules: dict[str, tuple[Schema, str]], doc: str | None) -> Schema:
-    """A mapping with these keys and no others."""
-    properties = {}
-    for key in keys:
-        schema, description = rules.get(key, ({}, ""))
-        properties[key] = {**schema, "description": description}
-    found: Schema = {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
-    return {"description": doc, **found} if doc else found
-
-
 def _parameter_declaration() -> Schema:
-    declared = _mapping(language.PARAMETER_KEYS, _PARAMETER, None)
+    declared = mapping(language.PARAMETER_KEYS, _PARAMETER, None)
     return {**declared, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
 def _port_declaration() -> Schema:
-    declared = _mapping(language.PORT_KEYS, _PORT, "A port of a composite: its type, or {type, doc}.")
+    declared = mapping(language.PORT_KEYS, _PORT, "A port of a composite: its type, or {type, doc}.")
     return {**declared, "type": ["object", "string", "null"]}
 
 
 def _composite() -> Schema:
     """Where a class extends another, its actors and aspects may be changes to inherited ones."""
-    found = _mapping(language.COMPOSITE_KEYS, _BODY, "A composite class: a graph with ports of its own.")
+    found = mapping(language.COMPOSITE_KEYS, _BODY, "A composite class: a graph with ports of its own.")
     for key in ("actors", "aspects"):
         found["properties"][key] = {"description": _BODY[key][1]}
     return {
@@ -300,7 +279,7 @@ def _composite() -> Schema:
 
 def _disturbance() -> Schema:
     """Its aspects may take over the ports of those whose places they take."""
-    found = _mapping(language.DISTURBANCE_KEYS, _BODY, "Aspects in a file of their own, to be added to a model.")
+    found = mapping(language.DISTURBANCE_KEYS, _BODY, "Aspects in a file of their own, to be added to a model.")
     found["properties"]["aspects"] = {**_named("added_aspect"), "description": _BODY["aspects"][1]}
     return found
 
@@ -315,8 +294,8 @@ def _changed(kind: str, reserved: frozenset[str]) -> Schema:
 
 
 def _connection() -> Schema:
-    declared = _mapping(language.CONNECTION_KEYS, _CONNECTION, "From ports, to ports.")
-    text = _text(CONNECTION, "expected 'actor.port -> actor.port', with => for all to all")
+    declared = mapping(language.CONNECTION_KEYS, _CONNECTION, "From ports, to ports.")
+    written = text(CONNECTION, "expected 'actor.port -> actor.port', with => for all to all")
     removal = {"description": "A connection of the extended class to do without.", "$ref": "#/$defs/connection"}
     return {
         **declared,
@@ -325,13 +304,13 @@ def _connection() -> Schema:
         "if": {"type": "object", "required": ["remove"]},
         "then": {"maxProperties": 1},
         "else": {"required": ["from", "to"]},
-        **text,
+        **written,
     }
 
 
 def _metric() -> Schema:
     return {
-        **_mapping(language.METRIC_KEYS, _METRIC, "A number taken from what a port sends."),
+        **mapping(language.METRIC_KEYS, _METRIC, "A number taken from what a port sends."),
         "type": "object",
         "required": ["of"],
     }
@@ -349,7 +328,7 @@ def _by_type(types: Mapping[str, type], prefix: str) -> list[Schema]:
     return [
         {
             "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
-            "then": _ref(f"{prefix}.{name}"),
+            "then": ref(f"{prefix}.{name}"),
         }
         for name in types
     ]
@@ -380,9 +359,9 @@ def _part(base: type, known: Mapping[str, type]) -> Schema:
     """A parameter that is a mapping with a type of its own."""
     return {
         "type": ["object", "string"],
-        **_text(EXPRESSION, f"expected a mapping with a type, one of {', '.join(known)}"),
+        **text(EXPRESSION, f"expected a mapping with a type, one of {', '.join(known)}"),
         "description": first_sentence(doc_of(base)),
-        "properties": {"type": {"anyOf": [_choice(known), _ref("expression")]}},
+        "properties": {"type": {"anyOf": [_choice(known), ref("expression")]}},
         "required": ["type"],
         "allOf": _by_type(known, _part_name(base)),
     }
@@ -428,13 +407,13 @@ def _plain_value(parameter: Parameter[Any]) -> Schema:
     if type(parameter).convert is not Parameter.convert:
         return {}  # what a parameter with a conversion of its own takes, only the conversion knows
     if is_part(parameter):
-        found = _ref(_part_name(parameter.type))
+        found = ref(_part_name(parameter.type))
         return {"anyOf": [found, {"type": "null"}]} if parameter.optional else found
     if parameter.shape is not None:
         return _array(parameter, parameter.shape)
     if parameter.choices:
         null: list[Schema] = [{"type": "null"}] if parameter.optional else []
-        return {"anyOf": [{"enum": list(parameter.choices)}, _ref("expression"), *null]}
+        return {"anyOf": [{"enum": list(parameter.choices)}, ref("expression"), *null]}
     return _scalar(parameter)
 
 
@@ -456,7 +435,7 @@ def _array(parameter: Parameter[Any], shape: tuple[int | None, ...]) -> Schema:
         return _scalar(parameter)
     found: Schema = {"type": ["array", "string"], "items": _array(parameter, shape[1:])}
     if parameter.type is not str:  # a single text will do for a list of texts
-        found |= _text(EXPRESSION, f"expected a {parameter.describe_type()}")
+        found |= text(EXPRESSION, f"expected a {parameter.describe_type()}")
     if shape[0] is not None:
         found["minItems"] = found["maxItems"] = shape[0]
     return found

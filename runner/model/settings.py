@@ -76,11 +76,12 @@ def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
     return [
         Setting(key, entry.value, entry.key.position)
         for key, entry in node.entries.items()
-        if _is_pattern(key, entry.key.position, problems)
+        if is_pattern(key, entry.key.position, problems)
     ]
 
 
-def _is_pattern(path: str, position: Position, problems: Problems) -> bool:
+def is_pattern(path: str, position: Position, problems: Problems) -> bool:
+    """Whether a text names parameters, alone or by a pattern; if not, that is noted."""
     try:
         matches(path, "")
     except PatternError as error:
@@ -98,7 +99,7 @@ def parse_setting(text: str, problems: Problems) -> Setting | None:
     if not equals or not path:
         problems.add(f"{text!r} is not of the form path=value", position)
         return None
-    if not _is_pattern(path, position, problems):
+    if not is_pattern(path, position, problems):
         return None
     node = _value(value, option, len(option) - len(value), problems)
     return None if node is None else Setting(path, node, position)

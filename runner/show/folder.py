@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import platform
-import sys
 from collections.abc import Iterable
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from ..engine import Results
+from ..provenance import versions
 from .figures import Figure
 from .summary import summary_object
-
-PACKAGES = ("epicycle", "simpy", "numpy", "scipy", "numba", "filterpy", "networkx", "pyyaml", "pyarrow")
 
 
 def write_folder(
@@ -61,14 +56,3 @@ def write_signals(results: Results, path: Path) -> None:
     aside = path.with_name(f".{path.name}")
     pq.write_table(table, aside)
     os.replace(aside, path)
-
-
-def versions() -> dict[str, Any]:
-    """What the run was made with."""
-    found: dict[str, Any] = {"python": platform.python_version(), "platform": sys.platform}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = None
-    return found

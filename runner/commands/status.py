@@ -1,0 +1,52 @@
+"""say how far a study is"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import Counter
+from pathlib import Path
+
+from .options import DONE
+
+DESCRIPTION = "Say how far a study is, also while it is running."
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle status``."""
+    command.add_argument("folder", metavar="DIR", type=Path, help="the results folder")
+    command.add_argument("--conditions", action="store_true", help="for each condition")
+    command.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Count what is there; name what failed."""
+    from ..study import open_study
+    from ..study.store import is_running
+
+    results = open_study(options.folder)
+    table = results.table()
+    statuses = table["status"].to_pylist()
+    counts = Counter(statuses)
+    plan = results.plan
+    failures = results.failures()
+    if options.json:
+        found = {"study": plan.study.name, "runs": plan.size, "conditions": plan.conditions, "statuses": dict(counts)}
+        print(json.dumps({**found, "running": is_running(options.folder), "failures": failures}))
+        return DONE
+    about = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"
+    print(
+        f"{plan.study.name}: {len(statuses):,} of {plan.size:,} runs are over ({about})"
+        + ("; it is running" if is_running(options.folder) else "")
+    )
+    if options.conditions:
+        by_condition = Counter(zip(table["condition"].to_pylist(), statuses, strict=True))
+        for index in sorted({condition for condition, _ in by_condition}):
+            values = ", ".join(f"{name}={value}" for name, value in plan.condition(index).values.items())
+            done = ", ".join(
+                f"{number:,} {status}" for (at, status), number in sorted(by_condition.items()) if at == index
+            )
+            print(f"{index} ({values}): {done} of {plan.replications:,}")
+    for row in failures:
+        print(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
+    return DONE

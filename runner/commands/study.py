@@ -1,0 +1,117 @@
+"""run a study: a model under many conditions"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .options import DONE, FAILED, INTERRUPTED, add_types, complain
+
+if TYPE_CHECKING:
+    from ..study import Plan
+
+DESCRIPTION = "Make all runs of a study that are not in its results folder yet."
+SHOWN = 5  # failed runs that are told one by one
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """The options of ``epicycle study``."""
+    command.add_argument("study", metavar="STUDY", help="a path to a YAML file, or the name of a packaged study")
+    command.add_argument(
+        "--set",
+        metavar="PATH=VALUE",
+        action="append",
+        default=[],
+        help="set a parameter of the model that the study does not vary; may be repeated",
+    )
+    command.add_argument(
+        "--replications", type=count, metavar="N", help="runs of each condition (default: the study's); more are added"
+    )
+    command.add_argument("--out", metavar="DIR", type=Path, help="results folder (default: results/STUDY)")
+    command.add_argument("--yes", action="store_true", help="do not ask back whether so many runs are meant")
+    add_types(command)
+    add_session(command)
+
+
+def add_session(command: argparse.ArgumentParser) -> None:
+    """The options of a session, which ``resume`` has, too."""
+    command.add_argument("--jobs", type=count, metavar="N", help="processes at a time (default: one for each core)")
+    command.add_argument(
+        "--run-timeout",
+        type=seconds,
+        metavar="S",
+        help="seconds of real time after which a run is ended, and counts as failed (default: none)",
+    )
+    command.add_argument(
+        "--retry", action="store_true", help="make runs anew that took too long, or whose process was killed"
+    )
+
+
+def count(text: str) -> int:
+    """A whole number from 1 on."""
+    if not text.isdecimal() or not 0 < int(text) <= 10**9:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 1e9")
+    return int(text)
+
+
+def seconds(text: str) -> float:
+    """A number of seconds."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
+    return number
+
+
+def run(options: argparse.Namespace, given: list[str]) -> int:
+    """Read, try and run the study."""
+    from ..study import Plan, available_cores, check_size, read_study
+
+    types = [Path(file) for file in options.types]
+    study = read_study(options.study, set=options.set, types=types, replications=options.replications)
+    if options.replications is not None and study.until is not None:
+        complain(f"{study.name} decides itself how many replications it needs: --replications counts for nothing")
+    plan = Plan.made(study)
+    if not options.yes:
+        check_size(plan, options.jobs or available_cores())
+    return session(plan, options.out or Path("results") / study.name, options)
+
+
+def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
+    """Make the runs that are missing, and tell what came of it."""
+    from epicycle.actors import counted
+
+    from ..study import open_study, run_study
+    from ..study.progress import progress
+
+    try:
+        with progress(plan.study.name) as tell:
+            outcome = run_study(
+                plan,
+                folder,
+                jobs=options.jobs,
+                timeout=options.run_timeout,
+                retry=options.retry,
+                tell=tell,
+            )
+    except KeyboardInterrupt:
+        complain(f"interrupted; what was finished is kept: 'epicycle resume {folder}' goes on")
+        return INTERRUPTED
+    print(
+        f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
+        f"{outcome.there:,} there before" + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
+    )
+    print(f"wrote {outcome.table}")
+    if outcome.is_good:
+        return DONE
+    failures = open_study(folder).failures()
+    for row in failures[:SHOWN]:
+        complain(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
+    if len(failures) > SHOWN:
+        complain(f"... and {len(failures) - SHOWN:,} more: epicycle status {folder}")
+    complain(f"error: {counted(outcome.failed, 'run')} failed")
+    return FAILED

@@ -1,0 +1,100 @@
+"""The JSON Schema of study files."""
+
+from __future__ import annotations
+
+from . import declarations as language
+from .schema_parts import QUANTITY, TEXT, Schema, mapping, one_or_more, ref, text
+
+_QUANTITY: Schema = {"type": ["number", "string"], **text(QUANTITY, "expected a number, alone or with its unit")}
+_UNTIL: dict[str, tuple[Schema, str]] = {
+    "metric": (ref("name"), "The metric whose mean is wanted."),
+    "half_width": ({"type": "number", "minimum": 0}, "Half the width of its 95 % interval that is narrow enough."),
+    "batch": ({"type": "integer", "minimum": 2}, "How many replications are made at a time (default: 10)."),
+    "at_most": ({"type": "integer", "minimum": 2}, "The most replications of a condition (default: 1000)."),
+}
+_RANGE: dict[str, tuple[Schema, str]] = {
+    "from": (_QUANTITY, "The first value."),
+    "to": (_QUANTITY, "The last value, if a step falls on it."),
+    "step": (_QUANTITY, "The distance between two values."),
+}
+_HYPERCUBE: dict[str, tuple[Schema, str]] = {
+    "size": ({"type": "integer", "minimum": 1}, "The number of points."),
+    "seed": ({"type": "integer", "minimum": 0}, "What the points are drawn from (default: 0)."),
+    "ranges": (
+        {"type": "object", "additionalProperties": {"type": "array", "items": _QUANTITY, "minItems": 2, "maxItems": 2}},
+        "'path: [low, high]' for each parameter.",
+    ),
+}
+_STUDY: dict[str, tuple[Schema, str]] = {
+    "study": (ref("name"), "The name of the study."),
+    "doc": (ref("text"), "What it is to find out."),
+    "model": ({"type": "string"}, "A packaged model, or the path of a file as seen from this one."),
+    "set": ({"type": ["object", "null"]}, "Values for parameters of the model in all runs: 'path: value'."),
+    "vary": (
+        {"type": ["object", "null"], "additionalProperties": ref("dimension")},
+        "What is varied; every value goes together with every one of the others.",
+    ),
+    "disturb": (
+        {"anyOf": [{"type": "object", "additionalProperties": one_or_more({"type": "string"})}, ref("texts")]},
+        "Disturbances as one more dimension: 'name: [disturbance, ...]', or a list of single ones.",
+    ),
+    "replications": ({"type": "integer", "minimum": 1}, "How many runs each condition has (default: 1)."),
+    "seed": ({"type": "integer", "minimum": 0}, "The seed of the first replication (default: 0)."),
+    "paired": ({"type": "boolean"}, "Whether a replication has the same seed in all conditions (default: true)."),
+    "until": (
+        {**mapping(language.UNTIL_KEYS, _UNTIL, None), "type": "object", "required": ["metric", "half_width"]},
+        "How many replications each condition gets, in place of a fixed number.",
+    ),
+    "metrics": (
+        {
+            "anyOf": [
+                {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": TEXT},
+                {"type": "array", "items": ref("name")},
+            ]
+        },
+        "What is kept of each run: names of the model's metrics, or 'name: expression' (default: all of the model's).",
+    ),
+}
+STUDY_RULES = {
+    "STUDY_KEYS": _STUDY,
+    "UNTIL_KEYS": _UNTIL,
+    "RANGE_KEYS": _RANGE,
+    "HYPERCUBE_KEYS": _HYPERCUBE,
+}
+
+
+def study() -> Schema:
+    """A study: a model under many conditions."""
+    return {**mapping(language.STUDY_KEYS, _STUDY, "A model under many conditions."), "required": ["model"]}
+
+
+def dimension() -> Schema:
+    """One of the forms in which a study says what values something takes."""
+    lists = {"type": "object", "minProperties": 1, "additionalProperties": {"type": "array", "minItems": 1}}
+    cases = {"type": "object", "minProperties": 1, "additionalProperties": {"type": ["object", "null"]}}
+    hypercube = {**mapping(language.HYPERCUBE_KEYS, _HYPERCUBE, None), "required": ["size", "ranges"]}
+    forms = (
+        ("zip", lists, "Parameters that go together: 'path: [value, ...]', all of one length."),
+        ("cases", cases, "Named sets of values: 'name: {path: value}'."),
+        ("latin_hypercube", hypercube, "Points that fill a box evenly."),
+    )
+    return {
+        "description": "The values of a parameter, or of several that go together.",
+        "anyOf": [
+            {"type": "array", "minItems": 1},
+            {
+                **mapping(language.RANGE_KEYS, _RANGE, "Values at equal distances."),
+                "type": "object",
+                "required": list(language.RANGE_KEYS),
+            },
+            *(
+                {
+                    "type": "object",
+                    "properties": {key: {**schema, "description": description}},
+                    "required": [key],
+                    "additionalProperties": False,
+                }
+                for key, schema, description in forms
+            ),
+        ],
+    }

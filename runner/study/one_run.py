@@ -1,0 +1,88 @@
+"""One run of a study: from a task to its row."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+
+from epicycle.actors import EpicycleError
+
+from ..engine import LogFilter, Results, Simulation
+from ..model import Model
+from .plan import Condition, Plan
+from .schedule import FAILED, OK, Task
+from .store import Row
+
+_MODELS_KEPT = 4
+
+
+class Runner:
+    """Makes runs of a plan, and keeps the models of the last conditions."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self._models: OrderedDict[int, tuple[Condition, Model | str]] = OrderedDict()
+
+    def prepare(self, task: Task) -> None:
+        """Load the model of the task's condition, unless it is there."""
+        if task.condition in self._models:
+            self._models.move_to_end(task.condition)
+            return
+        condition = self.plan.condition(task.condition)
+        try:
+            model: Model | str = self.plan.load(condition)
+            assert isinstance(model, Model)
+            # Recording costs time and memory, and most studies need none of it.
+            wanted = {signal for metric in self.plan.metrics for signal in metric.signals}
+            model.recorded = [name for name in model.recorded if name in wanted]
+        except EpicycleError as error:
+            model = str(error)
+        self._models[task.condition] = condition, model
+        if len(self._models) > _MODELS_KEPT:
+            self._models.popitem(last=False)
+
+    def row(self, task: Task) -> Row:
+        """Make the run; whatever it raises is told in the row."""
+        self.prepare(task)
+        condition, model = self._models[task.condition]
+        row = empty_row(self.plan, condition, task)
+        started = time.perf_counter()
+        try:
+            if isinstance(model, str):
+                raise EpicycleError(model)
+            results = Simulation(model, seed=task.seed).run()
+            row |= {metric.name: metric.value(results) for metric in self.plan.metrics}
+            row |= {"status": OK, "events": results.events, "digest": results.digest}
+        except Exception as error:
+            told = str(error) if isinstance(error, EpicycleError) else f"{type(error).__name__}: {error}"
+            row |= dict.fromkeys((metric.name for metric in self.plan.metrics), None)
+            row |= {"status": FAILED, "error": told}
+        row["wall_time"] = time.perf_counter() - started
+        return row
+
+
+def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:
+    """What a row holds before the run."""
+    return {
+        "run": task.key,
+        "condition": condition.key,
+        "replication": task.replication,
+        **condition.values,
+        "seed": task.seed,
+        "status": "",
+        **dict.fromkeys((metric.name for metric in plan.metrics), None),
+        "events": None,
+        "digest": None,
+        "error": None,
+        "wall_time": None,
+    }
+
+
+def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, Simulation, Exception | None]:
+    """A run once more, alone, with all that the model records and the whole event log; and what it raised."""
+    model = plan.load(condition)
+    simulation = Simulation(model, seed=seed, keep_log=LogFilter({}))
+    try:
+        return model, simulation.run(), simulation, None
+    except EpicycleError as error:
+        return model, simulation.results("failed"), simulation, error

@@ -1,0 +1,248 @@
+"""Plan: the conditions of a study and the identity of every run, worked out one at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError, version
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from ..model import Model, ModelError, Problems, did_you_mean, load_model
+from ..model.document import plain
+from ..model.files import noting_files
+from ..model.own_types import types_of_file
+from ..model.settings import Setting
+from .declaration import RESERVED, Study, study_of_text
+from .dimensions import Factor, Level
+from .metrics import StudyMetric
+
+MAX_TRIED = 20  # levels of a dimension with which the model is loaded before anything runs
+
+Sources = dict[str, str]  # SHA-256 by the name of a file
+
+
+def epicycle_version() -> str:
+    """The version of which results are: another one may give other ones."""
+    try:
+        return version("epicycle")
+    except PackageNotFoundError:  # run from its folder, without an install
+        return "unknown"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One combination of levels; ``key`` tells it from all others, whatever study it is in."""
+
+    index: int
+    settings: tuple[Setting, ...]
+    disturb: tuple[str, ...]
+    values: dict[str, Factor]
+    key: str
+
+
+class Plan:
+    """A study that has been tried: every level of every dimension loads.
+
+    ``made`` does so; ``of_manifest`` takes over from a results folder what was found then.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        metrics: list[StudyMetric],
+        sources: Sources,
+        extra: list[dict[int, Sources]],
+        texts: dict[str, str],
+    ) -> None:
+        self.study = study
+        self.metrics = metrics
+        self.sources = sources
+        self.texts = texts  # the YAML of the model and of all that belongs to it
+        self._extra = extra  # by dimension, the files that single levels read beside the others
+        self._sizes = [dimension.size for dimension in study.dimensions]
+        self.conditions = prod(self._sizes)
+
+    # -- making one -----------------------------------------------------------------------------------------------
+
+    @classmethod
+    def made(cls, study: Study) -> Plan:
+        """Load the model with the first levels of all dimensions, and with each other level in the place of its first.
+
+        Raises ``ModelError`` with all that is wrong in any of them.
+        """
+        problems = Problems()
+        models: list[Model] = []
+        texts: dict[str, str] = {}
+        firsts = [0] * len(study.dimensions)
+        sources = _tried(study, firsts, models, texts, problems)
+        extra: list[dict[int, Sources]] = [{} for _ in study.dimensions]
+        for number, dimension in enumerate(study.dimensions):
+            for index in _spread(dimension.size):
+                found = _tried(study, [*firsts[:number], index, *firsts[number + 1 :]], models, texts, problems)
+                if more := {name: digest for name, digest in found.items() if sources.get(name) != digest}:
+                    extra[number][index] = more
+        problems.raise_if_any()
+        metrics = study.metrics
+        if metrics is None:
+            metrics = [StudyMetric(metric.name, metric.name) for metric in models[0].metrics]
+        for metric in metrics:
+            metric.check(models, problems)
+            if study.metrics is None and (metric.name in RESERVED or metric.name in study.factors):
+                problems.add(
+                    f"metric {metric.name!r} of the model has the name of another column of the table",
+                    None,
+                    f"rename it in the study: metrics: {{my_name: {metric.name}}}",
+                )
+        if study.until is not None and study.until.metric not in (names := [metric.name for metric in metrics]):
+            wanted = study.until.metric
+            problems.add(
+                f"until: the study has no metric {wanted!r}{did_you_mean(wanted, names)}",
+                study.until.position,
+                f"its metrics: {', '.join(names) or 'none'}",
+            )
+        problems.raise_if_any()
+        return cls(study, metrics, sources, extra, texts)
+
+    @classmethod
+    def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
+        """The plan of a results folder; no file but the manifest is needed."""
+        study = study_of_text(
+            manifest["text"],
+            Path(manifest["file"]),
+            manifest["set"],
+            map(Path, manifest["types"]),
+            manifest["replications"],
+        )
+        metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
+        extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
+        return cls(study, metrics, manifest["sources"], extra, manifest["model"])
+
+    def manifest(self) -> dict[str, Any]:
+        """What ``of_manifest`` needs."""
+        study = self.study
+        return {
+            "study": study.name,
+            "file": str(study.path.resolve()),
+            "text": study.text,
+            "set": list(study.changes),
+            "types": [str(path.resolve()) for path in study.types],
+            "replications": study.replications,
+            "factors": study.factors,
+            "metrics": {metric.name: metric.source for metric in self.metrics},
+            "model": self.texts,
+            "sources": self.sources,
+            "level_sources": [{str(index): found for index, found in each.items()} for each in self._extra],
+        }
+
+    # -- what it holds --------------------------------------------------------------------------------------------
+
+    @property
+    def replications(self) -> int:
+        """How many runs a condition has, at most."""
+        return self.study.replications if self.study.until is None else self.study.until.at_most
+
+    @property
+    def size(self) -> int:
+        """How many runs there are, at most."""
+        return self.conditions * self.replications
+
+    def __iter__(self) -> Iterator[Condition]:
+        index = 0
+        while index < self.conditions:
+            yield self.condition(index)
+            index += 1
+
+    def condition(self, index: int) -> Condition:
+        """A condition by its number; the last dimension changes fastest."""
+        indices = _digits(index, self._sizes)
+        levels = [dimension.level(at) for dimension, at in zip(self.study.dimensions, indices, strict=True)]
+        settings, disturb = _together(self.study, levels)
+        sources = dict(self.sources)
+        for extra, at in zip(self._extra, indices, strict=True):
+            sources.update(extra.get(at, {}))
+        identity = {
+            "epicycle": epicycle_version(),
+            "model": Path(self.study.model).name,
+            "sources": sorted(sources.items()),
+            "set": [[setting.path, plain(setting.node)] for setting in settings],
+            "disturb": [Path(name).name for name in disturb],
+            "metrics": [[metric.name, metric.source] for metric in self.metrics],
+        }
+        values = {name: value for level in levels for name, value in level.values.items()}
+        return Condition(index, settings, disturb, values, _hash(identity))
+
+    def seed(self, condition: Condition, replication: int) -> int:
+        """The same for all conditions if they are paired, otherwise one that hangs on the condition, too."""
+        if self.study.paired:
+            return self.study.seed + replication
+        return int(_hash([self.study.seed, condition.key, replication])[:15], 16)
+
+    def key(self, condition: Condition, replication: int) -> str:
+        """The identity of a run."""
+        return _hash([condition.key, self.seed(condition, replication)])
+
+    def load(self, condition: Condition) -> Model:
+        """The model as it is in a condition; raises ``ModelError``."""
+        return _load(self.study, condition.settings, condition.disturb)
+
+
+def _hash(value: object) -> str:
+    text = json.dumps(value, ensure_ascii=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _digits(index: int, sizes: list[int]) -> list[int]:
+    """The levels of a condition, by dimension."""
+    found = []
+    for size in reversed(sizes):
+        index, digit = divmod(index, size)
+        found.append(digit)
+    return found[::-1]
+
+
+def _spread(size: int) -> list[int]:
+    """All indices but the first, or some of them from end to end."""
+    if size <= MAX_TRIED:
+        return list(range(1, size))
+    return sorted({index * (size - 1) // (MAX_TRIED - 1) for index in range(1, MAX_TRIED)})
+
+
+def _together(study: Study, levels: list[Level]) -> tuple[tuple[Setting, ...], tuple[str, ...]]:
+    settings = [*study.fixed, *(setting for level in levels for setting in level.settings)]
+    return tuple(settings), tuple(name for level in levels for name in level.disturb)
+
+
+def _load(study: Study, settings: tuple[Setting, ...], disturb: tuple[str, ...]) -> Model:
+    types = [each for file in study.types for each in types_of_file(file)]
+    return load_model(
+        study.model, set=[replace(setting, used=False) for setting in settings], disturb=disturb, types=types
+    )
+
+
+def _tried(study: Study, indices: list[int], models: list[Model], texts: dict[str, str], problems: Problems) -> Sources:
+    """Load the model with these levels; the files that this reads."""
+    levels = [dimension.level(at) for dimension, at in zip(study.dimensions, indices, strict=True)]
+    with noting_files() as noted:
+        try:
+            models.append(_load(study, *_together(study, levels)))
+        except ModelError as error:
+            for problem in error.problems:
+                problems.add(problem.message, problem.position, *problem.help)
+    home = Path(next(iter(noted), "")).resolve().parent
+    found = {}
+    for name, digest in [*noted.items(), *((str(file), _digest(file)) for file in study.types)]:
+        path = Path(name).resolve()
+        # By names that stay when a study and its model are moved, or Epicycle is.
+        shown = path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name
+        found[shown] = digest
+        if path.suffix in (".yaml", ".yml"):
+            texts[shown] = path.read_text(encoding="utf-8")
+    return found
+
+
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()

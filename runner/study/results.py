@@ -1,0 +1,137 @@
+"""What a study has found: its table, as Arrow, pandas or xarray."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from epicycle.actors import EpicycleError, counted
+
+from ..tables import pandas_module
+from .plan import Plan
+from .schedule import OK
+from .store import Store, StoreError, rank, replace_file
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow as pa
+    import xarray
+
+TIMES = ("wall_time",)  # what is not the same each time
+
+
+class StudyResults:
+    """The results folder of a study, finished or not.
+
+    >>> results = open_study("results/mm1_load")
+    >>> results.to_pandas().groupby("load")["mean_wait"].mean()
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._store = Store(folder)
+        self.manifest = self._store.manifest
+        self.plan = Plan.of_manifest(self.manifest)
+
+    @property
+    def factors(self) -> list[str]:
+        """The columns that say what was varied."""
+        return list(self.manifest["factors"])
+
+    @property
+    def metrics(self) -> list[str]:
+        """The columns that say what came out."""
+        return list(self.manifest["metrics"])
+
+    def table(self, *, times: bool = False) -> pa.Table:
+        """A row for each run that is over, by condition and replication; ``times``: with the wall time of each.
+
+        Without times the table of a study is the same bit for bit, whatever happened while it was made.  Rows of runs
+        that the study no longer has, as its file or model has changed, are left out.
+        """
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        batches = list(self._store.rows())
+        table = pa.Table.from_batches(batches, self._store.schema)
+        order = self._order(set(pc.unique(table["condition"]).to_pylist()))
+        places = pa.array([order.get(key, -1) for key in table["condition"].to_pylist()], pa.int64())
+        ranks = pa.array([rank(status) for status in table["status"].to_pylist()], pa.int8())
+        table = table.set_column(table.schema.get_field_index("condition"), "condition", places)
+        table = table.append_column("_rank", ranks)
+        wanted = pc.and_(pc.greater_equal(places, 0), pc.less(table["replication"], self.plan.replications))
+        table = table.filter(wanted).sort_by(
+            [("condition", "ascending"), ("replication", "ascending"), ("_rank", "ascending"), ("run", "ascending")]
+        )
+        # Of a run that was written more than once, the best row is the first.
+        runs = list(zip(table["condition"].to_pylist(), table["replication"].to_pylist(), strict=True))
+        firsts = [each != before for each, before in zip(runs, [None, *runs], strict=False)]
+        table = table.filter(pa.array(firsts, pa.bool_())).drop_columns(["_rank", *(() if times else TIMES)])
+        return table.combine_chunks().replace_schema_metadata(None)
+
+    def _order(self, keys: set[str]) -> dict[str, int]:
+        """The numbers of conditions by their keys; a plan is gone through only as far as there are results."""
+        found: dict[str, int] = {}
+        missing = set(keys)
+        for condition in self.plan:
+            if not missing:
+                break
+            if condition.key in missing:
+                missing.discard(condition.key)
+                found[condition.key] = condition.index
+        return found
+
+    def counts(self) -> Counter[str]:
+        """How many runs are over, by status."""
+        return Counter(self.table()["status"].to_pylist())
+
+    def failures(self) -> list[dict[str, Any]]:
+        """The rows that are not ``ok``, each with the command that repeats its run."""
+        return [
+            {**row, "replay": f"epicycle replay {self.folder} {row['run'][:12]}"}
+            for row in self.table().to_pylist()
+            if row["status"] != OK
+        ]
+
+    def find(self, run: str) -> dict[str, Any]:
+        """The row of a run, by the beginning of its key; raises ``StoreError``."""
+        found = [row for row in self.table().to_pylist() if row["run"].startswith(run)]
+        if len(found) == 1:
+            row: dict[str, Any] = found[0]
+            return row
+        if found:
+            raise StoreError(f"{counted(len(found), 'run')} of {self.folder} begin with {run!r}: give more of it")
+        raise StoreError(
+            f"{self.folder} has no run {run!r}\n"
+            f"   help: the column 'run' of {self.folder}/table.parquet has their names"
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table as a data frame."""
+        frame: pandas.DataFrame = pandas_module().DataFrame(self.table(times=True).to_pydict())
+        return frame
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The metrics over the factors and the replication; needs the package xarray."""
+        try:
+            import xarray  # type: ignore[import-not-found, unused-ignore]
+        except ImportError as error:
+            raise EpicycleError("this needs xarray: pip install 'epicycle[xarray]'") from error
+        frame = self.to_pandas().set_index([*self.factors, "replication"])[self.metrics]
+        found: xarray.Dataset = xarray.Dataset.from_dataframe(frame)
+        return found
+
+    def write_table(self) -> Path:
+        """Write ``table.parquet``."""
+        import pyarrow.parquet as pq
+
+        path = self.folder / "table.parquet"
+        table = self.table()
+        replace_file(path, lambda aside: pq.write_table(table, aside))
+        return path
+
+
+def open_study(folder: str | Path) -> StudyResults:
+    """The results of a study, which may still be running; raises ``StoreError``."""
+    return StudyResults(Path(folder))

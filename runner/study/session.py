@@ -1,0 +1,148 @@
+"""A session of a study: what is not there yet is made, and what there is then is told."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import EpicycleError, counted
+
+from ..engine import Simulation
+from ..provenance import git_revision, machine, versions
+from .local import LocalExecutor
+from .plan import Plan
+from .results import StudyResults
+from .schedule import OK, Schedule
+from .store import FORMAT, StoreError, collect, is_wanted, lock, prepare, read_manifest
+
+MANY = 100_000  # runs that nobody asks for by mistake
+_TRIAL = 5.0  # s that are spent at most to find out how long a run takes
+
+
+class TooManyRunsError(EpicycleError):
+    """A study that is larger than its author may think."""
+
+
+@dataclass
+class Outcome:
+    """What a session has done: runs by status, those that it made and those that were there."""
+
+    made: int
+    there: int
+    failed: int  # of both
+    stopped_early: int
+    table: Path
+
+    @property
+    def is_good(self) -> bool:
+        """Whether all runs are ok."""
+        return self.failed == 0
+
+
+def run_study(
+    plan: Plan,
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    timeout: float | None = None,
+    retry: bool = False,
+    tell: Callable[[Schedule], None] | None = None,
+) -> Outcome:
+    """Make all runs of a plan that are not in the folder yet.
+
+    ``retry``: also those that took too long or whose process died.  Raises ``StoreError`` and ``WorkerError``.
+    """
+    with lock(folder):
+        store = prepare(folder, manifest_of(plan))
+        until = plan.study.until
+        known = store.known(None if until is None else until.metric)
+        schedule = Schedule(plan, {key: done for key, done in known.items() if is_wanted(done, retry)})
+        executor = LocalExecutor(store, plan, jobs or available_cores(), timeout)
+        executor.run(schedule, lambda: None if tell is None else tell(schedule))
+        collect(store)
+        results = StudyResults(folder)
+        table = results.write_table()
+        made, there = schedule.made, schedule.there
+        failed = made.total() + there.total() - made[OK] - there[OK]
+        return Outcome(made.total(), there.total(), failed, schedule.stopped_early, table)
+
+
+def manifest_of(plan: Plan) -> dict[str, Any]:
+    """All that the folder is to know: the plan, and what its results are made with."""
+    study = plan.study
+    return {
+        "format": FORMAT,
+        **plan.manifest(),
+        "versions": versions(),
+        "machine": machine(),
+        "git": git_revision(study.path.resolve().parent),
+    }
+
+
+def plan_of_folder(folder: Path) -> Plan:
+    """The plan of a results folder, to go on with; raises ``StoreError`` if its model is not the same any more."""
+    manifest = read_manifest(folder)
+    before = Plan.of_manifest(manifest)
+    plan = Plan.made(before.study)
+    if changed := sorted(name for name, digest in plan.sources.items() if before.sources.get(name) != digest):
+        raise StoreError(
+            f"the model has changed since {folder} was made: {', '.join(changed)}\n"
+            f"   help: 'epicycle study {before.study.path} --out {folder}' makes the runs of the changed model"
+        )
+    return plan
+
+
+def available_cores() -> int:
+    """How many processes can run at once."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def check_size(plan: Plan, jobs: int) -> None:
+    """Raise ``TooManyRunsError`` for a study of very many runs, with how long it would take."""
+    if plan.size <= MANY:
+        return
+    seconds = seconds_of_a_run(plan) * plan.size / jobs
+    raise TooManyRunsError(
+        f"{plan.study.name} has {plan.conditions:,} conditions of {counted(plan.replications, 'replication')}: "
+        f"{plan.size:,} runs, which take about {duration(seconds)} with {jobs} at a time\n"
+        "   help: add --yes if that is what you want"
+    )
+
+
+class _Enough(Exception):  # noqa: N818  it is no error
+    pass
+
+
+def seconds_of_a_run(plan: Plan) -> float:
+    """How long the first run takes, or seems to take after a few seconds of it."""
+    condition = plan.condition(0)
+    model = plan.load(condition)
+    started = time.perf_counter()
+    reached = 0.0
+
+    def watch(now: float) -> None:
+        nonlocal reached
+        reached = now
+        if time.perf_counter() - started > _TRIAL:
+            raise _Enough
+
+    try:
+        Simulation(model, seed=plan.seed(condition, 0)).run(progress=watch)
+    except _Enough:
+        if model.stop and reached:
+            return _TRIAL * model.stop / reached
+    except EpicycleError:
+        pass  # the first run fails; others may not
+    return time.perf_counter() - started
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it."""
+    for limit, size, unit in ((100, 1, "s"), (6_000, 60, "min"), (172_800, 3600, "h"), (63_072_000, 86_400, "days")):
+        if seconds < limit:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds / 31_536_000:,.0f} years"

@@ -1,0 +1,81 @@
+"""What is said about studies that are wrong: whole messages, from ``bad_studies.txt``.
+
+A case is ``### its name``, ``$ option`` lines for --set, the study, ``>>>``, and the message.
+``python tests/study/test_bad_studies.py`` writes the messages anew; read the difference before keeping it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from epicycle.runner import ModelError, load_model
+from epicycle.runner.cli import main
+
+sys.path.insert(0, str(Path(__file__).parent))
+from study_parts import plan_of, write
+
+FILE = Path(__file__).parent / "bad_studies.txt"
+CASE = re.compile(r"^### ([^\n]+)\n((?:\$ [^\n]*\n)*)(.*?)^>>>\n(.*?)(?=^### |\Z)", re.MULTILINE | re.DOTALL)
+CASES = CASE.findall(FILE.read_text(encoding="utf-8"))
+# What grows with the house.
+LISTS = re.compile(r"(packaged \w+: |known functions: )[^;\n]*")
+
+
+def message(options: str, study: str) -> str:
+    """What is said about a study beside the model of the tests."""
+    write(Path("."), study)
+    (Path("gusts.yaml")).write_text("disturbance: gusts\nset: {dirft: 1}\n", encoding="utf-8")
+    try:
+        plan_of(Path("walks.yaml"), set=tuple(options.replace("$ ", "").splitlines()))
+    except ModelError as error:
+        return LISTS.sub(r"\1...", str(error)) + "\n"
+    return "nothing\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "study", "expected"), [case[1:] for case in CASES], ids=[case[0] for case in CASES]
+)
+def test_message(options: str, study: str, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert message(options, study) == expected.rstrip("\n") + "\n"
+
+
+def test_names_of_the_other_kind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path)
+    with pytest.raises(ModelError) as caught:
+        load_model(path)
+    assert str(caught.value) == f"error: {path} is a study, not a model\n   help: run it: epicycle study {path}"
+    assert main(["study", "tabel_1"]) == 2
+    assert LISTS.sub(r"\1...", capsys.readouterr().err) == (
+        "error: there is no packaged study 'tabel_1', did you mean 'table_1'?\n"
+        "   help: packaged studies: ...; a path to a file ends in .yaml\n"
+    )
+    assert main(["validate", "table_1", "--without", "packet_loss"]) == 2
+    assert capsys.readouterr().err == "error: --without is for models: a study says itself what it changes\n"
+
+
+def test_packaged_studies_are_valid(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "table_1"]) == 0
+    assert capsys.readouterr().out == "table_1 is valid: 60 conditions of 100 replications, 6,000 runs\n"
+    assert main(["validate", "waiting_time"]) == 0
+    assert capsys.readouterr().out == "waiting_time is valid: 5 conditions of 10 replications, 50 runs\n"
+
+
+def write_anew() -> None:
+    """Put the present messages into the file."""
+    cases = []
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        for name, options, study, _ in CASES:
+            cases.append(f"### {name}\n{options}{study}>>>\n{message(options, study)}\n")
+    FILE.write_text("".join(cases).rstrip("\n") + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_anew()

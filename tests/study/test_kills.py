@@ -1,0 +1,108 @@
+"""`kill -9` of a study and of its workers, at any moment: nothing is lost, the table is as if nothing had been."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from epicycle.runner.study import open_study, run_study
+
+sys.path.insert(0, str(Path(__file__).parent))
+from study_parts import STUDY, THIS, command, plan_of, write
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes in /proc")
+
+
+def members(session: int) -> list[int]:
+    """The processes of a session, its leader left out."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdecimal() and int(entry.name) != session:
+            try:
+                if os.getsid(int(entry.name)) == session:
+                    found.append(int(entry.name))
+            except OSError:
+                continue
+    return sorted(found)
+
+
+def rows(folder: Path) -> set[str]:
+    """The runs that are finished."""
+    if not (folder / "manifest.json").is_file():
+        return set()
+    return set(open_study(folder).table()["run"].to_pylist())
+
+
+def written(folder: Path) -> int:
+    """How many bytes of rows there are; it changes when something happens."""
+    total = 0
+    for path in (*folder.glob("journals/*"), *folder.glob("parts/*")):
+        with suppress(FileNotFoundError):
+            total += path.stat().st_size
+    return total
+
+
+def wait_for_rows(folder: Path, process: subprocess.Popen[bytes]) -> None:
+    """Until something is written, or the process has ended."""
+    before, start = written(folder), time.monotonic()
+    while written(folder) == before and process.poll() is None and time.monotonic() - start < 60:
+        time.sleep(0.01)
+
+
+def kill_and_resume(tmp_path: Path, *, jobs: int, kills: int, replications: int, seed: int) -> None:
+    """Kill a study that often, the whole group or one of its processes, and compare it with one that was left alone."""
+    pause = "pause=0.05"
+    write(tmp_path, STUDY.replace("replications: 5", f"replications: {replications}"))
+    run_study(plan_of(tmp_path / "walks.yaml", set=(pause,)), tmp_path / "calm", jobs=2)
+    random = np.random.default_rng(seed)
+    out = tmp_path / "out"
+
+    def next_command() -> list[str]:
+        if (out / "manifest.json").is_file():
+            return command("resume", out, "--jobs", jobs)
+        return command("study", tmp_path / "walks.yaml", "--types", THIS, "--set", pause, "--out", out, "--jobs", jobs)
+
+    done = 0
+    finished: set[str] = set()
+    while done < kills:
+        process = subprocess.Popen(next_command(), start_new_session=True, stdout=subprocess.DEVNULL)
+        try:
+            while done < kills and process.poll() is None:
+                if random.random() < 0.8:  # most of the time while it works, not while it starts
+                    wait_for_rows(out, process)
+                time.sleep(float(random.uniform(0.0, 0.2)))
+                others = members(process.pid)
+                done += 1
+                if random.random() < 0.5 or not others:
+                    break
+                with suppress(ProcessLookupError):
+                    os.kill(others[int(random.integers(len(others)))], signal.SIGKILL)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        now = rows(out)
+        assert finished <= now
+        finished = now
+    assert 0 < len(finished) < 2 * replications
+    assert subprocess.run(next_command(), check=False, stdout=subprocess.DEVNULL).returncode == 0
+    assert (out / "table.parquet").read_bytes() == (tmp_path / "calm" / "table.parquet").read_bytes()
+    assert len(rows(out)) == 2 * replications
+
+
+def test_nothing_is_lost(tmp_path: Path) -> None:
+    kill_and_resume(tmp_path, jobs=2, kills=2, replications=15, seed=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_nothing_is_lost_in_twenty_kills(jobs: int, tmp_path: Path) -> None:
+    kill_and_resume(tmp_path, jobs=jobs, kills=20, replications=200, seed=jobs)
