@@ -53,13 +53,13 @@ class Requests:
                 f"{self.model.response} sends {request!r}, which is no request: what leaves an aspect that is a model "
                 "must be what came in, with another token in it if need be"
             )
-        job = self._jobs.pop((request.port, request.way), None) if isinstance(request, FiringRequest) else None
-        if job is not None and request.aspect == self.name:
-            (point,) = self._ways[request.port]
-            point.act("executed", self._since(request, point))
-            point.forward(job)
-            return
         ways = self._ways.get(request.port, []) if request.aspect == self.name else []
+        if ways and isinstance(request, FiringRequest):
+            job = self._jobs.pop((request.port, request.way), None)
+            if job is not None:
+                ways[0].act("executed", self._since(request, ways[0]))
+                ways[0].forward(job)
+                return
         if isinstance(request, FiringRequest) or not 0 <= request.way < len(ways):
             raise EpicycleError(
                 f"{self.model.response} sends {request!r}, which is no request to {self.name} that waits for an answer"

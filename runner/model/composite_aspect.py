@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import networkx as nx
 
-from epicycle.actors import accepts, declared_parameters, type_name
+from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, Request
 
 from .declarations import PartText, PointcutText
@@ -75,6 +75,12 @@ class ModelWeaving(Weaving):
                     "add another input for what else the composite needs",
                 )
                 self.graph.disconnect(hop)
+            if isinstance(self.graph.ports.nodes[port]["port"], OutputPort):
+                self._problem(
+                    f"{self.path} is the model of another aspect already",
+                    self.position,
+                    "let that one stand here, too, or add another composite",
+                )
         self._check_types()
         self._check_directors(woven)
 
@@ -131,13 +137,7 @@ class ModelWeaving(Weaving):
         """The port by which the tokens of a pointcut come in."""
         asked = pointcut.request
         if asked is None:
-            found = self._only(
-                self.inputs,
-                "request",
-                "input",
-                pointcut.position,
-                BY_PLACE,
-            )
+            found = self._only(self.inputs, "request", "input", pointcut.position, BY_PLACE)
         else:
             found = f"{self.path}.{asked.text}"
             if found not in self.inputs:

@@ -306,6 +306,27 @@ def test_an_aspect_in_local_time() -> None:
     assert [tag.seconds for tag, *_ in sends(results, "a.output")] == [0.15, 1.15, 2.15]
 
 
+class Twice(Actor):
+    """Answers every request twice."""
+
+    input = InputPort(Request)
+    output = OutputPort(Request)
+
+    def fire(self) -> None:
+        for request in self.input.tokens:
+            self.output.send(request)
+            self.output.send(request)
+
+
+def test_an_answer_may_come_twice_but_a_firing_happens_once() -> None:
+    text = PAIR.replace("{type: Negate}", "{type: Twice}")
+    ports = engine_parts.load(text.replace("{ASPECTS}", "{net: {type: Line, at: a.input}}"), types=[Twice])
+    assert [value for *_, value in sends(run(ports), "a.output")] == [0, 0, 2, 2, 4, 4]
+    firings = engine_parts.load(text.replace("{ASPECTS}", "{net: {type: Line, at: {at: a, time: 0}}}"), types=[Twice])
+    with pytest.raises(ActorError, match="which is no request to net that waits for an answer"):
+        run(firings)
+
+
 def test_what_comes_out_must_have_gone_in() -> None:
     text = PAIR.replace("{type: Negate}", "{type: Unwrap}").replace("{ASPECTS}", "{net: {type: Line, at: a.input}}")
     with pytest.raises(ActorError) as caught:
@@ -622,6 +643,9 @@ def test_models_built_in_python(tmp_path: Path) -> None:
     net.connect("negate.output -> response")
     model.weave("net", net, at="a.input")
     assert [value for *_, value in sends(run(model), "a.output")] == [0.0, -2.0, -4.0]
+    with pytest.raises(ModelError, match="medium is the model of another aspect already"):
+        model.weave("again", net, at="b.input")
+    assert [woven.name for woven in model.aspects] == ["net"]
 
 
 def test_a_weaving_that_fails_changes_nothing(tmp_path: Path) -> None:
