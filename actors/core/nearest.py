@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import heapq
 import itertools
 from collections.abc import Iterable
 
 _MAX_NAME = 200  # comparing names takes quadratic time; nobody mistypes a name this long
 _MAX_CANDIDATES = 2_000
+_MAX_COMPARED = 100
 
 
 def nearest(name: str, candidates: Iterable[str], likeness: float = 0.6) -> str | None:
@@ -21,8 +23,21 @@ def nearest(name: str, candidates: Iterable[str], likeness: float = 0.6) -> str 
     for candidate in itertools.islice(candidates, _MAX_CANDIDATES):
         if candidate != name and len(candidate) <= _MAX_NAME:
             by_folded.setdefault(candidate.casefold(), candidate)
-    found = difflib.get_close_matches(name.casefold(), by_folded, n=1, cutoff=likeness)
+    asked, likely = name.casefold(), list(by_folded)
+    if len(likely) > _MAX_COMPARED:
+        likely = heapq.nlargest(_MAX_COMPARED, likely, key=lambda each: _shared_ends(asked, each))
+    found = difflib.get_close_matches(asked, likely, n=1, cutoff=likeness)
     return by_folded[found[0]] if found else None
+
+
+def _shared_ends(one: str, other: str) -> int:
+    """How many letters two names have in common at the start and at the end."""
+    return _shared_start(one, other) + _shared_start(one[::-1], other[::-1])
+
+
+def _shared_start(one: str, other: str) -> int:
+    pairs = enumerate(zip(one, other, strict=False))
+    return next((place for place, (mine, its) in pairs if mine != its), min(len(one), len(other)))
 
 
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:

@@ -4,11 +4,13 @@ from .evaluation import check_names, evaluate, interpolate, names_in
 from .formula import Formula, FormulaParameter, operand
 from .port_formula import PortFormula, PortFormulaParameter, value_at
 from .syntax import ExpressionError
-from .values import CONSTANTS, FUNCTIONS, text_of
+from .values import CONSTANTS, FUNCTIONS, Budget, BudgetError, text_of
 
 __all__ = [
     "CONSTANTS",
     "FUNCTIONS",
+    "Budget",
+    "BudgetError",
     "ExpressionError",
     "Formula",
     "FormulaParameter",

@@ -37,16 +37,16 @@ T = TypeVar("T")
 P = ParamSpec("P")
 
 
-def evaluate(source: str, names: Mapping[str, object]) -> object:
-    """Return the value of an expression in which the given names are known."""
+def evaluate(source: str, names: Mapping[str, object], budget: Budget | None = None) -> object:
+    """Return the value of an expression in which the given names are known; ``budget`` is for several together."""
     tree = parse(source)
-    evaluation = _Evaluation(source, names)
+    evaluation = _Evaluation(source, names, Budget(whole=budget))
     value = evaluation.guard(tree, evaluation.value, tree)
     evaluation.guard(tree, check_result, value)
     return value
 
 
-def interpolate(text: str, names: Mapping[str, object]) -> object:
+def interpolate(text: str, names: Mapping[str, object], budget: Budget | None = None) -> object:
     """Return the text with its `${...}` evaluated; a text that is one `${...}` gives the value as it is.
 
     In a longer text a quantity counts in the unit that is written behind it, or else in SI units.  `$${` stands for
@@ -59,7 +59,7 @@ def interpolate(text: str, names: Mapping[str, object]) -> object:
             parts.append(source)
             continue
         with _shifted(offset):
-            value = evaluate(source, names)
+            value = evaluate(source, names, budget)
             if len(pieces) == 1:
                 return value
             parts.append(_as_text(source, _as_read(value, pieces[number + 1 :])))
@@ -180,11 +180,11 @@ def _as_text(source: str, value: object) -> str:
 class _Evaluation:
     """One walk over a checked tree."""
 
-    def __init__(self, source: str, names: Mapping[str, object]) -> None:
+    def __init__(self, source: str, names: Mapping[str, object], budget: Budget) -> None:
         self._source = source
         self._names = names
         self._bound: list[dict[str, object]] = []
-        self._budget = Budget()
+        self._budget = budget
 
     def _error(self, node: ast.expr, message: str) -> ExpressionError:
         return ExpressionError(message, node.col_offset, (node.end_col_offset or 0) - node.col_offset)

@@ -1,5 +1,7 @@
 """What expressions compute with: operators, functions and constants, each checked before it is costly."""
 
+from __future__ import annotations
+
 import ast
 import math
 import operator
@@ -22,16 +24,28 @@ class BudgetError(Exception):
 
 
 class Budget:
-    """What one evaluation may still spend; a step is one part, or ten elements or characters."""
+    """What may still be spent, by one evaluation or, as the ``whole``, by several.
 
-    def __init__(self) -> None:
-        self._left = MAX_STEPS
+    A step is one part of an expression, or ten elements or characters.
+    """
+
+    def __init__(self, steps: int = MAX_STEPS, what: str = "this takes", whole: Budget | None = None) -> None:
+        self._steps = self._left = steps
+        self._what = what
+        self._whole = whole
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether more has been asked for than there was."""
+        return self._left < 0
 
     def spend(self, steps: int) -> None:
         """Take some steps off, or raise if there are not so many left."""
+        if self._whole is not None:
+            self._whole.spend(steps)
         self._left -= steps
         if self._left < 0:
-            raise BudgetError(f"this takes more than {MAX_STEPS:,} steps")
+            raise BudgetError(f"{self._what} more than {self._steps:,} steps")
 
     def weigh(self, value: object) -> None:
         """Pay for a value by its size, or raise if it is too large."""

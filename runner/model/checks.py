@@ -14,7 +14,7 @@ from .graph import Detour, Hop, ModelGraph, Wire
 from .problems import Position, Problems
 from .schedule import dependencies
 
-MAX_WIRES = 1_000_000
+MAX_WIRES = 200_000
 MAX_PASSAGE = 200  # composite ports in a row
 MAX_SHOWN = 10  # names in one message
 

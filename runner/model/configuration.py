@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from pathlib import Path
 
 from epicycle.actors import Configurable, ParameterError, declared_parameters, unknown_parameter
@@ -63,7 +63,7 @@ class Configurator:
         for name, declared in composite.parameters.items():
             full = f"{path}.{name}" if path else name
             node, scope, instance = declared.value, names, path
-            later: Sequence[str] = list(composite.parameters)
+            later: Collection[str] = composite.parameters.keys()
             if name in given:
                 node, scope, instance, later = given[name].value, outer, above, ()
             if (setting := self._setting(full)) is not None:

@@ -28,7 +28,7 @@ from .problems import Position, Problems, did_you_mean
 
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 100
-MAX_NODES = 500_000  # with each alias counted as often as it is used
+MAX_NODES = 200_000  # with each alias counted as often as it is used
 _MAX_DIGITS = 1_000
 
 _LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

@@ -34,8 +34,8 @@ from .settings import Settings
 from .wiring import Child, Wiring
 from .woven import WovenAspect, check_processors
 
-MAX_COUNT = 100_000
-MAX_INSTANCES = 200_000  # of actors and composites together
+MAX_COUNT = 20_000
+MAX_INSTANCES = 20_000  # of actors and composites together
 MAX_DEPTH = 50
 
 

@@ -19,6 +19,7 @@ from .settings import Settings
 from .weave import Weaving
 from .woven import WovenAspect
 
+MAX_PLACES = 100_000  # of all aspects together
 MAX_SHOWN = 12  # types in one message
 
 
@@ -38,6 +39,7 @@ class AspectElaborator(Configurator):
         self.broken = broken  # composites that are there, but lack what they extend
         self.catalogue = catalogue
         self.aspects: list[WovenAspect] = []
+        self._places = 0
         # What is to be woven: (name, scope, declaration, names), and the actors, whose classes may be decorated.
         self._to_weave: list[tuple[str, str, PartText, dict[str, object]]] = []
         self._actors: list[Actor] = []
@@ -92,6 +94,10 @@ class AspectElaborator(Configurator):
         if isinstance(weaving, ModelWeaving):
             weaving.check(woven)
             weaving.connect(woven)
+        self._places += len(woven.places)
+        if self._places > MAX_PLACES:
+            self.problems.add(f"aspect {name}: aspects stand at more than {MAX_PLACES:,} places", part.position)
+            self.problems.raise_if_any()
         if is_enabled:
             self.aspects.append(woven)
 

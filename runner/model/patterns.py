@@ -15,6 +15,7 @@ from epicycle.actors import did_you_mean
 _SEGMENT = re.compile(r"(\*\*(?!\[)|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?\Z")
 
 _INDEX = re.compile(r"\[\d+\]")
+MAX_PATTERN = 1_000
 
 
 class PatternError(ValueError):
@@ -24,23 +25,37 @@ class PatternError(ValueError):
 @lru_cache(maxsize=4096)
 def compile_pattern(text: str) -> re.Pattern[str]:
     """The regular expression of a pattern; raises ``PatternError``."""
-    parts = []
-    for name, index in _segments(text):
+    # What stands between two `**` is taken where it fits first, and that is final (?>...): to look for it further on
+    # could find nothing more, but might take for ever.
+    head, *tails = _split_at_doubles(_segments(text))
+    expression = "".join(f"{segment}\\." for segment in head)
+    for tail in tails[:-1]:
+        expression += r"(?>(?:[^.]+\.)+?" + "".join(f"{segment}\\." for segment in tail) + ")"
+    if tails:
+        expression += r"(?:[^.]+\.)+" + "".join(f"{segment}\\." for segment in tails[-1])
+    # Every segment has got its dot; the path gets one more to match.
+    return re.compile(expression)
+
+
+def _split_at_doubles(segments: Iterable[tuple[str, str | None]]) -> list[list[str]]:
+    """The regular expressions of the segments before, between and behind the ``**`` of a pattern."""
+    parts: list[list[str]] = [[]]
+    for name, index in segments:
         if name == "**":
-            parts.append(r"(?:[^.]+\.)*[^.]+")
+            parts.append([])
         elif name == "*":
-            parts.append(r"[^.]+")
+            parts[-1].append(r"[^.]+")
         elif index is None:
-            parts.append(re.escape(name))
+            parts[-1].append(re.escape(name))
         else:
-            parts.append(re.escape(name) + (r"\[\d+\]" if index == "*" else re.escape(f"[{index}]")))
-    return re.compile(r"\.".join(parts) + r"\Z")
+            parts[-1].append(re.escape(name) + (r"\[\d+\]" if index == "*" else re.escape(f"[{index}]")))
+    return parts
 
 
 def _segments(text: str) -> list[tuple[str, str | None]]:
     """The names and indices of a pattern; raises ``PatternError``."""
-    if len(text) > 1000:
-        raise PatternError("a pattern has at most 1,000 characters")
+    if len(text) > MAX_PATTERN:
+        raise PatternError(f"a pattern has at most {MAX_PATTERN:,} characters")
     found = []
     for segment in text.split("."):
         match = _SEGMENT.match(segment)
@@ -52,7 +67,7 @@ def _segments(text: str) -> list[tuple[str, str | None]]:
 
 def matches(pattern: str, path: str) -> bool:
     """Whether the pattern selects the path."""
-    return compile_pattern(pattern).match(path) is not None
+    return compile_pattern(pattern).fullmatch(f"{path}.") is not None
 
 
 def could_be_within(pattern: str, path: str, *, array: bool) -> bool:
@@ -101,7 +116,7 @@ class PathIndex:
         # Where the first wildcard stands, `name[*]` still says the name.
         fixed = pattern.partition("*")[0].rstrip("[.")
         candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else list(self._place)
-        return [path for path in candidates if expression.match(path)]
+        return [path for path in candidates if expression.fullmatch(f"{path}.")]
 
     def in_order(self, paths: Iterable[str]) -> list[str]:
         """The given paths in their order here."""
@@ -120,6 +135,8 @@ class PathIndex:
         """What could be written in place of a pattern that selects none: which ports there are where it points to."""
         start = f"{scope}." if scope else ""
         owner = pattern.rpartition(".")[0]
+        if len(start) + len(pattern) + 2 > MAX_PATTERN:
+            return ()
         for holder in (pattern, owner):
             ports = [path for path in self.select(f"{start}{holder}.*") if fits(path)] if holder else []
             names = list(dict.fromkeys(path.rpartition(".")[2] for path in ports))

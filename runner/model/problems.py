@@ -50,39 +50,36 @@ class Problem:
 
 
 class ModelError(EpicycleError):
-    """A model that cannot be used, with every problem found in it; `more` counts those that were left out."""
+    """A model that cannot be used, with the problems found in it; `more` says that there are others."""
 
-    def __init__(self, problems: Iterable[Problem], more: int = 0) -> None:
+    def __init__(self, problems: Iterable[Problem], more: bool = False) -> None:
         self.problems = tuple(problems)
         self.more = more
         super().__init__(self.problems, more)  # args are what pickle and copy rebuild the error from
 
     def __str__(self) -> str:
         parts = [str(problem) for problem in self.problems]
-        if self.more:
-            parts.append(f"... and {self.more} more")
         text = "\n\n".join(parts)
-        count = len(self.problems) + self.more
-        if count > 1:
+        if len(parts) > 1:
             files = dict.fromkeys(visible(p.position.file) for p in self.problems if p.position is not None)
+            count = f"more than {len(parts)}" if self.more else f"{len(parts)}"
             text += f"\n{count} errors" + (f" in {', '.join(files)}" if files else "")
         return text
 
 
 class Problems:
-    """Collects problems, so that one run shows them all; identical ones count once, 100 are kept."""
+    """Collects problems, so that one run shows them all; identical ones count once, and after 100 it is enough."""
 
     def __init__(self) -> None:
         # What is wrong in an array is told for the first instance; a composite class's fault, for its first use.
         self._kept: dict[tuple[str, Position | None], Problem] = {}
-        self._left_out: set[int] = set()  # hashes will do: this is only a count
         self._warnings: dict[tuple[str, Position | None], Problem] = {}
         self._unsaid = 0
         self._spoilt: set[Position] = set()
         self.muted = False  # while true, problems count for len() alone: they repeat what has been said
 
     def __len__(self) -> int:
-        return len(self._kept) + len(self._left_out) + self._unsaid
+        return len(self._kept) + self._unsaid
 
     def __bool__(self) -> bool:
         """True for any collector, as `problems or Problems()` must not lose an empty one; ask len()."""
@@ -105,7 +102,7 @@ class Problems:
             self._warnings.setdefault(key, Problem(message, position, hints, "warning"))
 
     def add(self, message: str, position: Position | None = None, *hints: str, scope: str = "") -> None:
-        """Note a problem; each hint becomes a line of help.
+        """Note a problem; each hint becomes a line of help.  One too many raises all that there are as a ModelError.
 
         ``scope`` is the path, within the message, of the instance of a composite class that stands for them all.
         """
@@ -115,10 +112,9 @@ class Problems:
         key = (_INDEX.sub("[]", message.replace(f"{scope}.", "") if scope else message), position)
         if key in self._kept:
             return
-        if len(self._kept) < MAX_PROBLEMS:
-            self._kept[key] = Problem(message, position, hints)
-        else:
-            self._left_out.add(hash(key))
+        if len(self._kept) == MAX_PROBLEMS:
+            raise self._error(more=True)  # to find them all, and what each was meant to be, may take very long
+        self._kept[key] = Problem(message, position, hints)
 
     def spoil(self, position: Position) -> None:
         """Let nothing more be said of what stands there: it would only be a consequence of what has been said."""
@@ -127,7 +123,10 @@ class Problems:
     def raise_if_any(self) -> None:
         """Raise all problems as one ModelError, if there are any."""
         if self._kept:
-            raise ModelError(sorted(self.found, key=self._place), len(self._left_out))
+            raise self._error()
+
+    def _error(self, *, more: bool = False) -> ModelError:
+        return ModelError(sorted(self.found, key=self._place), more)
 
     def _place(self, problem: Problem) -> tuple[int, int, int]:
         """Where a problem is shown: file by file as they were met, and from top to bottom."""

@@ -6,12 +6,14 @@ from collections.abc import Collection, Container
 from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, Quantity
-from epicycle.actors.expression import ExpressionError, check_names, interpolate, names_in
+from epicycle.actors.expression import Budget, BudgetError, ExpressionError, check_names, interpolate, names_in
 
 from .declarations import ParameterText
 from .document import Mapping, Node, Scalar, Sequence
 from .problems import Position, Problems
 from .reading import inside
+
+MAX_STEPS = 500_000
 
 
 class _Missing:
@@ -26,6 +28,7 @@ class Values:
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
         self.outside: dict[str, object] = {}  # the names that a value knows which is set from outside: none
+        self._budget = Budget(MAX_STEPS, "the values of the model take")
         self.of_model: Container[str] = ()  # the model's own parameters, which composites do not see
 
     def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Collection[str] = ()) -> Any:
@@ -34,6 +37,8 @@ class Values:
         ``label`` is whose value it is, ``scope`` the composite in which it stands; ``later`` are the names that are
         declared but have no value yet.
         """
+        if not isinstance(node, Scalar):
+            self._pay(node, len(node.items if isinstance(node, Sequence) else node.entries) // 3, label, scope)
         if isinstance(node, Sequence):
             items = [self.of(item, names, label, scope, later) for item in node.items]
             return self.missing if any(item is self.missing for item in items) else items
@@ -56,12 +61,25 @@ class Values:
                     scope=scope,
                 )
                 return self.missing
-            return interpolate(node.value, {k: v for k, v in names.items() if v is not self.missing})
+            value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self._budget)
         except ExpressionError as error:
             self.problems.add(
                 f"{label}: {error.message}", _inside(node, error), *self._unseen(node.value, names), scope=scope
             )
+            if self._budget.is_spent:
+                self.problems.raise_if_any()
             return self.missing
+        if isinstance(value, (list, dict)):
+            self._pay(node, len(value) // 3, label, scope)
+        return value
+
+    def _pay(self, node: Node, steps: int, label: str, scope: str) -> None:
+        """Take steps off what all values may cost together; when that is spent, there is no going on."""
+        try:
+            self._budget.spend(steps)
+        except BudgetError as error:
+            self.problems.add(f"{label}: {error}", node.position, scope=scope)
+            self.problems.raise_if_any()
 
     def _unseen(self, text: str, names: Container[str]) -> tuple[str, ...]:
         """What to do about a name of the model's that is not known inside a composite, or outside of the model."""

@@ -17,7 +17,7 @@ from .reading import Text, within
 from .values import Values
 
 _ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
-MAX_CONNECTIONS = 300_000  # each takes about a kilobyte
+MAX_CONNECTIONS = 100_000  # each takes about a kilobyte
 
 
 @dataclass

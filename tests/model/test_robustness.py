@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import copy
 import pickle
-import re
-import shutil
 import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 import epicycle.actors
 from epicycle.actors import (
@@ -29,21 +24,10 @@ from epicycle.actors import (
 from epicycle.actors.expression import ExpressionError
 from epicycle.runner.engine import ActorError, LogError, LoopError
 from epicycle.runner.engine.encoding import TokenError
-from epicycle.runner.model import Model, ModelError, Position, Problem, load_model
-from epicycle.runner.model.load import model_folders
+from epicycle.runner.model import ModelError, Position, Problem, load_model
 
 sys.path.insert(0, str(Path(__file__).parent))
 from model_parts import TYPES
-
-EXAMPLE = next(folder for folder in model_folders() if (folder / "collision_avoidance.yaml").is_file())
-TEXT = (EXAMPLE / "collision_avoidance.yaml").read_text(encoding="utf-8")
-TOKEN = re.compile(r"[A-Za-z_]\w*|[-\d.]+|\S")
-SPICE = [
-    "", " ", "  ", "\n", ":", "- ", "{", "}", "[", "]", "'", '"', "&a", "*a", "!!int", "|", ">", "#", "${", "}", "?",
-    "${index}", "%", "null", "true", ".nan", ".inf", "-1", "1e999", "0x1F", "1e9", "[]", "{}", "[[[]]]", "a.b", "**",
-    "*", "[*]", "->", "\t", "\x00", "é", "type", "count", "value", "delay", "at", "of", "from", "to", "<<", "---",
-    "...", "99999999999999999999", "3 m", "10 s",
-]  # fmt: skip
 
 
 def said(text: str, tmp_path: Path, **options: object) -> str:
@@ -52,56 +36,6 @@ def said(text: str, tmp_path: Path, **options: object) -> str:
     with pytest.raises(ModelError) as caught:
         load_model(path, types=TYPES, **options)  # type: ignore[arg-type]
     return str(caught.value).replace(str(path), "m.yaml")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("models")
-    shutil.copytree(EXAMPLE / "robots", path / "robots", ignore=shutil.ignore_patterns("__pycache__"))
-    return path
-
-
-def mutated(text: str, chance: np.random.Generator) -> str:
-    """The text with one to five accidents of the kind that happen in an editor."""
-    for _ in range(chance.integers(1, 6)):
-        lines = text.split("\n")
-        one, other = int(chance.integers(len(lines))), int(chance.integers(len(lines)))
-        kind = chance.integers(7)
-        if kind == 0:
-            del lines[one]
-        elif kind == 1:
-            lines.insert(other, lines[one])
-        elif kind == 2:
-            lines[one], lines[other] = lines[other], lines[one]
-        elif kind == 3:
-            lines[one] = " " * int(chance.integers(7)) + lines[one].strip()
-        else:
-            tokens = list(TOKEN.finditer(text))
-            token = tokens[chance.integers(len(tokens))]
-            new = SPICE[chance.integers(len(SPICE))] if kind < 6 else tokens[chance.integers(len(tokens))][0]
-            text = text[: token.start()] + new + text[token.end() :]
-            continue
-        text = "\n".join(lines)
-    return text
-
-
-@settings(
-    max_examples=200, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(st.integers(0, 2**32))
-def test_accidents_in_a_file(folder: Path, seed: int) -> None:
-    path = folder / "m.yaml"
-    path.write_text(mutated(TEXT, np.random.default_rng(seed)), encoding="utf-8")
-    outcome: object
-    try:
-        outcome = load_model(path)
-    except ModelError as error:
-        outcome = error
-    if isinstance(outcome, ModelError):
-        assert "error: " in str(outcome)
-        assert pickle.loads(pickle.dumps(outcome)).problems == outcome.problems
-    else:
-        assert isinstance(outcome, Model)
 
 
 BOMBS = {
@@ -131,6 +65,24 @@ BOMBS = {
     + "".join(f"  - f{i}.out -> f{i + 1}.in\n" for i in range(1999)),
     "pattern": "model: m\nactors: {a: {type: Ramp}}\nrun: {record: '" + "**." * 300 + "x'}\n",
     "long name": "model: m\nactors: {a: {type: " + "R" * 100_000 + "}}\n",
+    "far patterns": "model: m\ncomposites:\n"
+    + "".join(f"  C{i}: {{actors: {{a: {{type: C{i + 1}}}}}}}\n" for i in range(45))
+    + "  C45: {actors: {a: {type: Ramp}}}\nactors: {a: {type: C0}}\nrun: {record: ['"
+    + "**." * 22
+    + "x', '"
+    + "**.a." * 20
+    + "x']}\n",
+    "values in all": "model: m\nactors:\n"
+    + "".join(f"  a{i}: {{type: Ramp, init: '${{sum([i * {i} for i in range(9000)])}}'}}\n" for i in range(500)),
+    "lists in all": f"model: m\nactors: {{a: {{type: Ramp, init: [{'1, ' * 9_999}1], count: 9999}}}}\n",
+    "parameters": "model: m\nparameters:\n" + "".join(f"  a{i}: 1\n" for i in range(20_000)),
+    "renamed": "model: m\nactors:\n"
+    + "".join(f"  robot_{i}: {{type: Ramp}}\n" for i in range(2_000))
+    + "connections:\n"
+    + "".join(f"  - robt_{i}.output -> robo_{i}.input\n" for i in range(2_000)),
+    "aspects": "model: m\nactors:\n  a: {type: Ramp, count: 5000}\n  s: {type: Sum, count: 5000}\n"
+    "connections: ['a[*].output -> s[*].input']\naspects:\n"
+    + "".join(f"  a{i}: {{type: PacketLoss, probability: 0, at: '**.input'}}\n" for i in range(500)),
     "many mistakes": "model: m\nactors:\n" + "".join(f"  a{i}: {{type: Rmap{i}}}\n" for i in range(3000)),
 }
 
@@ -139,19 +91,19 @@ BOMBS = {
 def test_bombs_do_no_harm(name: str, tmp_path: Path) -> None:
     started = time.process_time()
     assert "error: " in said(BOMBS[name], tmp_path)
-    assert time.process_time() - started < 10
+    assert time.process_time() - started < 5
 
 
 def test_what_is_said_about_bombs(tmp_path: Path) -> None:
     assert "m.yaml:2:115: error: nested deeper than 100 levels" in said(BOMBS["nesting"], tmp_path)
     assert "a.a.a.a" in said(BOMBS["too deep"], tmp_path)
     assert "composites are nested deeper than 50 levels" in said(BOMBS["too deep"], tmp_path)
-    assert "the model has more than 200,000 actors and composites" in said(BOMBS["doubling"], tmp_path)
-    assert "the model has more than 1,000,000 wires" in said(BOMBS["wires"], tmp_path)
+    assert "the model has more than 20,000 actors and composites" in said(BOMBS["doubling"], tmp_path)
+    assert "the model has more than 200,000 wires" in said(BOMBS["wires"], tmp_path)
     assert "a way of more than 200 composite ports in a row, from f0.in to f1999.out" in said(
         BOMBS["passage"], tmp_path
     )
-    assert "... and 2900 more\n3000 errors in m.yaml" in said(BOMBS["many mistakes"], tmp_path)
+    assert "more than 100 errors in m.yaml" in said(BOMBS["many mistakes"], tmp_path)
 
 
 def test_files_that_are_no_text(tmp_path: Path) -> None:

@@ -55,6 +55,7 @@ SHAPE = re.compile(
 # Messages that look like it, but are about other files, computed values, or units.
 NOT_SHAPE = re.compile(
     r"\$\{|is not an expression|has the unknown unit|is not a number with a unit|no (pattern|pointcut)"
+    r"|not a function that|of rising, falling"
 )
 
 
@@ -152,6 +153,8 @@ def breaks_shape(problem: str, file: str) -> bool:
     if at is None or not SHAPE.search(head) or NOT_SHAPE.search(head):
         return False
     source = shown[0].partition("| ")[2]
+    if "is out of bounds" in head and re.search("[a-z%]", source[int(at[1]) - 1 :][: shown[1].count("^")]):
+        return False  # the bounds of a text with a unit are beyond a schema
     return "${" not in source[: int(at[1]) - 1 + shown[1].count("^")]
 
 
