@@ -85,7 +85,7 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Make the runs that are missing, and tell what came of it."""
     from epicycle.actors import counted
 
-    from ..study import open_study, run_study
+    from ..study import WorkerError, WriteError, open_study, run_study
     from ..study.progress import progress
 
     try:
@@ -101,6 +101,9 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is kept: 'epicycle resume {folder}' goes on")
         return INTERRUPTED
+    except (WorkerError, WriteError) as error:  # no fault of the study's
+        complain(f"error: {error}")
+        return FAILED
     print(
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
         f"{outcome.there:,} there before" + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")

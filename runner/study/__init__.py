@@ -1,12 +1,13 @@
 """Studies: many runs of a model under many conditions, which survive whatever happens to them."""
 
 from .declaration import Study, find_study, is_study, read_study
+from .local import WorkerError
 from .metrics import MetricError, StudyMetric
 from .plan import Condition, Plan
 from .results import StudyResults, open_study
 from .schedule import Schedule
 from .session import Outcome, TooManyRunsError, available_cores, check_size, plan_of_folder, run_study
-from .store import StoreError
+from .store import StoreError, WriteError
 
 __all__ = [
     "Condition",
@@ -19,6 +20,8 @@ __all__ = [
     "StudyMetric",
     "StudyResults",
     "TooManyRunsError",
+    "WorkerError",
+    "WriteError",
     "available_cores",
     "check_size",
     "find_study",

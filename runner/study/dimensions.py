@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any, TypeAlias
@@ -48,6 +48,10 @@ class Dimension(ABC):
     def level(self, index: int) -> Level:
         """One level."""
 
+    @abstractmethod
+    def find(self, values: Mapping[str, Factor]) -> int | None:
+        """The level that puts these values into its columns; None if there is none."""
+
 
 class Listed(Dimension):
     """Levels that are written out, one by one."""
@@ -55,6 +59,7 @@ class Listed(Dimension):
     def __init__(self, name: str, position: Position, columns: dict[str, str], levels: Sequence[Level]) -> None:
         super().__init__(name, position, columns)
         self._levels = tuple(levels)
+        self._places = {tuple(level.values.values()): index for index, level in enumerate(levels)}
 
     @property
     def size(self) -> int:
@@ -62,6 +67,9 @@ class Listed(Dimension):
 
     def level(self, index: int) -> Level:
         return self._levels[index]
+
+    def find(self, values: Mapping[str, Factor]) -> int | None:
+        return self._places.get(tuple(values[name] for name in self.columns))
 
 
 class Ranged(Dimension):
@@ -83,6 +91,14 @@ class Ranged(Dimension):
         value: int | float = int(number) if self.columns[self.name] == "int" else float(number)
         node = number_node(value, self._unit, self._at)
         return Level((Setting(self.name, node, self.position),), {self.name: in_si(value, self._unit)})
+
+    def find(self, values: Mapping[str, Factor]) -> int | None:
+        first, second, wanted = (
+            float(each or 0) for each in (*(self.level(at).values[self.name] for at in (0, 1)), values[self.name])
+        )
+        index = round((wanted - first) / (second - first))
+        is_there = 0 <= index < self._size and self.level(index).values[self.name] == values[self.name]
+        return index if is_there else None
 
 
 def number_node(value: float, unit: str, position: Position) -> Scalar:

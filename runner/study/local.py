@@ -17,9 +17,11 @@ from . import worker
 from .one_run import empty_row
 from .plan import Plan
 from .schedule import KILLED, TIMEOUT, Done, Schedule, Task
-from .store import Store, StoreError, Writer, cannot_write, writing
+from .store import Store, WriteError, Writer, cannot_write, writing
 
 ATTEMPTS = 3  # of a run whose worker dies; memory runs out for what others take, too
+# Once, for all workers; pyarrow asks for pandas wherever it is installed.
+_IMPORTED = [worker.__name__, "pyarrow.parquet", "numpy.random", "pandas"]
 MAX_STILLBORN = 5  # workers in a row that die before they can do anything
 _LOOK = 0.5  # s between two looks at the clock
 # One thread a process: N workers of N threads each would only be in each other's way.
@@ -79,13 +81,13 @@ class LocalExecutor:
         self._writer = Writer(store)
         method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
         self._context: Any = multiprocessing.get_context(method)
-        if method == "forkserver":  # which has all imported that a worker needs
-            self._context.set_forkserver_preload([worker.__name__])
+        if method == "forkserver":
+            self._context.set_forkserver_preload(_IMPORTED)
         self._workers: list[_Worker] = []
         self._stillborn = 0
 
     def run(self, schedule: Schedule, tell: Callable[[], None]) -> None:
-        """Make all runs; ``tell`` is called now and then.  Raises ``StoreError`` and ``WorkerError``."""
+        """Make all runs; ``tell`` is called now and then.  Raises ``WriteError`` and ``WorkerError``."""
         try:
             with _one_thread():
                 self._run(schedule, tell)
@@ -149,7 +151,7 @@ class LocalExecutor:
             schedule.finished(each.task, told)
             each.task = None
         elif what == worker.CANNOT_WRITE:
-            raise StoreError(cannot_write(self._store.folder, told))
+            raise WriteError(cannot_write(self._store.folder, told))
 
     def _bury(self, dead: _Worker, schedule: Schedule) -> None:
         """A worker has died; its run is made again, or given up."""
@@ -190,7 +192,7 @@ class LocalExecutor:
                 while True:
                     what, told = each.connection.recv()
                     if what == worker.CANNOT_WRITE:
-                        raise StoreError(cannot_write(self._store.folder, told))
+                        raise WriteError(cannot_write(self._store.folder, told))
             except (EOFError, OSError):  # it has ended
                 each.process.join()
 

@@ -175,6 +175,15 @@ class Plan:
         values = {name: value for level in levels for name, value in level.values.items()}
         return Condition(index, settings, disturb, values, _hash(identity))
 
+    def find(self, key: str, values: Mapping[str, Factor]) -> int | None:
+        """The number of the condition with this key, which has these values; None if the plan has none."""
+        index = 0
+        for dimension in self.study.dimensions:
+            if (at := dimension.find(values)) is None:
+                return None
+            index = index * dimension.size + at
+        return index if self.condition(index).key == key else None
+
     def seed(self, condition: Condition, replication: int) -> int:
         """The same for all conditions if they are paired, otherwise one that hangs on the condition, too."""
         if self.study.paired:

@@ -55,7 +55,7 @@ class StudyResults:
 
         batches = list(self._store.rows())
         table = pa.Table.from_batches(batches, self._store.schema)
-        order = self._order(set(pc.unique(table["condition"]).to_pylist()))
+        order = self._order(table)
         places = pa.array([order.get(key, -1) for key in table["condition"].to_pylist()], pa.int64())
         ranks = pa.array([rank(status) for status in table["status"].to_pylist()], pa.int8())
         table = table.set_column(table.schema.get_field_index("condition"), "condition", places)
@@ -70,16 +70,12 @@ class StudyResults:
         table = table.filter(pa.array(firsts, pa.bool_())).drop_columns(["_rank", *(() if times else TIMES)])
         return table.combine_chunks().replace_schema_metadata(None)
 
-    def _order(self, keys: set[str]) -> dict[str, int]:
-        """The numbers of conditions by their keys; a plan is gone through only as far as there are results."""
+    def _order(self, table: pa.Table) -> dict[str, int]:
+        """The numbers of the plan's conditions by their keys; a plan may be too large to be gone through."""
         found: dict[str, int] = {}
-        missing = set(keys)
-        for condition in self.plan:
-            if not missing:
-                break
-            if condition.key in missing:
-                missing.discard(condition.key)
-                found[condition.key] = condition.index
+        for row in table.group_by(["condition", *self.factors], use_threads=False).aggregate([]).to_pylist():
+            if (index := self.plan.find(row["condition"], row)) is not None:
+                found[row["condition"]] = index
         return found
 
     def counts(self) -> Counter[str]:

@@ -45,7 +45,11 @@ Row = dict[str, Any]
 
 
 class StoreError(EpicycleError):
-    """A results folder that cannot be used, or written to."""
+    """A results folder that cannot be used."""
+
+
+class WriteError(StoreError):
+    """A results folder that takes nothing more."""
 
 
 def schema_of(manifest: Mapping[str, Any]) -> pa.Schema:
@@ -170,8 +174,9 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
             (folder / name).mkdir(exist_ok=True)
         _replace(path, lambda aside: aside.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8"))
         store = Store(folder)
-        for aside in [*(folder / "parts").glob(".*"), *folder.glob(".*")]:
-            aside.unlink()  # what somebody was writing when killed
+        for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*"):
+            for aside in folder.glob(pattern):
+                aside.unlink()  # what somebody was writing when killed
     collect(store)
     return store
 
@@ -221,11 +226,11 @@ def is_running(folder: Path) -> bool:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
-    """Tell of a full disk, missing rights and the like in one sentence."""
+    """Tell of a full disk, missing rights and the like in one sentence: raise ``WriteError``."""
     try:
         yield
     except OSError as error:
-        raise StoreError(cannot_write(folder, error.strerror or str(error))) from error
+        raise WriteError(cannot_write(folder, error.strerror or str(error))) from error
 
 
 def cannot_write(folder: Path, reason: str) -> str:

@@ -16,8 +16,11 @@ HEAD = "study: s\nmodel: ./walk.yaml\n"
 
 
 def values(tmp_path: Path, text: str) -> list[dict[str, Any]]:
-    """What the columns hold in every condition."""
-    return [condition.values for condition in plan_of(write(tmp_path, HEAD + text))]
+    """What the columns hold in every condition, by which it can be found again."""
+    plan = plan_of(write(tmp_path, HEAD + text))
+    conditions = list(plan)
+    assert [plan.find(each.key, each.values) for each in conditions] == [each.index for each in conditions]
+    return [condition.values for condition in conditions]
 
 
 @pytest.mark.parametrize(
