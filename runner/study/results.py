@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from dataclasses import asdict
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, counted
+from epicycle.actors import EpicycleError, counted, did_you_mean
 
 from ..tables import pandas_module
+from .dimensions import Factor
 from .plan import Plan
 from .schedule import OK
+from .statistics import LEVEL, holm, mean, paired_difference
 from .store import Store, StoreError, rank, replace_file
 
 if TYPE_CHECKING:
@@ -89,6 +94,56 @@ class StudyResults:
             for row in self.table().to_pylist()
             if row["status"] != OK
         ]
+
+    def values(self, metric: str) -> dict[int, dict[int, float]]:
+        """The numbers of a metric by condition and replication; runs that are not ``ok`` or have none are left out."""
+        if metric not in self.metrics:
+            guess = did_you_mean(metric, self.metrics)
+            raise StoreError(f"{self.folder} has no metric {metric!r}{guess}; it has {', '.join(self.metrics)}")
+        table = self.table().select(["condition", "replication", "status", metric])
+        found: dict[int, dict[int, float]] = {condition: {} for condition in table["condition"].to_pylist()}
+        for condition, replication, status, value in zip(*(each.to_pylist() for each in table.columns), strict=True):
+            if status == OK and value is not None and math.isfinite(value):
+                found[condition][replication] = value
+        return found
+
+    def means(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
+        """A row for each condition: what was varied, the mean with its standard error and interval, how many runs.
+
+        ``runs`` are those that are over, ``count`` those of them that have a number.
+        """
+        runs = Counter(self.table()["condition"].to_pylist())
+        return [
+            {
+                **self.plan.condition(condition).values,
+                **asdict(mean(list(numbers.values()), level)),
+                "runs": runs[condition],
+            }
+            for condition, numbers in self.values(metric).items()
+        ]
+
+    def differences(self, metric: str, over: str, level: float = LEVEL) -> list[dict[str, Any]]:
+        """How the levels of one factor differ, two by two, at every combination of the others.
+
+        Each row has the other factors, the two levels as ``first`` and ``second``, the mean of second less first over
+        common replications with its interval, ``p`` of a paired test, and ``p_holm`` corrected for all rows.
+        """
+        if over not in self.factors:
+            guess = did_you_mean(over, self.factors)
+            raise StoreError(f"{self.folder} has no factor {over!r}{guess}; it has {', '.join(self.factors) or 'none'}")
+        groups: dict[tuple[Factor, ...], list[tuple[Factor, dict[int, float]]]] = {}
+        others = [name for name in self.factors if name != over]
+        for condition, numbers in self.values(metric).items():
+            levels = self.plan.condition(condition).values
+            groups.setdefault(tuple(levels[name] for name in others), []).append((levels[over], numbers))
+        rows = []
+        for place, members in groups.items():
+            for (first, before), (second, after) in combinations(members, 2):
+                found = paired_difference(before, after, level)
+                pair = {"first": first, "second": second}
+                rows.append({**dict(zip(others, place, strict=True)), **pair, **asdict(found.estimate), "p": found.p})
+        corrected = holm([row["p"] for row in rows])
+        return [{**row, "p_holm": p} for row, p in zip(rows, corrected, strict=True)]
 
     def find(self, run: str) -> dict[str, Any]:
         """The row of a run, by the beginning of its key; raises ``StoreError``."""

@@ -1,23 +1,119 @@
-"""Statistics of replications."""
+"""Statistics of replications: intervals of means and rates, and comparisons of conditions in pairs.
+
+Runs that failed or have no number are counted apart by the callers, never averaged in.
+Source: A. M. Law, *Simulation Modeling and Analysis*, chapters 4, 9 and 10.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 LEVEL = 0.95
 
 
-def half_width(values: Sequence[float], level: float = LEVEL) -> float:
-    """Half the width of Student's confidence interval of the mean; infinite for fewer than two values.
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its standard error and confidence interval, from ``count`` values."""
 
-    Source: A. M. Law, *Simulation Modeling and Analysis*, section 4.5.
-    """
+    value: float
+    error: float
+    low: float
+    high: float
+    count: int
+
+
+def half_width(values: Sequence[float], level: float = LEVEL) -> float:
+    """Half the width of Student's confidence interval of the mean; infinite for fewer than two values."""
+    if len(values) < 2:
+        return math.inf
     from scipy.stats import t
 
+    return float(t.ppf((1 + level) / 2, len(values) - 1)) * standard_error(values)
+
+
+def standard_error(values: Sequence[float]) -> float:
+    """The standard error of the mean; NaN for fewer than two values."""
     count = len(values)
     if count < 2:
-        return math.inf
+        return math.nan
     mean = math.fsum(values) / count
-    variance = math.fsum((value - mean) ** 2 for value in values) / (count - 1)
-    return float(t.ppf((1 + level) / 2, count - 1)) * math.sqrt(variance / count)
+    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1) / count)
+
+
+def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
+    """The mean with Student's interval; NaN where there are no values, an infinite interval for one."""
+    count = len(values)
+    if count == 0:
+        return Estimate(math.nan, math.nan, -math.inf, math.inf, 0)
+    value, half = math.fsum(values) / count, half_width(values, level)
+    return Estimate(value, standard_error(values), value - half, value + half, count)
+
+
+def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, seed: int = 0, resamples: int = 9_999) -> Estimate:
+    """The mean with the bias-corrected and accelerated bootstrap interval, which may lie unevenly around it."""
+    if len(values) < 2 or min(values) == max(values):
+        return mean(values, level)
+    import numpy as np
+    from scipy.stats import bootstrap
+
+    found = bootstrap(
+        (np.asarray(values, dtype=float),),
+        np.mean,
+        confidence_level=level,
+        n_resamples=resamples,
+        batch=max(1, 1_000_000 // len(values)),
+        random_state=np.random.default_rng(seed),
+    )
+    low, high = found.confidence_interval
+    return Estimate(math.fsum(values) / len(values), float(found.standard_error), float(low), float(high), len(values))
+
+
+def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
+    """A share with Wilson's interval, which holds for rare events and few runs, too."""
+    if count == 0:
+        return Estimate(math.nan, math.nan, 0.0, 1.0, 0)
+    from scipy.stats import binomtest
+
+    found = binomtest(successes, count).proportion_ci(level, method="wilson")
+    share = successes / count
+    return Estimate(share, math.sqrt(share * (1 - share) / count), float(found.low), float(found.high), count)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The mean of ``second`` less ``first`` over common replications, and the p-value of its being zero."""
+
+    estimate: Estimate
+    p: float
+
+
+def paired_difference(first: dict[int, float], second: dict[int, float], level: float = LEVEL) -> Difference:
+    """How much greater one condition's numbers are than another's, by replication, with Student's paired test.
+
+    Replications that only one of them has are left out.
+    """
+    gaps = [second[each] - first[each] for each in sorted(first.keys() & second.keys())]
+    estimate = mean(gaps, level)
+    if len(gaps) < 2:
+        return Difference(estimate, math.nan)
+    if estimate.error == 0:  # all gaps are the same
+        return Difference(estimate, 1.0 if estimate.value == 0 else 0.0)
+    from scipy.stats import t
+
+    return Difference(estimate, float(2 * t.sf(abs(estimate.value) / estimate.error, len(gaps) - 1)))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """The p-values of tests that were made together, corrected for their number; those that are NaN do not count.
+
+    Source: S. Holm, *A simple sequentially rejective multiple test procedure*, Scand. J. Statist. 6 (1979).
+    """
+    corrected = list(p_values)
+    order = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
+    greatest = 0.0
+    for rank, (p, place) in enumerate(order):
+        greatest = max(greatest, min(1.0, (len(order) - rank) * p))
+        corrected[place] = greatest
+    return corrected

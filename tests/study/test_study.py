@@ -19,11 +19,11 @@ from scipy import stats
 
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
-from epicycle.runner.study import run_study
+from epicycle.runner.study import StoreError, run_study
+from epicycle.runner.study import progress as progress_module
 from epicycle.runner.study import store as store_module
 from epicycle.runner.study.schedule import OK, Done, Schedule
 from epicycle.runner.study.session import duration, manifest_of
-from epicycle.runner.study.statistics import half_width
 from epicycle.runner.study.store import Store, Writer, lock, prepare
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -139,14 +139,6 @@ def _width(values: Any) -> float:
     return float(stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
-def test_half_width_covers_the_mean_as_often_as_it_says() -> None:
-    draws = np.random.default_rng(5).normal(3.0, 2.0, (4000, 6))
-    covered = sum(abs(row.mean() - 3.0) < half_width(row.tolist()) for row in draws)
-    low, high = stats.binom.interval(0.999, 4000, 0.95)
-    assert low <= covered <= high
-    assert half_width([1.0]) == float("inf")
-
-
 # -- what fails -------------------------------------------------------------------------------------------------------
 
 
@@ -202,6 +194,51 @@ def test_status_tells_how_far_it_is(done: Path, capsys: pytest.CaptureFixture[st
     with lock(done / "out"):
         assert main(["status", str(done / "out")]) == 0
         assert capsys.readouterr().out.endswith("; it is running\n")
+
+
+def test_means_and_differences_are_those_of_the_table(done: Path) -> None:
+    results = open_study(done / "out")
+    rows = results.table().to_pylist()
+    first, second = ([row["place"] for row in rows if row["drift"] == drift] for drift in (0.0, 1.0))
+    for found, places, drift in zip(results.means("place"), (first, second), (0.0, 1.0), strict=True):
+        assert (found["drift"], found["count"], found["runs"]) == (drift, 5, 5)
+        assert (found["value"], found["error"]) == pytest.approx((mean(places), stats.sem(places)))
+    (found,) = results.differences("lost", over="drift")
+    assert (found["first"], found["second"]) == (0.0, 1.0)
+    # The same steps are lost, as the random numbers are common.
+    assert (found["value"], found["p"], found["p_holm"]) == (0.0, 1.0, 1.0)
+    (found,) = results.differences("place", over="drift")
+    assert (found["value"], found["low"], found["high"]) == pytest.approx((10.0, 10.0, 10.0))
+    assert found["p_holm"] < 1e-9
+    with pytest.raises(StoreError, match="has no metric 'plaec', did you mean 'place'"):
+        results.means("plaec")
+    with pytest.raises(StoreError, match="has no factor 'drfit', did you mean 'drift'"):
+        results.differences("place", over="drfit")
+
+
+def test_failed_runs_are_counted_apart(tmp_path: Path) -> None:
+    run_study(plan_of(write(tmp_path, STUDY + "set: {fails: [3]}\n")), tmp_path / "out", jobs=1)
+    assert [(row["count"], row["runs"]) for row in open_study(tmp_path / "out").means("place")] == [(4, 5)] * 2
+
+
+def test_progress_is_a_line_a_minute_without_a_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    schedule = Schedule(plan_of(write(tmp_path)), {})
+    tasks = [schedule.next() for _ in range(10)]
+    now = 1000.0
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: now)
+    with progress_module.progress("walks") as tell:
+        for number, task in enumerate(tasks):
+            assert task is not None
+            schedule.finished(task, Done("failed" if number == 2 else OK))
+            now += 12.0
+            tell(schedule)
+    lines = [line.partition(" ")[2] for line in capsys.readouterr().err.splitlines()]
+    assert lines == [
+        "walks: 5 of 10 runs, 1 failed, 0.0833 runs/s, 60 s left",
+        "walks: 10 of 10 runs, 1 failed, 0.0833 runs/s, 0 s left",
+    ]
 
 
 # -- the folder -------------------------------------------------------------------------------------------------------

@@ -1,0 +1,93 @@
+"""Intervals that cover as often as they say, and tests that agree with SciPy's."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from epicycle.runner.study.statistics import bootstrap_mean, half_width, holm, mean, paired_difference, rate
+
+RUNS = 3000
+
+
+def is_covered_as_said(hits: int, level: float, runs: int = RUNS) -> bool:
+    """At a confidence of 99.9 %."""
+    low, high = stats.binom.interval(0.999, runs, level)
+    return bool(low <= hits <= high)
+
+
+@pytest.mark.parametrize(("count", "level"), [(2, 0.95), (6, 0.95), (6, 0.8)])
+def test_students_interval_covers_the_mean_of_normal_values(count: int, level: float) -> None:
+    draws = np.random.default_rng(5).normal(3.0, 2.0, (RUNS, count))
+    estimates = [mean(row.tolist(), level) for row in draws]
+    assert is_covered_as_said(sum(each.low < 3.0 < each.high for each in estimates), level)
+    assert estimates[0].value == pytest.approx(draws[0].mean())
+    assert estimates[0].error == pytest.approx(stats.sem(draws[0]))
+    assert estimates[0].high - estimates[0].value == pytest.approx(half_width(draws[0].tolist(), level))
+
+
+def test_wilsons_interval_covers_a_rate_on_average() -> None:
+    """For a single rate its coverage swings around the level; over many rates it is the level."""
+    random = np.random.default_rng(7)
+    shares = random.uniform(0.05, 0.95, RUNS)
+    hits = 0
+    for share in shares:
+        found = rate(int(random.binomial(50, share)), 50)
+        hits += found.low <= share <= found.high
+    assert is_covered_as_said(hits, 0.95)
+    assert rate(0, 10).low == 0.0
+    assert 0.2 < rate(0, 10).high < 0.35
+
+
+def test_bootstrap_interval_leans_where_the_values_do() -> None:
+    values = np.random.default_rng(3).exponential(1.0, 40).tolist()
+    found = bootstrap_mean(values)
+    assert found == bootstrap_mean(values)
+    assert found.value == pytest.approx(np.mean(values))
+    assert found.low < found.value < found.high
+    assert found.high - found.value > found.value - found.low
+    assert found.error == pytest.approx(stats.sem(values), rel=0.1)
+    assert bootstrap_mean([2.0, 2.0, 2.0]).high == 2.0
+
+
+def test_paired_difference_is_scipys_paired_test() -> None:
+    random = np.random.default_rng(1)
+    first = {each: float(value) for each, value in enumerate(random.normal(0, 1, 20))}
+    second = {each: value + 0.2 + float(random.normal(0, 0.3)) for each, value in first.items()}
+    expected = stats.ttest_rel(list(second.values()), list(first.values()))
+    low, high = expected.confidence_interval(0.95)
+    # A replication that one of them has not is left out of both.
+    found = paired_difference({**first, 77: 5.0}, {**second, 78: -5.0})
+    assert found.p == pytest.approx(expected.pvalue)
+    assert (found.estimate.low, found.estimate.high) == pytest.approx((low, high))
+    assert found.estimate.count == 20
+
+
+def test_holm_is_the_correction_of_the_textbook() -> None:
+    # Worked by hand: 0.005 * 4, 0.01 * 3, 0.03 * 2, and 0.04 * 1 raised to the one before.
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.9]) == [1.0, 1.0]
+    assert holm([]) == []
+    corrected = holm([math.nan, 0.02, 0.03])
+    assert math.isnan(corrected[0])
+    assert corrected[1:] == pytest.approx([0.04, 0.04])
+
+
+def test_holm_keeps_the_rate_of_false_alarms() -> None:
+    alarms = sum(min(holm(row)) < 0.05 for row in np.random.default_rng(2).uniform(size=(RUNS, 5)).tolist())
+    # 1 - 0.99 ** 5, for five independent tests of true hypotheses.
+    assert is_covered_as_said(alarms, 1 - 0.99**5)
+
+
+def test_few_values_give_no_false_certainty() -> None:
+    assert half_width([1.0]) == math.inf
+    none, one = mean([]), mean([4.0])
+    assert (math.isnan(none.value), none.count) == (True, 0)
+    assert (one.value, one.low, one.high) == (4.0, -math.inf, math.inf)
+    assert rate(0, 0).high == 1.0
+    assert math.isnan(paired_difference({1: 2.0}, {1: 3.0}).p)
+    assert paired_difference({1: 2.0, 2: 2.0}, {1: 2.0, 2: 2.0}).p == 1.0
+    assert paired_difference({1: 2.0, 2: 2.0}, {1: 3.0, 2: 3.0}).p == 0.0
