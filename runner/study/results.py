@@ -16,7 +16,7 @@ from .dimensions import Factor
 from .plan import Plan
 from .schedule import OK
 from .statistics import LEVEL, holm, mean, paired_difference
-from .store import Store, StoreError, rank, replace_file
+from .store import BEST_FIRST, Store, StoreError, replace_file
 
 if TYPE_CHECKING:
     import pandas
@@ -61,19 +61,22 @@ class StudyResults:
         batches = list(self._store.rows())
         table = pa.Table.from_batches(batches, self._store.schema)
         order = self._order(table)
-        places = pa.array([order.get(key, -1) for key in table["condition"].to_pylist()], pa.int64())
-        ranks = pa.array([rank(status) for status in table["status"].to_pylist()], pa.int8())
+        at = pc.index_in(table["condition"], value_set=pa.array(order, pa.string()))
+        places = pc.take(pa.array(order.values(), pa.int64()), at)
+        ranks = pc.index_in(table["status"], value_set=pa.array(BEST_FIRST))
         table = table.set_column(table.schema.get_field_index("condition"), "condition", places)
         table = table.append_column("_rank", ranks)
-        wanted = pc.and_(pc.greater_equal(places, 0), pc.less(table["replication"], self.plan.replications))
+        wanted = pc.and_(pc.is_valid(places), pc.less(table["replication"], self.plan.replications))
         table = table.filter(wanted).sort_by(
-            [("condition", "ascending"), ("replication", "ascending"), ("_rank", "ascending"), ("run", "ascending")]
+            [(name, "ascending") for name in ("condition", "replication", "_rank", "run")]
         )
-        # Of a run that was written more than once, the best row is the first.
-        runs = list(zip(table["condition"].to_pylist(), table["replication"].to_pylist(), strict=True))
-        firsts = [each != before for each, before in zip(runs, [None, *runs], strict=False)]
-        table = table.filter(pa.array(firsts, pa.bool_())).drop_columns(["_rank", *(() if times else TIMES)])
-        return table.combine_chunks().replace_schema_metadata(None)
+        if table.num_rows:  # of a run that was written more than once, the best row is the first
+            changes = (
+                pc.not_equal(table[name].slice(1), table[name].slice(0, table.num_rows - 1))
+                for name in ("condition", "replication")
+            )
+            table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
+        return table.drop_columns(["_rank", *(() if times else TIMES)]).combine_chunks().replace_schema_metadata(None)
 
     def _order(self, table: pa.Table) -> dict[str, int]:
         """The numbers of the plan's conditions by their keys; a plan may be too large to be gone through."""

@@ -39,7 +39,7 @@ except ImportError:  # Windows: nothing tells two processes that they write to o
 FORMAT = 1
 ROWS_OF_A_PART = 1_000
 SECONDS_TO_THE_DISK = 1.0
-_BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of one run, the better one counts
+BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of one run, the better one counts
 
 Row = dict[str, Any]
 
@@ -119,7 +119,7 @@ class Store:
 
 def rank(status: str) -> int:
     """The smaller, the better."""
-    return _BEST_FIRST.index(status)
+    return BEST_FIRST.index(status)
 
 
 # -- the manifest -----------------------------------------------------------------------------------------------------

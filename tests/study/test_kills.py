@@ -9,6 +9,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,8 @@ def members(session: int) -> list[int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdecimal() and int(entry.name) != session:
             try:
-                if os.getsid(int(entry.name)) == session:
+                state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
+                if os.getsid(int(entry.name)) == session and state != "Z":
                     found.append(int(entry.name))
             except OSError:
                 continue
@@ -50,7 +52,7 @@ def written(folder: Path) -> int:
     return total
 
 
-def wait_for_rows(folder: Path, process: subprocess.Popen[bytes]) -> None:
+def wait_for_rows(folder: Path, process: subprocess.Popen[Any]) -> None:
     """Until something is written, or the process has ended."""
     before, start = written(folder), time.monotonic()
     while written(folder) == before and process.poll() is None and time.monotonic() - start < 60:
@@ -100,6 +102,23 @@ def kill_and_resume(tmp_path: Path, *, jobs: int, kills: int, replications: int,
 
 def test_nothing_is_lost(tmp_path: Path) -> None:
     kill_and_resume(tmp_path, jobs=2, kills=2, replications=15, seed=2)
+
+
+def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
+    write(tmp_path)
+    out = tmp_path / "out"
+    arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--set", "pause=0.5", "--out", out, "--jobs", 1)
+    process = subprocess.Popen(command(*arguments), start_new_session=True, stderr=subprocess.PIPE, text=True)
+    wait_for_rows(out, process)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert said == f"interrupted; what was finished is kept: 'epicycle resume {out}' goes on\n"
+    assert 0 < len(rows(out)) < 10
+    deadline = time.monotonic() + 30
+    while members(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert members(process.pid) == []
 
 
 @pytest.mark.slow
