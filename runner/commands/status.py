@@ -35,8 +35,9 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         print(json.dumps({**found, "running": is_running(options.folder), "failures": failures}))
         return DONE
     about = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"
+    most = "" if plan.study.until is None else "at most "
     print(
-        f"{plan.study.name}: {len(statuses):,} of {plan.size:,} runs are over ({about})"
+        f"{plan.study.name}: {len(statuses):,} of {most}{plan.size:,} runs are over ({about})"
         + ("; it is running" if is_running(options.folder) else "")
     )
     if options.conditions:

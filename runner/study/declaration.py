@@ -174,7 +174,7 @@ class _StudyReader(NodeReader):
             study.doc = self.text(entries["doc"].value, "doc") or ""
         if "set" in entries and isinstance(entries["set"].value, Mapping):
             study.fixed = settings_in(entries["set"].value, self.problems)
-        elif "set" in entries:
+        elif "set" in entries and not _is_empty(entries["set"].value):
             self.problems.add(
                 "set is not a mapping from parameters to values",
                 entries["set"].value.position,
@@ -239,7 +239,7 @@ class _StudyReader(NodeReader):
 
     def vary(self, node: Node) -> list[Dimension]:
         """An ordered mapping of dimensions."""
-        if isinstance(node, Scalar) and node.value is None:
+        if _is_empty(node):
             return []
         if not isinstance(node, Mapping):
             self.problems.add("vary is not a mapping", node.position, "write lines like 'load: [0.5, 0.75, 0.9]'")
@@ -318,7 +318,7 @@ class _StudyReader(NodeReader):
             settings: list[Setting] = []
             if isinstance(entry.value, Mapping):
                 settings = settings_in(entry.value, self.problems)
-            elif not (isinstance(entry.value, Scalar) and entry.value.value is None):
+            elif not _is_empty(entry.value):
                 self.problems.add(f"case {case!r} is not a mapping from parameters to values", entry.value.position)
             levels.append(Level(tuple(settings), {name: case}))
         return Listed(name, position, {name: "text"}, levels)
@@ -490,3 +490,7 @@ class _StudyReader(NodeReader):
                     "give it another name: metrics: {name: expression}",
                 )
             seen[metric.name] = metric.node.position
+
+
+def _is_empty(node: Node) -> bool:
+    return isinstance(node, Scalar) and node.value is None

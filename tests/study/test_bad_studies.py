@@ -13,12 +13,18 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from epicycle.runner import ModelError, load_model
 from epicycle.runner.cli import main
+from epicycle.runner.model import Problems
+from epicycle.runner.model.catalogue import built_in
+from epicycle.runner.model.document import parse, plain
+from epicycle.runner.model.schema import json_schema
+from epicycle.runner.show import figure_types
 
 sys.path.insert(0, str(Path(__file__).parent))
-from study_parts import plan_of, write
+from study_parts import STUDY, plan_of, write
 
 FILE = Path(__file__).parent / "bad_studies.txt"
 CASE = re.compile(r"^### ([^\n]+)\n((?:\$ [^\n]*\n)*)(.*?)^>>>\n(.*?)(?=^### |\Z)", re.MULTILINE | re.DOTALL)
@@ -65,6 +71,38 @@ def test_packaged_studies_are_valid(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == "table_1 is valid: 60 conditions of 100 replications, 6,000 runs\n"
     assert main(["validate", "waiting_time"]) == 0
     assert capsys.readouterr().out == "waiting_time is valid: 5 conditions of 10 replications, 50 runs\n"
+
+
+# Those cases whose shape is broken, as far as a schema sees one file and no values of other kinds.
+SHAPES = (
+    "not a mapping",
+    "unknown keys",
+    "no such model",
+    "values",
+    "dimensions",
+    "no mapping",
+    "ranges",
+    "hypercubes",
+    "until",
+    "numbers of until",
+    "metrics in a list",
+    "cases",
+)
+
+
+def test_schema_refuses_what_is_misshapen() -> None:
+    def document(text: str) -> object:
+        node = parse(text, "s.yaml", Problems())
+        assert node is not None
+        return plain(node)
+
+    validator = Draft202012Validator(json_schema(built_in(), figure_types()))
+    refused = [name for name, _, study, _ in CASES if not validator.is_valid(document(study))]
+    assert [name for name in SHAPES if name not in refused] == []
+    said = {name: message for name, _, _, message in CASES}
+    assert [name for name in refused if said[name] == "nothing\n"] == []
+    for good in (STUDY, "study: s\nmodel: mm1\nset:\nvary:\nmetrics:\n"):
+        assert list(validator.iter_errors(document(good))) == []
 
 
 def write_anew() -> None:

@@ -122,7 +122,7 @@ def test_table_is_the_same_for_any_number_of_jobs(done: Path, tmp_path: Path) ->
     assert list((done / "out" / "journals").iterdir()) == []
 
 
-def test_sequential_stopping_is_decided_between_batches(tmp_path: Path) -> None:
+def test_sequential_stopping_is_decided_between_batches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     until = "until: {metric: place, half_width: 2, batch: 4, at_most: 40}\n"
     plan = plan_of(write(tmp_path, STUDY + until))
     outcome = run_study(plan, tmp_path / "out", jobs=2)
@@ -132,6 +132,8 @@ def test_sequential_stopping_is_decided_between_batches(tmp_path: Path) -> None:
         needed = next(n for n in range(4, 44, 4) if n == 40 or _width(places[:n]) < 2)
         assert len(places) == needed
     assert outcome.stopped_early == 80 - len(table)
+    assert main(["status", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out == f"walks: {len(table)} of at most 80 runs are over ({len(table)} ok)\n"
     assert run_study(plan, tmp_path / "out", jobs=1).made == 0
 
 
