@@ -7,13 +7,14 @@ USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 
 .NOTPARALLEL:
-.PHONY: help run test check lint reference wheel clean
+.PHONY: help run test check fuzz lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
 	@echo "make test   the quick tests"
 	@echo "make lint   ruff, formatting and types"
 	@echo "make check  lint and every test, the slow ones too"
+	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
 	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
 	@echo "make wheel  build dist/epicycle-*.whl"
 	@echo "make clean  remove all that these made, except results/"
@@ -26,6 +27,9 @@ test: $(DEV)
 
 check: lint
 	$(BIN)/python -m pytest -n 2 -q -m ""
+
+fuzz: $(DEV)
+	$(BIN)/python tests/fuzz/fuzz.py
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -1,0 +1,26 @@
+"""Some mutants of good models in every run of the tests; `make fuzz` tries many more, and others each time."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FUZZ = Path(__file__).parent / "fuzz.py"
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_mutants_of_good_models(seed: int) -> None:
+    # In a process of its own, which watches what it opens, and whose memory is limited.
+    command = [sys.executable, str(FUZZ), "--mutants", "1000", "--seed", str(seed), "--jobs", "1"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stdout + done.stderr
+    counted = re.search(r"1,000 mutants: (\d+) rejected, (\d+) accepted, (\d+) run", done.stdout.splitlines()[-2])
+    assert counted is not None
+    rejected, accepted, run = map(int, counted.groups())
+    assert rejected + accepted == 1_000
+    assert rejected > 500
+    assert run > 50
