@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy import stats
 
+from epicycle.actors import EpicycleError
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
 from epicycle.runner.study import StoreError, run_study
@@ -216,6 +217,20 @@ def test_means_and_differences_are_those_of_the_table(done: Path) -> None:
         results.means("plaec")
     with pytest.raises(StoreError, match="has no factor 'drfit', did you mean 'drift'"):
         results.differences("place", over="drfit")
+
+
+def test_xarray_is_an_extra(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(EpicycleError, match=r"this needs xarray: pip install 'epicycle\[xarray\]'"):
+        open_study(done / "out").to_xarray()
+
+
+def test_factors_become_coordinates(done: Path) -> None:
+    pytest.importorskip("xarray")
+    found = open_study(done / "out").to_xarray()
+    assert dict(found.sizes) == {"drift": 2, "replication": 5}
+    gaps = found["place"].sel(drift=1.0) - found["place"].sel(drift=0.0)
+    assert gaps.values == pytest.approx([10.0] * 5)
 
 
 def test_failed_runs_are_counted_apart(tmp_path: Path) -> None:
