@@ -121,19 +121,20 @@ def _ring(*_: object) -> None:
 
 @dataclass
 class Tally:
-    """What came of the mutants."""
+    """What came of the mutants, how long the slowest took to load (s of processor time), and the memory (MB)."""
 
     mutants: int = 0
     rejected: int = 0
     accepted: int = 0
     run: int = 0
     failed: int = 0
+    long: int = 0
     slowest: float = 0.0
     memory: float = 0.0
 
     def add(self, other: Tally) -> None:
         """Count another process's mutants, too."""
-        for name in ("mutants", "rejected", "accepted", "run", "failed"):
+        for name in ("mutants", "rejected", "accepted", "run", "failed", "long"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.slowest = max(self.slowest, other.slowest)
         self.memory = max(self.memory, other.memory)
@@ -141,7 +142,8 @@ class Tally:
     def __str__(self) -> str:
         return (
             f"{self.mutants:,} mutants: {self.rejected:,} rejected, {self.accepted:,} accepted, {self.run:,} run, "
-            f"{self.failed:,} failed in the run; slowest {self.slowest:.2f} s, largest memory {self.memory:.0f} MB"
+            f"{self.failed:,} failed in the run, {self.long:,} stopped in a long step; "
+            f"slowest {self.slowest:.2f} s, largest memory {self.memory:.0f} MB"
         )
 
 
@@ -207,6 +209,8 @@ class Plot:
                     Simulation(model).run(until=1.0, progress=progress)
             except (ActorError, LoopError):
                 tally.failed += 1
+            except Hang:
+                tally.long += 1  # what a good model computes may take its time
             except Enough:
                 pass
             finally:
