@@ -210,11 +210,11 @@ class Plot:
             except (ActorError, LoopError):
                 tally.failed += 1
             except Hang:
-                tally.long += 1  # what a good model computes may take its time
+                tally.long += 1  # what a good model computes may take its time, and what it takes up meanwhile
+                return
             except Enough:
                 pass
-            finally:
-                self.weigh(tally)
+            self.weigh(tally)
 
     def weigh(self, tally: Tally) -> None:
         """See that this mutant has not taken too much memory, whatever others have left behind."""
