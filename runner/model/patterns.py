@@ -16,6 +16,7 @@ _SEGMENT = re.compile(r"(\*\*(?!\[)|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])
 
 _INDEX = re.compile(r"\[\d+\]")
 MAX_PATTERN = 1_000
+MAX_SHOWN = 12  # names in a message
 
 
 class PatternError(ValueError):
@@ -145,7 +146,14 @@ class PathIndex:
                 return (f"that is an actor, not a port: write {written}",)
             if names:
                 return (f"valid ports of {holder}: {', '.join(names)}",)
-        return ()
+        if self.did_you_mean(pattern, scope, fits):
+            return ()
+        firsts = (path.removeprefix(start).partition(".")[0] for path in self.inside(scope) if fits(path))
+        holders = list(dict.fromkeys(_INDEX.sub("[*]", first) for first in firsts))
+        if not holders:
+            return ("there is no port that would do",)
+        more = ", ..." if len(holders) > MAX_SHOWN else ""
+        return (f"there are such ports at {', '.join(holders[:MAX_SHOWN])}{more}",)
 
     def inside(self, scope: str) -> Iterable[str]:
         """The paths within a composite; all of them if it is the model."""
