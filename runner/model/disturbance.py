@@ -13,8 +13,8 @@ from .declarations import DISTURBANCE_KEYS, CompositeText, DeclarationReader, Mo
 from .document import Mapping, Node, Scalar, read
 from .elaborate import Elaborator
 from .inheritance import inherit
-from .packaged import is_path, packaged_disturbances
-from .problems import Position, Problems, did_you_mean
+from .packaged import find, packaged_disturbances
+from .problems import Position, Problems
 from .settings import Setting, Settings, put_aspect, settings_in
 from .site import node_of
 from .usage import check_own_usage
@@ -35,17 +35,7 @@ class Disturbance:
 
 def find_disturbance(name: str, problems: Problems) -> Path | None:
     """The file of a disturbance: a path if it looks like one, otherwise a packaged disturbance's name."""
-    if is_path(name):
-        return Path(name)
-    known = packaged_disturbances()
-    if name not in known:
-        problems.add(
-            f"there is no packaged disturbance {name!r}{did_you_mean(name, list(known))}",
-            None,
-            f"packaged disturbances: {', '.join(known) or 'none'}; a path to a file ends in .yaml",
-        )
-        return None
-    return known[name]
+    return find(name, "disturbance", packaged_disturbances(), problems)
 
 
 def load_disturbance(name: str, problems: Problems) -> Disturbance | None:

@@ -16,7 +16,7 @@ from .document import read
 from .elaborate import Elaborator
 from .inheritance import inherit
 from .model import Model
-from .packaged import is_path, model_folders, packaged_models
+from .packaged import find, model_folders, packaged_models
 from .problems import Problems, did_you_mean
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
 from .site import call_site, node_of
@@ -28,17 +28,7 @@ MAX_INCLUDES = 200
 
 def find_model(name: str, problems: Problems) -> Path | None:
     """The file of a model: a path if it looks like one, otherwise a packaged model's name."""
-    if is_path(name):
-        return Path(name)
-    known = packaged_models()
-    if name not in known:
-        problems.add(
-            f"there is no packaged model {name!r}{did_you_mean(name, list(known))}",
-            None,
-            f"packaged models: {', '.join(known) or 'none'}; a path to a file ends in .yaml",
-        )
-        return None
-    return known[name]
+    return find(name, "model", packaged_models(), problems)
 
 
 def find_library(path: Path) -> Path:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
+from .problems import Problems, did_you_mean
+
 
 def model_folders() -> list[Path]:
     """The folders of packaged models.
@@ -37,3 +39,17 @@ def _yaml_files(folders: list[Path]) -> dict[str, Path]:
 def is_path(name: str) -> bool:
     """Whether the name of a model, disturbance or study is a path, and not that of a packaged one."""
     return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
+
+
+def find(name: str, kind: str, packaged: dict[str, Path], problems: Problems) -> Path | None:
+    """The file that a name means: a path if it looks like one, otherwise what is packaged under it."""
+    if is_path(name):
+        return Path(name)
+    if name not in packaged:
+        problems.add(
+            f"there is no packaged {kind} {name!r}{did_you_mean(name, list(packaged))}",
+            None,
+            f"packaged {'studies' if kind == 'study' else kind + 's'}: {', '.join(packaged) or 'none'}; "
+            "a path to a file ends in .yaml",
+        )
+    return packaged.get(name)

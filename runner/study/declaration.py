@@ -15,7 +15,7 @@ from ..model.declarations import HYPERCUBE_KEYS, RANGE_KEYS, STUDY_KEYS, UNTIL_K
 from ..model.disturbance import find_disturbance
 from ..model.document import Entry, Mapping, Node, Scalar, Sequence, parse, read
 from ..model.observation import MAX_SEED
-from ..model.packaged import is_path, packaged_disturbances, packaged_models, packaged_studies
+from ..model.packaged import find, is_path, packaged_disturbances, packaged_models, packaged_studies
 from ..model.reading import NodeReader
 from ..model.settings import Setting, is_pattern, parse_setting, settings_in
 from .dimensions import Dimension, Level, Listed, Ranged, as_factor, in_si, kind_of, number_node, split_number
@@ -65,17 +65,7 @@ class Study:
 
 def find_study(name: str, problems: Problems) -> Path | None:
     """The file of a study: a path if it looks like one, otherwise a packaged study's name."""
-    if is_path(name):
-        return Path(name)
-    known = packaged_studies()
-    if name not in known:
-        problems.add(
-            f"there is no packaged study {name!r}{did_you_mean(name, list(known))}",
-            None,
-            f"packaged studies: {', '.join(known) or 'none'}; a path to a file ends in .yaml",
-        )
-        return None
-    return known[name]
+    return find(name, "study", packaged_studies(), problems)
 
 
 def is_study(path: Path) -> bool:
