@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
 from epicycle.aspects import Aspect
@@ -34,6 +34,7 @@ Place: TypeAlias = "str | Port | Actor | Composite"
 Places: TypeAlias = "Place | Iterable[Place]"
 
 
+@runtime_checkable
 class Instance(Protocol):
     """An instance of a composite class that can be added to a model; see ``load_composite``."""
 
@@ -65,6 +66,13 @@ def clock_of(
     except ParameterError as error:
         problems.add(f"{path}: director.drift: {error}", position)
     return begin, speed
+
+
+def check_aspect(aspect: object, kinds: tuple[type, ...], position: Position, problems: Problems) -> None:
+    """See that what is to be woven is an object of one of the kinds."""
+    if isinstance(aspect, type) or not isinstance(aspect, kinds):
+        shown = aspect.__name__ if isinstance(aspect, type) else repr(aspect)
+        problems.add(f"{shown} is no aspect", position, "give an object, such as PacketLoss(probability=0.1)")
 
 
 def seconds_of(time: float | str | None, aspect: object, position: Position, problems: Problems) -> float | None:

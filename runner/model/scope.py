@@ -18,7 +18,7 @@ from .composite_aspect import ModelWeaving, check_nesting
 from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
 from .decorated import weave_decorations
 from .document import Scalar
-from .ends import CompositePort, Ends, Instance, Places, clock_of, each_of, mistake, raising, seconds_of
+from .ends import CompositePort, Ends, Instance, Places, check_aspect, clock_of, each_of, mistake, raising, seconds_of
 from .graph import Hop
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
@@ -384,6 +384,7 @@ class Scope:
                 problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
+            check_aspect(aspect, (Aspect, Composite, Instance), position, problems)
             seconds = seconds_of(time, aspect, position, problems)
         if isinstance(aspect, Aspect):
             with raising() as problems:

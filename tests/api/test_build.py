@@ -420,6 +420,16 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
         """error: there is an aspect 'failure' already
    help: unweave it, or give this another name""",
     ),
+    "aspect's class": (
+        lambda m: m.weave("loss", PacketLoss, at="sum.input"),
+        """error: PacketLoss is no aspect
+   help: give an object, such as PacketLoss(probability=0.1)""",
+    ),
+    "name of an aspect for one": (
+        lambda m: m.weave("loss", "PacketLoss", at="sum.input"),
+        """error: 'PacketLoss' is no aspect
+   help: give an object, such as PacketLoss(probability=0.1)""",
+    ),
     "aspect's port": (
         lambda m: m.weave("loss", PacketLoss(probability=0.1), at="sum.inputs"),
         """error: aspect loss: 'sum.inputs' matches no port, did you mean 'sum.input'?
