@@ -66,13 +66,14 @@ class Machine(Process):
         parts = 0
         while True:
             left = _duration(self, self.work_time)
-            while left > 0:
+            is_made = False
+            while not is_made:
                 begin = self.now
                 try:
-                    yield self.wait(left)
-                    left = 0.0
+                    yield self.wait(left)  # a microstep at least, or else parts that take no time have no end
+                    is_made = True
                 except simpy.Interrupt:
-                    left -= self.now - begin
+                    left = max(left - (self.now - begin), 0.0)
                     yield from self._repair()
             parts += 1
             self.part.send(parts)

@@ -12,7 +12,7 @@ import scipy.stats
 import simpy
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.engine import Results
+from epicycle.runner.engine import LoopError, Results
 from epicycle.runner.model import Problems
 from epicycle.runner.show import figures_of
 
@@ -137,6 +137,12 @@ def test_machines_make_parts_as_long_as_they_run() -> None:
     metrics = results.metrics
     running = 10 - metrics["mean_broken"]
     assert metrics["parts"] == pytest.approx(running * results.end / 600, rel=0.002)
+
+
+def test_parts_that_take_no_time_come_to_an_end() -> None:
+    # So wide a distribution gives nothing but zeros.  Made within one firing, such parts would fill the memory.
+    with pytest.raises(LoopError, match=r"^time stands still at 0 s: more than 100,000 microsteps"):
+        run("machine_shop", machines=1, part_spread="1e20 min")
 
 
 # -- the others -----------------------------------------------------------------------------------------------------

@@ -101,14 +101,14 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
 @contextmanager
 def watched(folder: Path) -> Iterator[None]:
     """Nothing but the folder is touched, and time is limited."""
-    signal.setitimer(signal.ITIMER_VIRTUAL, MAX_SECONDS)
+    signal.setitimer(signal.ITIMER_VIRTUAL, MAX_SECONDS, 0.1)  # and again, for SimPy keeps what ends one process
     faulthandler.dump_traceback_later(60, exit=True)  # for what no signal can stop
     _watched.append(folder)
     try:
         yield
     finally:
-        _watched.clear()
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        _watched.clear()
         faulthandler.cancel_dump_traceback_later()
 
 
