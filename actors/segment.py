@@ -46,6 +46,11 @@ class Crossing:
     sides: dict[int, int]
 
 
+def _no_warnings() -> np.errstate:
+    """What overflows fails, and is told then: a step that cannot be taken, or a derivative that is no number."""
+    return np.errstate(over="ignore", invalid="ignore", divide="ignore")
+
+
 class Segment:
     """A solution that starts at time 0 and is extended as far as it is asked for, or to the first crossing."""
 
@@ -62,9 +67,10 @@ class Segment:
         import scipy.integrate
 
         relative, absolute = tolerance
-        self._solver = getattr(scipy.integrate, method)(
-            derivative, 0.0, state, np.inf, rtol=relative, atol=absolute, max_step=max_step
-        )
+        with _no_warnings():
+            self._solver = getattr(scipy.integrate, method)(
+                derivative, 0.0, state, np.inf, rtol=relative, atol=absolute, max_step=max_step
+            )
         self._guards = guards
         self._start = state
         self._piece: Any = None
@@ -78,7 +84,8 @@ class Segment:
 
     def extend(self) -> None:
         """Take one step; raises ``EpicycleError`` if there is none to take."""
-        message = self._solver.step()
+        with _no_warnings():
+            message = self._solver.step()
         if self._solver.status == "failed":
             raise EpicycleError(f"the solution cannot be continued beyond {self.end:.9g} s from here: {message}")
         self._before, self._piece = self._piece, self._solver.dense_output()

@@ -266,8 +266,11 @@ def test_what_is_wrong_is_told_at_load(change: dict[str, Any], message: str) -> 
         ("1 / (x - 1)", "derivative of x: '1 / (x - 1)': 1 / (x - 1) divides by zero, with x = 1.0"),
         ("x > 0", "derivative of x: 'x > 0' gives True, which is not a number"),
         ("x ** 2", "the solution cannot be continued beyond 1 s from here: Required step size is less than"),
+        ("x * 1e300", "the solution cannot be continued beyond 0 s from here: Required step size is less than"),
+        ("inf * x", "derivative of x: 'inf * x': inf * x: the result is not a number (NaN), with x = nan"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_what_goes_wrong_on_the_way(rate: str, message: str) -> None:
     with pytest.raises(ActorError) as caught:
         feed({"type": "ODE", "initial": {"x": 1}, "derivatives": {"x": rate}}, {"trigger": [(5.0, 0)]})
