@@ -354,10 +354,9 @@ def test_measured_once_and_replayed(tmp_path: Path) -> None:
     free, expected = 0, []
     for tick, time in enumerate(times):
         free = max(free, tick * 1_000_000) + round(time * 1e9)
-        expected.append(free / 1e9)
-    done = [time for time, _ in sent(runs[0])]
-    assert done == pytest.approx(expected[: len(done)], abs=1e-12)
-    assert len(done) > 10  # on a busy machine, not all is over in time
+        expected += [free / 1e9] if free <= 40_000_000 else []  # on a busy machine, not all is over in time
+    assert expected
+    assert [time for time, _ in sent(runs[0])] == pytest.approx(expected, abs=1e-12)
 
 
 def test_times_for_all_actors_over_and_over(tmp_path: Path) -> None:
