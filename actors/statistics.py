@@ -121,7 +121,10 @@ class MovingStatistics(_Window):
 
 
 def root(square: Fraction) -> float:
-    """The square root of a fraction whose own size may be beyond all floats."""
+    """The square root of a fraction whose own size may be beyond all floats; infinite if the root is, too."""
     shift = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
     scaled = square / Fraction(4) ** shift  # close to 1
-    return math.ldexp(math.sqrt(scaled), shift)
+    try:
+        return math.ldexp(math.sqrt(scaled), shift)
+    except OverflowError:
+        return math.inf

@@ -35,7 +35,7 @@ class Disturbance:
 
 def find_disturbance(name: str, problems: Problems) -> Path | None:
     """The file of a disturbance: a path if it looks like one, otherwise a packaged disturbance's name."""
-    return find(name, "disturbance", packaged_disturbances(), problems)
+    return find(name, "disturbance", packaged_disturbances, problems)
 
 
 def load_disturbance(name: str, problems: Problems) -> Disturbance | None:

@@ -28,7 +28,7 @@ MAX_INCLUDES = 200
 
 def find_model(name: str, problems: Problems) -> Path | None:
     """The file of a model: a path if it looks like one, otherwise a packaged model's name."""
-    return find(name, "model", packaged_models(), problems)
+    return find(name, "model", packaged_models, problems)
 
 
 def find_library(path: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
@@ -41,10 +42,11 @@ def is_path(name: str) -> bool:
     return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
 
 
-def find(name: str, kind: str, packaged: dict[str, Path], problems: Problems) -> Path | None:
+def find(name: str, kind: str, packaged_ones: Callable[[], dict[str, Path]], problems: Problems) -> Path | None:
     """The file that a name means: a path if it looks like one, otherwise what is packaged under it."""
     if is_path(name):
         return Path(name)
+    packaged = packaged_ones()
     if name not in packaged:
         problems.add(
             f"there is no packaged {kind} {name!r}{did_you_mean(name, list(packaged))}",

@@ -65,7 +65,7 @@ class Study:
 
 def find_study(name: str, problems: Problems) -> Path | None:
     """The file of a study: a path if it looks like one, otherwise a packaged study's name."""
-    return find(name, "study", packaged_studies(), problems)
+    return find(name, "study", packaged_studies, problems)
 
 
 def is_study(path: Path) -> bool:
