@@ -99,7 +99,7 @@ def user_seconds(path: Path) -> tuple[float, str]:
 
 
 def main() -> None:
-    models = {"flat, 2,000 actors": flat(2_000), "count: 10,000": replicated(10_000)}
+    models = {"flat, 2,000 actors": flat(2_000), "count: 6,000": replicated(6_000)}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.yaml"
         for name, text in models.items():
