@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
@@ -21,6 +22,7 @@ from ..model.settings import Setting, is_pattern, parse_setting, settings_in
 from .dimensions import Dimension, Level, Listed, Ranged, as_factor, in_si, kind_of, number_node, split_number
 from .metrics import StudyMetric, checked_metric
 
+LARGE = 10_000_000  # bytes of a file
 MAX_REPLICATIONS = 10**9
 MAX_LEVELS = 10**12  # of a range
 MAX_SAMPLES = 100_000  # of a Latin hypercube, which is made as a whole
@@ -70,6 +72,10 @@ def find_study(name: str, problems: Problems) -> Path | None:
 
 def is_study(path: Path) -> bool:
     """Whether a file says that it is a study."""
+    with suppress(OSError):
+        # A large model need not be read twice; what is no file, or too large, is told when it is read.
+        if path.is_file() and path.stat().st_size <= LARGE and b"study" not in path.read_bytes():
+            return False
     node = read(path, Problems())
     return isinstance(node, Mapping) and "study" in node.entries
 
