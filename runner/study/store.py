@@ -235,7 +235,10 @@ def writing(folder: Path) -> Iterator[None]:
 
 def cannot_write(folder: Path, reason: str) -> str:
     """The message of a folder that takes nothing more."""
-    return f"cannot write to {folder}: {reason}\n   help: what was finished is kept; 'epicycle resume {folder}' goes on"
+    message = f"cannot write to {folder}: {reason}"
+    if not (folder / "manifest.json").is_file():  # nothing has begun
+        return message
+    return f"{message}\n   help: what was finished is kept; 'epicycle resume {folder}' goes on"
 
 
 # -- writing rows -----------------------------------------------------------------------------------------------------

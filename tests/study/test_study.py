@@ -391,6 +391,13 @@ def test_full_disk_leaves_nothing_half(
     assert capsys.readouterr().out.startswith("walks: 2 conditions, 0 new runs, 12 there before\n")
 
 
+def test_folder_that_takes_nothing_from_the_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path)
+    (tmp_path / "letter.txt").write_text("Dear")
+    assert study(tmp_path, out="letter.txt/out") == 1
+    assert message(capsys, tmp_path) == "error: cannot write to letter.txt/out: Not a directory\n"
+
+
 def _refuse(*_: object) -> None:
     raise OSError(errno.ENOSPC, "No space left on device")
 
