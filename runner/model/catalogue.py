@@ -20,6 +20,8 @@ import epicycle.aspects
 from epicycle.actors import Actor, Configurable, EpicycleError, Process
 from epicycle.aspects import Aspect, ClockAspect
 
+from .files import note_package
+
 GROUPS: dict[type, str] = {Actor: "epicycle.actors", Aspect: "epicycle.aspects"}
 _ENTRY = re.compile(r"[A-Za-z_][\w.]*\s*:\s*[A-Za-z_][\w.]*\s*(\[.*\])?\Z", re.ASCII)
 
@@ -111,6 +113,8 @@ class Types(Mapping[str, type[T]], Generic[T]):
         found = self._loaded[qualified[0]]
         if isinstance(found, CatalogueError):
             raise found
+        if (distribution := offer.point.dist) is not None:
+            note_package(distribution.name, distribution.version)
         return found
 
     def __contains__(self, name: object) -> bool:

@@ -23,7 +23,7 @@ from yaml.events import (
     ScalarEvent,
 )
 
-from .files import note
+from .files import note_file
 from .problems import Position, Problems, did_you_mean
 
 MAX_BYTES = 10_000_000
@@ -92,7 +92,7 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
     if len(data) > MAX_BYTES:
         problems.add(_too_large(name))
         return None
-    note(path, data)
+    note_file(path, data)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

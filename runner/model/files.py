@@ -1,4 +1,4 @@
-"""Files that a model names: found from where the name is written, and never outside of it; and which were read."""
+"""Files that a model names: found from where the name is written, and never outside of it; and what was read."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from epicycle.actors import ParameterError
@@ -13,13 +14,23 @@ from epicycle.actors import ParameterError
 from .problems import Position, did_you_mean
 
 COMMAND_LINE = "command line"  # the file of a position in an option
-_noted: ContextVar[dict[str, str] | None] = ContextVar("noted", default=None)
+
+
+@dataclass
+class Noted:
+    """What loading a model has read."""
+
+    files: dict[str, str] = field(default_factory=dict)  # SHA-256 by path
+    packages: dict[str, str] = field(default_factory=dict)  # versions of packages whose types it names
+
+
+_noted: ContextVar[Noted | None] = ContextVar("noted", default=None)
 
 
 @contextmanager
-def noting_files() -> Iterator[dict[str, str]]:
-    """The SHA-256 of every file that loading a model reads, by path, filled as it goes."""
-    found: dict[str, str] = {}
+def noting() -> Iterator[Noted]:
+    """What loading models reads, filled as it goes."""
+    found = Noted()
     token = _noted.set(found)
     try:
         yield found
@@ -27,10 +38,16 @@ def noting_files() -> Iterator[dict[str, str]]:
         _noted.reset(token)
 
 
-def note(path: Path, data: bytes) -> None:
+def note_file(path: Path, data: bytes) -> None:
     """A file has been read, with these contents."""
     if (noted := _noted.get()) is not None:
-        noted[str(path)] = hashlib.sha256(data).hexdigest()
+        noted.files[str(path)] = hashlib.sha256(data).hexdigest()
+
+
+def note_package(name: str, version: str) -> None:
+    """A type of an installed package has been named."""
+    if (noted := _noted.get()) is not None:
+        noted.packages[name] = version
 
 
 def data_file(name: Path, position: Position) -> Path:
@@ -49,7 +66,7 @@ def data_file(name: Path, position: Position) -> Path:
             )
         if target.is_file():
             if _noted.get() is not None:
-                note(target, target.read_bytes())
+                note_file(target, target.read_bytes())
             return target
         if target.is_dir():
             raise ParameterError(f"{str(name)!r} is a folder, not a file")

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..model import Model, ModelError, Problems, did_you_mean, load_model
 from ..model.document import plain
-from ..model.files import noting_files
+from ..model.files import noting
 from ..model.own_types import types_of_file
 from ..model.settings import Setting
 from .declaration import RESERVED, Study, study_of_text
@@ -22,7 +22,7 @@ from .metrics import StudyMetric
 
 MAX_TRIED = 20  # levels of a dimension with which the model is loaded before anything runs
 
-Sources = dict[str, str]  # SHA-256 by the name of a file
+Sources = dict[str, str]  # SHA-256 by the name of a file, and versions by 'package NAME'
 
 
 def epicycle_version() -> str:
@@ -235,15 +235,15 @@ def _load(study: Study, settings: tuple[Setting, ...], disturb: tuple[str, ...])
 def _tried(study: Study, indices: list[int], models: list[Model], texts: dict[str, str], problems: Problems) -> Sources:
     """Load the model with these levels; the files that this reads."""
     levels = [dimension.level(at) for dimension, at in zip(study.dimensions, indices, strict=True)]
-    with noting_files() as noted:
+    with noting() as noted:
         try:
             models.append(_load(study, *_together(study, levels)))
         except ModelError as error:
             for problem in error.problems:
                 problems.add(problem.message, problem.position, *problem.help)
-    home = Path(next(iter(noted), "")).resolve().parent
-    found = {}
-    for name, digest in [*noted.items(), *((str(file), _digest(file)) for file in study.types)]:
+    home = Path(next(iter(noted.files), "")).resolve().parent
+    found = {f"package {name}": version for name, version in noted.packages.items()}
+    for name, digest in [*noted.files.items(), *((str(file), _digest(file)) for file in study.types)]:
         path = Path(name).resolve()
         # By names that stay when a study and its model are moved, or Epicycle is.
         shown = path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name

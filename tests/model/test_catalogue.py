@@ -192,6 +192,10 @@ def check_installed(site: Path) -> None:
     results = json.loads(epicycle(site, "run", "weather.yaml", "--json"))
     assert results["metrics"] == {"coldest": 273.15, "last": 275.0}
     assert results["aspects"] == {"icing": {"frozen": 4}}
+    (site / "icy.yaml").write_text("study: icy\nmodel: ./weather.yaml\n", encoding="utf-8")
+    epicycle(site, "study", "icy.yaml", "--out", "icy", "--jobs", "1")
+    manifest = json.loads((site / "icy" / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["sources"]["package acme-sensing"] == "1.0"  # another version, other runs
 
 
 def test_third_party_package_shows_up(tmp_path: Path) -> None:
