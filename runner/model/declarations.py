@@ -40,10 +40,14 @@ STUDY_KEYS = (
     "paired",
     "until",
     "metrics",
+    "claims",
+    "guideline",
 )
 RANGE_KEYS = ("from", "to", "step")
 HYPERCUBE_KEYS = ("size", "seed", "ranges")
 UNTIL_KEYS = ("metric", "half_width", "batch", "at_most")
+CLAIM_KEYS = ("doc", "less", "greater", "rises", "falls", "always", "at", "than", "over", "per", "where", "share")
+GUIDELINE_KEYS = ("choose", "least", "greatest", "tolerance")
 LIBRARY_KEYS = ("doc", "include", "composites")
 COMPOSITE_KEYS = ("doc", "extends", "parameters", "inputs", "outputs", "director", "actors", "connections", "aspects")
 DIRECTOR_KEYS = ("start", "drift")

@@ -24,7 +24,7 @@ from .elaborate import MAX_COUNT
 from .observation import MAX_SEED
 from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
 from .schema_parts import QUANTITY, TEXT, Schema, mapping, one_or_more, ref, text
-from .study_schema import STUDY_RULES, dimension, study
+from .study_schema import STUDY_RULES, claim, dimension, study
 
 NAME = "[A-Za-z_][A-Za-z0-9_]*"
 EXPRESSION = r"\$\{"
@@ -64,6 +64,7 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "connection": _connection(),
         "metric": _metric(),
         "run": mapping(language.RUN_KEYS, _RUN, "How long a run takes, and what it records."),
+        "claim": claim(),
         "dimension": dimension(),
         "director": mapping(language.DIRECTOR_KEYS, _DIRECTOR, "A director of its own, with a local clock."),
         "composite": _composite(),

@@ -25,6 +25,33 @@ _HYPERCUBE: dict[str, tuple[Schema, str]] = {
         "'path: [low, high]' for each parameter.",
     ),
 }
+_METRICS: Schema = {"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]}
+_LEVELS: Schema = {
+    "type": "object",
+    "minProperties": 1,
+    "additionalProperties": {"anyOf": [TEXT, {"type": "array", "minItems": 1}]},
+}
+_SHARE: Schema = {"type": "number", "minimum": 0.5, "maximum": 1}
+_CLAIM: dict[str, tuple[Schema, str]] = {
+    "doc": (ref("text"), "What is claimed, in words."),
+    "less": (_METRICS, "Metrics whose mean is less at some levels than at others."),
+    "greater": (_METRICS, "Metrics whose mean is greater at some levels than at others."),
+    "rises": (_METRICS, "Metrics whose mean, or slope per unit of another factor, rises over the levels of a factor."),
+    "falls": (_METRICS, "Metrics whose mean, or slope per unit of another factor, falls over the levels of a factor."),
+    "always": ({"type": "string"}, "A condition on the metrics that holds in every run."),
+    "at": (_LEVELS, "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'."),
+    "than": (_LEVELS, "What they are compared with (default: all other levels, so that these are the best)."),
+    "over": ({"type": "string"}, "The factor over which something rises or falls."),
+    "per": ({"type": "string"}, "What rises or falls is the slope over this factor."),
+    "where": (_LEVELS, "The levels to which the claim is confined (default: all)."),
+    "share": (_SHARE, "In how many of the comparisons, or runs, it is to hold (default: 1, in all)."),
+}
+_GUIDELINE: dict[str, tuple[Schema, str]] = {
+    "choose": ({"type": "string"}, "The factor whose best level is wanted, for every combination of the others."),
+    "least": (ref("name"), "The metric that is to be least."),
+    "greatest": (ref("name"), "The metric that is to be greatest."),
+    "tolerance": ({"type": "number", "minimum": 0}, "How much worse than the best is good enough (default: 0)."),
+}
 _STUDY: dict[str, tuple[Schema, str]] = {
     "study": (ref("name"), "The name of the study."),
     "doc": (ref("text"), "What it is to find out."),
@@ -54,18 +81,48 @@ _STUDY: dict[str, tuple[Schema, str]] = {
         },
         "What is kept of each run: names of the model's metrics, or 'name: expression' (default: all of the model's).",
     ),
+    "claims": (
+        {
+            "anyOf": [
+                {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": ref("claim")},
+                {"type": "string"},
+            ]
+        },
+        "Hypotheses on the results, by name; or the study whose claims are judged here, too.",
+    ),
+    "guideline": (
+        {
+            **mapping(language.GUIDELINE_KEYS, _GUIDELINE, None),
+            "type": "object",
+            "required": ["choose"],
+            "oneOf": [{"required": ["least"]}, {"required": ["greatest"]}],
+        },
+        "Which level of a factor to choose, for every combination of the others.",
+    ),
 }
 STUDY_RULES = {
     "STUDY_KEYS": _STUDY,
     "UNTIL_KEYS": _UNTIL,
     "RANGE_KEYS": _RANGE,
     "HYPERCUBE_KEYS": _HYPERCUBE,
+    "CLAIM_KEYS": _CLAIM,
+    "GUIDELINE_KEYS": _GUIDELINE,
 }
 
 
 def study() -> Schema:
     """A study: a model under many conditions."""
     return {**mapping(language.STUDY_KEYS, _STUDY, "A model under many conditions."), "required": ["model"]}
+
+
+def claim() -> Schema:
+    """A hypothesis on the results of a study: one of the forms, and what belongs to it."""
+    forms = {form: ["at"] for form in ("less", "greater")} | {form: ["over"] for form in ("rises", "falls")}
+    return {
+        **mapping(language.CLAIM_KEYS, _CLAIM, "A hypothesis on the results."),
+        "type": "object",
+        "oneOf": [{"required": [form, *needs]} for form, needs in {**forms, "always": []}.items()],
+    }
 
 
 def dimension() -> Schema:

@@ -21,6 +21,7 @@ from ..model.reading import NodeReader
 from ..model.settings import Setting, is_pattern, parse_setting, settings_in
 from .dimensions import Dimension, Level, Listed, Ranged, as_factor, in_si, kind_of, number_node, split_number
 from .metrics import StudyMetric, checked_metric
+from .questions import QuestionReader, Questions, without
 
 LARGE = 10_000_000  # bytes of a file
 MAX_REPLICATIONS = 10**9
@@ -56,6 +57,7 @@ class Study:
     paired: bool = True
     until: Until | None = None
     metrics: list[StudyMetric] | None = None  # None: all of the model
+    questions: Questions = field(default_factory=Questions)
     changes: tuple[str, ...] = ()  # --set, as given
     types: tuple[Path, ...] = ()
 
@@ -95,15 +97,20 @@ def read_study(
 
 
 def study_of_text(
-    text: str, path: Path, set: Iterable[str] = (), types: Iterable[Path] = (), replications: int | None = None
+    text: str,
+    path: Path,
+    set: Iterable[str] = (),
+    types: Iterable[Path] = (),
+    replications: int | None = None,
+    lender: tuple[str, str] | None = None,
 ) -> Study:
-    """The study that a text says, which once was read from ``path``."""
+    """The study that a text says, which once was read from ``path``; ``lender``: what then was that of its claims."""
     problems = Problems()
     node = parse(text, str(path), problems)
     if node is None:
         problems.raise_if_any()
         raise AssertionError("a text that cannot be read is a problem")
-    return _made(node, path, text, tuple(set), tuple(types), replications, problems)
+    return _made(node, path, text, tuple(set), tuple(types), replications, problems, lender)
 
 
 def _made(
@@ -114,8 +121,9 @@ def _made(
     types: tuple[Path, ...],
     replications: int | None,
     problems: Problems,
+    lender: tuple[str, str] | None = None,
 ) -> Study:
-    reader = _StudyReader(problems, path)
+    reader = _StudyReader(problems, path, lender)
     study = reader.study(node, text)
     problems.raise_if_any()
     assert study is not None, "what is no study is a problem"
@@ -136,9 +144,10 @@ def _made(
 class _StudyReader(NodeReader):
     """Reads one study file; whatever is misshapen is added to ``problems`` and left out."""
 
-    def __init__(self, problems: Problems, path: Path) -> None:
+    def __init__(self, problems: Problems, path: Path, lender: tuple[str, str] | None = None) -> None:
         super().__init__(problems)
         self.path = path
+        self.lender = lender  # file and text of the study whose claims are judged here, if they are known
 
     def study(self, node: Node, text: str) -> Study | None:
         """The whole file."""
@@ -187,8 +196,16 @@ class _StudyReader(NodeReader):
             study.metrics = self.metrics(entries["metrics"].value)
         if "until" in entries:
             study.until = self.until(entries["until"].value, study)
+        before = len(self.problems)
         self.columns(study)
+        if len(self.problems) == before:
+            study.questions = QuestionReader(self.problems, study, self.factors_of).questions(entries, self.lender)
         return study
+
+    def factors_of(self, node: Node, path: Path, problems: Problems) -> dict[str, str]:
+        """What another study varies, whose claims this one judges."""
+        found = _StudyReader(problems, path).study(without(node, "claims", "guideline"), "")
+        return {} if found is None else found.factors
 
     # -- values ---------------------------------------------------------------------------------------------------
 

@@ -98,7 +98,7 @@ class StudyMetric:
         asked += [results.aspects.get(aspect, {}).get(figure) for aspect, figure in self.figures]
         asked += [results.signals.get(signal) for signal in self.signals]
         is_plain = self.formula.names == (self.source.strip(),)
-        if None in asked and (is_plain or not _asks_for_none(self.source)):
+        if None in asked and (is_plain or not asks_for_none(self.source)):
             return None
         if self.figures:
             names[ASPECTS] = results.aspects
@@ -123,7 +123,7 @@ class StudyMetric:
         problems.add(f"metric {self.name}: {message}{did_you_mean(part, names)}", position, f"{caption}: {shown}")
 
 
-def _asks_for_none(source: str) -> bool:
+def asks_for_none(source: str) -> bool:
     """Whether an expression deals with missing numbers itself: ``30 if arrival == None else arrival``."""
     return any(
         isinstance(node, ast.Constant) and node.value is None

@@ -104,6 +104,7 @@ class Plan:
                 study.until.position,
                 f"its metrics: {', '.join(names) or 'none'}",
             )
+        study.questions.check([metric.name for metric in metrics], problems)
         problems.raise_if_any()
         return cls(study, metrics, sources, extra, texts)
 
@@ -116,6 +117,7 @@ class Plan:
             manifest["set"],
             map(Path, manifest["types"]),
             manifest["replications"],
+            None if (lender := manifest.get("lender")) is None else (lender[0], lender[1]),
         )
         metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
         extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
@@ -131,6 +133,7 @@ class Plan:
             "set": list(study.changes),
             "types": [str(path.resolve()) for path in study.types],
             "replications": study.replications,
+            "lender": study.questions.lender,
             "factors": study.factors,
             "metrics": {metric.name: metric.source for metric in self.metrics},
             "model": self.texts,

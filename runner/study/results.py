@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import xarray
 
+    from .claims import Judgement
+    from .guideline import Recommendation
+
 TIMES = ("wall_time",)  # what is not the same each time
 
 
@@ -147,6 +150,18 @@ class StudyResults:
                 rows.append({**dict(zip(others, place, strict=True)), **pair, **asdict(found.estimate), "p": found.p})
         corrected = holm([row["p"] for row in rows])
         return [{**row, "p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+
+    def claims(self, level: float = LEVEL) -> list[Judgement]:
+        """What came of the claims of the study's file; those of another study, at each level of what that has not."""
+        from .claims import judge
+
+        return judge(self, level)
+
+    def guideline(self, level: float = LEVEL) -> list[Recommendation]:
+        """What the study's guideline recommends, at every combination of the factors that are not to be chosen."""
+        from .guideline import recommend
+
+        return recommend(self, level)
 
     def find(self, run: str) -> dict[str, Any]:
         """The row of a run, by the beginning of its key; raises ``StoreError``."""

@@ -87,6 +87,10 @@ SHAPES = (
     "numbers of until",
     "metrics in a list",
     "cases",
+    "claims",
+    "guidelines",
+    "choosing nothing that is varied",
+    "claims in a list",
 )
 
 

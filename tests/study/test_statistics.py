@@ -90,4 +90,9 @@ def test_few_values_give_no_false_certainty() -> None:
     assert rate(0, 0).high == 1.0
     assert math.isnan(paired_difference({1: 2.0}, {1: 3.0}).p)
     assert paired_difference({1: 2.0, 2: 2.0}, {1: 2.0, 2: 2.0}).p == 1.0
-    assert paired_difference({1: 2.0, 2: 2.0}, {1: 3.0, 2: 3.0}).p == 0.0
+    # Without any spread there is the sign test alone, and rounding is no spread.
+    before = {each: 0.1 * each for each in range(8)}
+    for gap in (1.0, 0.1, -0.7):
+        found = paired_difference(before, {each: value + gap for each, value in before.items()})
+        assert found.p == pytest.approx(stats.binomtest(0, 8).pvalue)
+        assert found.estimate.error == pytest.approx(0.0, abs=1e-12)

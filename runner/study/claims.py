@@ -1,0 +1,344 @@
+"""Judging claims: every one is taken apart into comparisons, each with its interval and a corrected test.
+
+A comparison is a contrast of conditions, weighed sum by weighed sum over common replications: the difference of two
+conditions, or the difference of two slopes.  Its mean has Student's interval and test, and the bootstrap's interval
+beside them; the p-values of one claim are corrected together (Holm).
+
+Sources: A. M. Law, *Simulation Modeling and Analysis*, 10.2 (paired comparisons under common random numbers);
+S. Holm, *A simple sequentially rejective multiple test procedure* (1979); E. B. Wilson, *Probable inference* (1927).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise, product
+from typing import TYPE_CHECKING, Any
+
+from epicycle.actors.expression import Formula
+
+from .dimensions import Factor
+from .metrics import asks_for_none
+from .questions import ALWAYS, FALLS, GREATER, RISES, Claim, Selection, levels_of
+from .samples import MISSING, Place, Samples
+from .statistics import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
+
+if TYPE_CHECKING:
+    from .results import StudyResults
+
+REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
+CONFIRMED, REVERSED = "confirmed", "reversed"
+ALMOST_ALL = 0.9  # what Wilson's lower bound has to reach for "in every run", if none is against it
+RESAMPLES = 1_999
+
+Levels = dict[str, Factor]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one comparison has found: how much more ``metric`` is at ``level`` than ``against`` another, ``where``.
+
+    For a condition that is to hold always, ``metric`` is the condition, and ``value`` the share of the runs in which it
+    does.  ``count`` runs or pairs have a number, ``missing`` have none.  ``outcome`` is ``confirmed``, ``reversed`` or
+    ``undecided``.
+    """
+
+    metric: str
+    where: Levels
+    level: Levels
+    against: Levels
+    value: float
+    error: float
+    low: float
+    high: float
+    bootstrap_low: float
+    bootstrap_high: float
+    count: int
+    missing: int
+    p: float
+    p_holm: float
+    outcome: str
+
+    @property
+    def has_enough(self) -> bool:
+        """Whether so few numbers are missing that the mean says something."""
+        return self.count > 1 and self.missing <= MISSING * (self.count + self.missing)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What came of a claim, for one level each of the factors that are judged apart (``where``)."""
+
+    claim: Claim
+    where: Levels
+    verdict: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def name(self) -> str:
+        """The name of the claim."""
+        return self.claim.name
+
+    def counts(self, outcome: str) -> int:
+        """How many comparisons have come out like this."""
+        return sum(finding.outcome == outcome for finding in self.findings)
+
+    @property
+    def missing(self) -> int:
+        """How many runs or pairs have no number, over all comparisons."""
+        return sum(finding.missing for finding in self.findings)
+
+    @property
+    def weakest(self) -> Finding | None:
+        """The comparison that speaks most against the claim, or least for it; None if there is none."""
+        return min(self.findings, key=lambda each: _support(self.claim, each), default=None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a JSON file; numbers that are not finite are None."""
+        claim, weakest = self.claim, self.weakest
+        return {
+            "name": claim.name,
+            "doc": claim.doc,
+            "statement": claim.statement,
+            "form": claim.form,
+            "where": self.where,
+            "verdict": self.verdict,
+            "confirmed": self.counts(CONFIRMED),
+            "reversed": self.counts(REVERSED),
+            "undecided": self.counts(UNDECIDED),
+            "missing": self.missing,
+            "weakest": None if weakest is None else _finite(asdict(weakest)),
+            "findings": [_finite(asdict(finding)) for finding in self.findings],
+        }
+
+
+def judge(results: StudyResults, level: float = LEVEL) -> list[Judgement]:
+    """Judge all claims of a study, one after the other; those of another study at each level of what that has not."""
+    questions = results.plan.study.questions
+    if not questions.claims:
+        return []
+    samples = Samples(results)
+    apart = [levels_of(samples.dimensions, factor) for factor in questions.apart]
+    return [
+        _judged(claim, dict(zip(questions.apart, place, strict=True)), samples, level)
+        for place in product(*apart)
+        for claim in questions.claims
+    ]
+
+
+def _judged(claim: Claim, apart: Levels, samples: Samples, level: float) -> Judgement:
+    where: Selection = {**claim.where, **{factor: (value,) for factor, value in apart.items()}}
+    if claim.form == ALWAYS:
+        findings = list(_occurrences(claim, where, samples, level))
+    else:
+        contrasts = _ordered if claim.form in (RISES, FALLS) else _compared
+        findings = [
+            _finding(claim, contrast, samples, level)
+            for metric in claim.metrics
+            for contrast in contrasts(claim, metric.text, where, samples)
+        ]
+        corrected = holm([finding.p for finding in findings])
+        findings = [replace(each, p_holm=p) for each, p in zip(findings, corrected, strict=True)]
+        findings = [replace(each, outcome=_outcome(claim, each, level)) for each in findings]
+    findings = [replace(each, where=_without(each.where, apart)) for each in findings]
+    return Judgement(claim, apart, verdict(claim, findings), tuple(findings))
+
+
+def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
+    """What the outcomes of all comparisons mean for their claim."""
+    count = len(findings)
+    confirmed = sum(each.outcome == CONFIRMED for each in findings)
+    turned = sum(each.outcome == REVERSED for each in findings)
+    if claim.form in (RISES, FALLS):
+        if turned:
+            return NOT_REPRODUCED
+        is_monotone = all(each.has_enough and _sign(claim) * each.value >= 0 for each in findings)
+        return REPRODUCED if confirmed and is_monotone else UNDECIDED
+    share = 1.0 if claim.form == ALWAYS else claim.share
+    if turned > (1 - share) * count + 1e-9:
+        return NOT_REPRODUCED
+    return REPRODUCED if count and confirmed >= share * count - 1e-9 else UNDECIDED
+
+
+# -- comparisons ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Contrast:
+    """A weighed sum of conditions."""
+
+    metric: str
+    weights: Mapping[Place, float]
+    where: Levels
+    level: Levels
+    against: Levels
+
+
+def _compared(claim: Claim, metric: str, where: Selection, samples: Samples) -> Iterator[_Contrast]:
+    """``at`` less ``than``, at every combination of the other dimensions."""
+    choices = samples.choices(where)
+    homes = samples.homes(claim.at)
+    others = [home for home in range(len(choices)) if home not in homes]
+
+    def levels(selection: Selection) -> list[Place]:
+        within = samples.choices(selection)
+        return list(product(*([each for each in choices[home] if each in within[home]] for home in homes)))
+
+    these = levels(claim.at)
+    those = levels(claim.than or {})
+    if claim.than is None:
+        those = [each for each in those if each not in these]
+    for rest in samples.places(choices, dict.fromkeys(homes, 0)):
+        for this in these:
+            for that in those:
+                first, second = _with(rest, homes, this), _with(rest, homes, that)
+                yield _Contrast(
+                    metric,
+                    {first: 1.0, second: -1.0},
+                    samples.values(first, others),
+                    samples.values(first, homes),
+                    samples.values(second, homes),
+                )
+
+
+def _ordered(claim: Claim, metric: str, where: Selection, samples: Samples) -> Iterator[_Contrast]:
+    """Each level of a factor against the one before it: their means, or their slopes over another factor."""
+    choices = samples.choices(where)
+    (home,) = samples.homes([claim.over])
+    levels = choices[home]
+    if samples.dimensions[home].columns[claim.over] in ("int", "float"):
+        levels = sorted(levels, key=lambda index: _number(samples.level(home, index, claim.over)))
+    slope: dict[int, float] = {0: 1.0}
+    inner: list[int] = []
+    if claim.per:
+        inner = samples.homes([claim.per])
+        at = {index: _number(samples.level(inner[0], index, claim.per)) for index in choices[inner[0]]}
+        center = math.fsum(at.values()) / len(at)
+        spread = math.fsum((each - center) ** 2 for each in at.values())
+        slope = {index: (each - center) / spread for index, each in at.items()}
+    others = [each for each in range(len(choices)) if each != home and each not in inner]
+    for rest in samples.places(choices, dict.fromkeys([home, *inner], 0)):
+        for before, after in pairwise(levels):
+            weights = {
+                _with(rest, [home, *inner], [index, place] if inner else [index]): sign * weight
+                for sign, index in ((1.0, after), (-1.0, before))
+                for place, weight in slope.items()
+                if weight
+            }
+            yield _Contrast(
+                metric,
+                weights,
+                samples.values(rest, others),
+                samples.values(_with(rest, [home], [after]), [home]),
+                samples.values(_with(rest, [home], [before]), [home]),
+            )
+
+
+def _finding(claim: Claim, contrast: _Contrast, samples: Samples, level: float) -> Finding:
+    """The mean of a contrast over the replications in which all its conditions have a number."""
+    numbers = {place: samples.numbers(place, contrast.metric) for place in contrast.weights}
+    over = set.intersection(*(samples.over(place) for place in numbers))
+    pairs = sorted(set.intersection(*(set(each) for each in numbers.values())))
+    terms = [[weight * numbers[place][each] for place, weight in contrast.weights.items()] for each in pairs]
+    values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
+    found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
+    student, bootstrap = found.estimate, bootstrap_mean(values, level, resamples=RESAMPLES)
+    return Finding(
+        contrast.metric,
+        contrast.where,
+        contrast.level,
+        contrast.against,
+        student.value,
+        student.error,
+        student.low,
+        student.high,
+        bootstrap.low,
+        bootstrap.high,
+        student.count,
+        len(over) - len(pairs),
+        found.p,
+        math.nan,
+        UNDECIDED,
+    )
+
+
+def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float) -> Iterator[Finding]:
+    """How often a condition holds, at every combination of levels."""
+    formula = Formula(claim.condition)
+    may_be_none = asks_for_none(claim.condition)
+    for place in samples.places(samples.choices(where)):
+        rows = samples.rows(place, formula.names)
+        known = [row for row in rows if row is not None and (may_be_none or None not in row.values())]
+        holds = sum(bool(formula(row)) for row in known)
+        found = rate(holds, len(known), level)
+        missing = len(rows) - len(known)
+        finding = Finding(
+            claim.condition, samples.values(place), {}, {}, found.value, found.error, found.low, found.high,
+            math.nan, math.nan, found.count, missing, math.nan, math.nan, UNDECIDED,
+        )  # fmt: skip
+        yield replace(finding, outcome=_outcome_of_rate(claim, finding, holds))
+
+
+# -- outcomes ---------------------------------------------------------------------------------------------------------
+
+
+def _outcome(claim: Claim, finding: Finding, level: float) -> str:
+    """A comparison counts if so much is hardly chance, and few numbers are missing."""
+    if not finding.has_enough or not finding.p_holm < 1 - level:
+        return UNDECIDED
+    return CONFIRMED if _sign(claim) * finding.value > 0 else REVERSED
+
+
+def _outcome_of_rate(claim: Claim, finding: Finding, holds: int) -> str:
+    """One run against it refutes ``always``, whatever is missing; none against it needs runs enough to say so."""
+    if claim.share == 1:
+        if holds < finding.count:
+            return REVERSED
+        is_confirmed = finding.missing == 0 and finding.low >= ALMOST_ALL
+    else:
+        if finding.high < claim.share:
+            return REVERSED if finding.has_enough else UNDECIDED
+        is_confirmed = finding.has_enough and finding.low >= claim.share
+    return CONFIRMED if is_confirmed else UNDECIDED
+
+
+def _sign(claim: Claim) -> int:
+    return 1 if claim.form in (GREATER, RISES) else -1
+
+
+def _support(claim: Claim, finding: Finding) -> float:
+    """How much a finding speaks for its claim, in standard errors."""
+    if claim.form == ALWAYS:
+        return finding.value if finding.count else -math.inf
+    if finding.count < 2:
+        return -math.inf
+    value = _sign(claim) * finding.value
+    if finding.error == 0:
+        return math.copysign(math.inf, value) if value else 0.0
+    return value / finding.error
+
+
+# -- small things -----------------------------------------------------------------------------------------------------
+
+
+def _with(place: Place, homes: Sequence[int], levels: Sequence[int]) -> Place:
+    found = list(place)
+    for home, level in zip(homes, levels, strict=True):
+        found[home] = level
+    return tuple(found)
+
+
+def _without(values: Levels, apart: Levels) -> Levels:
+    return {factor: value for factor, value in values.items() if factor not in apart}
+
+
+def _number(value: Factor) -> float:
+    assert isinstance(value, (int, float))
+    return float(value)
+
+
+def _finite(values: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in values.items()
+    }
