@@ -16,7 +16,7 @@ from .parameter import (
     variants,
 )
 from .port_parameter import PortParameter
-from .ports import InputPort, OutputPort, PortError, accepts, shaped, type_name
+from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
 from .quantity import Quantity, counted_in_si, plain
 from .random import random_stream
@@ -30,6 +30,7 @@ __all__ = [
     "Actor",
     "Configurable",
     "Context",
+    "Emit",
     "EpicycleError",
     "InputPort",
     "MappingParameter",

@@ -78,6 +78,18 @@ class Context(Protocol):
         """End the run when the present tag has been handled; ``reason`` says why it ended."""
 
 
+class _NoContext:
+    """What an actor sees of a run when it is part of none."""
+
+    def __init__(self, actor: Actor) -> None:
+        self._actor = actor
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # Python itself asks, to copy it for example
+            raise AttributeError(name)
+        raise RuntimeError(f"{self._actor.path} is not part of a running model")
+
+
 class Actor(Configurable):
     """Base of all actors: declare ``InputPort``, ``OutputPort`` and ``Parameter`` in the class, write ``fire``.
 
@@ -101,7 +113,7 @@ class Actor(Configurable):
             raise ParameterError(f"{path}: {error}") from None
         self.path = path
         self.home: object | None = None  # the graph that it is part of
-        self._context: Context | None = None
+        self.context: Context = _NoContext(self)  # the run that the actor is part of
         self._streams: dict[str, np.random.Generator] = {}
         self.inputs: dict[str, InputPort[Any]] = {}
         self.outputs: dict[str, OutputPort[Any]] = {}
@@ -167,18 +179,11 @@ class Actor(Configurable):
 
     def enter(self, context: Context) -> None:
         """Engine: the actor becomes part of a run."""
-        self._context = context
+        self.context = context
         self._streams.clear()
         for port in self.inputs.values():
             if isinstance(port, ParameterPort):
                 port.reset()
-
-    @property
-    def context(self) -> Context:
-        """The run that the actor is part of."""
-        if self._context is None:
-            raise RuntimeError(f"{self.path} is not part of a running model")
-        return self._context
 
     @property
     def tag(self) -> Tag:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import types
+from collections.abc import Callable
 from typing import Any, TypeVar, overload
 
 from .parameter import Parameter, ParameterError
@@ -20,13 +21,20 @@ class ParameterPort(InputPort[T]):
         self._parameter = parameter
         self._received: Any = _NOTHING
         self._current: Any = _NOTHING
+        self.has_received = False  # which is asked first: most have not, and are read for every token
         self._before: Any = _NOTHING  # what had been received, and not been read, before the present tag
 
-    def put(self, token: T, channel: int) -> None:
-        if not self._arriving[0]:
-            self._before = self._received
-        super().put(token, channel)
-        self._received = token
+    def entry(self) -> tuple[Callable[[T], None], Callable[[int], None]]:
+        put, put_channel = super().entry()
+
+        def put_and_keep(token: T) -> None:
+            if not self._arriving[0]:
+                self._before = self._received
+            put(token)
+            self._received = token
+            self.has_received = True
+
+        return put_and_keep, put_channel
 
     def take(self) -> tuple[list[T], list[int]]:
         self._received = self._before
@@ -35,10 +43,12 @@ class ParameterPort(InputPort[T]):
     def give(self, taken: tuple[list[T], list[int]]) -> None:
         super().give(taken)
         self._received = taken[0][-1]
+        self.has_received = True
 
     def reset(self) -> None:
         """Forget what came: the declared value counts again."""
         self._received = self._current = _NOTHING
+        self.has_received = False
 
     def current(self, initial: T) -> T:
         """The value at present: the latest token that came, or else the value given in the model."""
@@ -76,7 +86,8 @@ class PortParameter(Parameter[T]):
         if instance is None:
             return self
         port: ParameterPort[T] = instance.inputs[self.name]
-        return port.current(instance.__dict__[self.name])
+        initial: T = instance.__dict__[self.name]
+        return port.current(initial) if port.has_received else initial
 
     def __set__(self, instance: Any, value: T) -> None:
         # That it exists makes Python ask __get__ before the instance's __dict__, where the value given first lies.

@@ -13,9 +13,9 @@ A token sent over a connection without delay arrives at the same tag; with delay
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
 microstep 1.  The first tag of a run is (start, 1).
 
-SimPy owns time and the event heap: the director puts one event into it for each instant at which something happens,
-with lower priority than SimPy's own, so that timeouts, resources and processes of that instant come first.  What they
-send is received at the first microstep that the director has not handled yet.
+SimPy owns time, and the events of processes and resources.  The director has an agenda of its own beside it: of the
+two, who is first goes on.  At one instant all that SimPy has to do comes first, and what processes send then is
+received at the first microstep that the director has not handled yet.
 
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
 token; and tokens that an actor does not read do not stay in the port.
@@ -23,26 +23,21 @@ token; and tokens that an actor does not read do not stay in the port.
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Callable
 from functools import partial
-from itertools import count
-from typing import Any, cast
-
-import simpy
-from simpy.events import EventPriority
+from heapq import heappop, heappush
+from typing import Any
 
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake
 from epicycle.aspects import Job
 
+from .agenda import Environment, Instant, Turn
 from .pace import Pace
 
 MAX_MICROSTEPS = 100_000
 MAX_STEPS = 1_000_000  # of SimPy at one instant
 _START = 0
-# After all of SimPy's own events of an instant (priorities 0 and 1).
-_LAST = cast(EventPriority, 2)
 
 
 class ActorError(EpicycleError):
@@ -83,30 +78,29 @@ class Director:
     """Fires the actors of one run."""
 
     def __init__(self, order: dict[str, int], seed: int) -> None:
-        self.environment = simpy.Environment(initial_time=_START)
+        self.environment = Environment(initial_time=_START)
         self.seed = seed
         self.firings = 0
+        self.present: Tag | None = None  # the tag that is being handled; None between, while SimPy does things
         self.last = Tag(_START, 0)  # the latest tag that was handled, or is being handled
         self.ranks = order  # of actors and of their inputs
-        # By the rank of a firing, the ports whose tokens are taken in a later firing of the same actor.
-        self._later_ports: dict[int, list[InputPort[Any]]] = {}
-        # (time, microstep, rank, sequence, what): deliveries have rank -1, so they come before all firings.
-        self._agenda: list[tuple[int, int, int, int, Actor | Callable[[], None]]] = []
-        self._sequence = count()
-        self._wanted: set[tuple[int, int, int]] = set()  # (time, microstep, rank) of the firings in the agenda
-        self._wakes: dict[tuple[int, int, int], list[Wake]] = {}
-        self._alarms: set[int] = set()
-        self._firing = False
-        self._turn = -1  # the rank of what is handled now
+        self._turns: dict[int, Turn] = {}  # by rank
+        # What is to be done: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
+        # One entry per actor and tag, whatever the number of its tokens.
+        self._ready: list[int] = []
+        self._next: Instant | None = None
+        self._instants: dict[int, Instant] = {}
+        self._times: list[int] = []  # theirs (a heap)
+        self._rank = -1  # the rank of what is handled now
         self._stop_after: Tag | None = None
         self._reason = "no events left"
-        self._recent: list[str] = []
+        self._recent: list[str] | None = None  # who fires, when it looks as if time stood still
 
     @property
     def tag(self) -> Tag:
         """The present tag: outside of firings (a process that SimPy resumed), the first not handled yet."""
-        if self._firing:
-            return self.last
+        if self.present is not None:
+            return self.present
         # SimPy's time need not be whole; what comes between two nanoseconds belongs to the later one.
         now = math.ceil(self.environment.now)
         return Tag(now, 1) if now > self.last.time else Tag(self.last.time, self.last.microstep + 1)
@@ -115,29 +109,60 @@ class Director:
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time``; the present or past is the next microstep."""
-        return self.call(actor, self._tag_at(time), self.ranks[actor.path])
+        rank, present = self.ranks[actor.path], self.present
+        if present is None or time <= present.time:
+            return self.call(actor, self._tag_at(time), rank)
+        instant = self._instants.get(time) or self._await(Tag(time, 1))
+        wake = Wake(instant.tag)
+        instant.wakes.append((self.turn(actor, rank), wake))
+        return wake
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
         """Fire ``actor`` at a tag and rank that are still to come."""
-        wake = Wake(tag)
-        key = self._want(actor, tag, rank)
-        self._wakes.setdefault(key, []).append(wake)
+        turn = self.turn(actor, rank)
+        if tag == self.tag:
+            wake = Wake(tag)
+            turn.wakes.append(wake)
+            self._want(turn)
+        else:
+            instant = self._to_come(tag)
+            wake = Wake(instant.tag)  # which is equal: one tag for all that is to be done
+            instant.wakes.append((turn, wake))
         return wake
 
-    def put(self, port: InputPort[Any], channel: int, token: Any, turn: Actor | None = None) -> None:
-        """Put a token into a port at the present tag, and fire its actor, or who has the ``turn`` in its place."""
-        port.put(token, channel)
-        self._want(turn or port.actor, self.tag, self.ranks[port.path])
+    def turn(self, actor: Actor, rank: int) -> Turn:
+        """The turn of a rank, which ``actor`` has: an actor of the model, or who stands in for it."""
+        turn = self._turns.get(rank)
+        if turn is None:
+            turn = self._turns[rank] = Turn(actor, rank, self.ranks)
+        return turn
+
+    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Callable[[Any], None]:
+        """What puts tokens into a port at the present tag, and lets its actor fire, or who stands in for it."""
+        turn = self.turn(stand_in or port.actor, self.ranks[port.path])
+        rank, ready = turn.rank, self._ready
+        put, put_channel = port.entry()
+
+        def enter(token: Any) -> None:
+            put(token)
+            put_channel(channel)
+            if not turn.is_wanted:  # as in _want, without the call: this is done for every token that arrives
+                turn.is_wanted = True
+                heappush(ready, rank)
+                if self.present is None:
+                    self._await_present()
+
+        return enter
 
     def trigger(self, actor: Actor) -> None:
         """Fire ``actor`` at the present tag."""
-        self._want(actor, self.tag, self.ranks[actor.path])
+        self._want(self.turn(actor, self.ranks[actor.path]))
 
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
         now = self.tag
         tag = Tag(now.time + delay, 1) if delay > 0 else Tag(now.time, now.microstep + 1)
-        self._enter(tag, -1, self.hold(deliver, token))
+        self._to_come(tag).deliveries.append(self.hold(deliver, token))
 
     def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
         """``deliver(token)``, to be called later."""
@@ -152,7 +177,7 @@ class Director:
     def next_turn(self, rank: int) -> Tag:
         """The first tag at which a turn of this rank is still to come."""
         now = self.tag
-        is_over = self._firing and self._turn >= rank
+        is_over = self.present is not None and self._rank >= rank
         return Tag(now.time, now.microstep + 1) if is_over else now
 
     def set_aside(self, job: Job) -> None:
@@ -166,87 +191,109 @@ class Director:
         now = self.tag
         if time > now.time:
             return Tag(time, 1)
-        return Tag(now.time, now.microstep + 1) if self._firing else now
+        return now if self.present is None else Tag(now.time, now.microstep + 1)
 
-    def _want(self, actor: Actor, tag: Tag, rank: int) -> tuple[int, int, int]:
-        key = (tag.time, tag.microstep, rank)
-        if key not in self._wanted:
-            self._wanted.add(key)
-            self._enter(tag, rank, actor)
-        return key
+    # -- the agenda -----------------------------------------------------------------------------------------------
 
-    def _enter(self, tag: Tag, rank: int, what: Actor | Callable[[], None]) -> None:
-        heapq.heappush(self._agenda, (tag.time, tag.microstep, rank, next(self._sequence), what))
-        if tag.time not in self._alarms:
-            self._alarms.add(tag.time)
-            alarm = self.environment.event()
-            alarm._ok, alarm._value = True, None
-            alarm.callbacks.append(lambda _: self._instant(tag.time))
-            self.environment.schedule(alarm, priority=_LAST, delay=tag.time - self.environment.now)
+    def _want(self, turn: Turn) -> None:
+        """Let an actor have a turn at the present tag."""
+        if not turn.is_wanted:
+            turn.is_wanted = True
+            heappush(self._ready, turn.rank)
+            if self.present is None:
+                self._await_present()
+
+    def _to_come(self, tag: Tag) -> Instant:
+        """What is to be done at a tag after the present one: the next microstep, or the first one of a later time."""
+        if tag.time > self.tag.time:
+            return self._instants.get(tag.time) or self._await(tag)
+        if self._next is None:
+            self._next = Instant(tag)
+            if self.present is None:
+                self._await_present()
+        return self._next
+
+    def _await_present(self) -> None:
+        """Between tags: see to it that the present one is going to be handled."""
+        tag = self.tag
+        if tag.time not in self._instants:
+            self._await(tag)
+
+    def _await(self, tag: Tag) -> Instant:
+        """Put a tag into the agenda."""
+        heappush(self._times, tag.time)
+        instant = self._instants[tag.time] = Instant(tag)
+        return instant
 
     # -- time -----------------------------------------------------------------------------------------------------
 
-    def _instant(self, now: int) -> None:
-        """Handle every tag of the present instant."""
-        agenda = self._agenda
-        self._firing = True
+    def _handle(self, time: int) -> None:
+        """Handle every tag of an instant."""
+        self.environment.move_on(time)
+        to_handle: Instant | None = self._instants.pop(time)
         try:
-            while agenda and agenda[0][0] == now:
-                _, microstep, rank, _, what = heapq.heappop(agenda)
-                self._turn = rank
-                tag = self.last
-                if microstep != tag.microstep or now != tag.time:
-                    tag = Tag(now, microstep)
-                    if self._stop_after is not None and tag > self._stop_after:
-                        # The entry stays undone: the run ends here.
-                        return
-                if isinstance(what, Actor):
-                    key = (now, microstep, rank)
-                    self._wanted.discard(key)
-                    if self._is_idle(what, key, rank):
-                        continue
-                self.last = tag
-                if microstep > MAX_MICROSTEPS:
-                    raise LoopError(now, tuple(dict.fromkeys(self._recent)))
-                if isinstance(what, Actor):
-                    self.fire(what, rank)
-                else:
-                    what()
+            while to_handle is not None:
+                if self._stop_after is not None and to_handle.tag > self._stop_after:
+                    return  # and leave it undone: the run ends here
+                self._handle_tag(to_handle)
+                to_handle, self._next = self._next, None
         finally:
-            self._firing = False
-            self._alarms.discard(now)
+            self.present = None
 
-    def _is_idle(self, actor: Actor, key: tuple[int, int, int], rank: int) -> bool:
-        """Make the wake-ups of a firing due; true if all were cancelled and there is nothing else to fire for."""
-        wakes = self._wakes.pop(key, None)
-        if wakes is None:
-            return False
-        due = False
-        for wake in wakes:
-            wake.due = not wake.cancelled
-            due = due or wake.due
-        later = self._later_ports.get(rank, ())
-        return not due and not any(port.present for port in actor.inputs.values() if port not in later)
+    def _handle_tag(self, instant: Instant) -> None:
+        tag, turns, ready = instant.tag, self._turns, self._ready
+        for turn, wake in instant.wakes:
+            turn.wakes.append(wake)
+            if not turn.is_wanted:
+                turn.is_wanted = True
+                heappush(ready, turn.rank)
+        if instant.deliveries:
+            self._rank = -1
+            self._begin(tag)
+            for deliver in instant.deliveries:
+                deliver()
+        while ready:
+            turn = turns[heappop(ready)]
+            turn.is_wanted = False
+            self._rank = turn.rank
+            if turn.wakes and not self._use_wakes(turn):
+                continue
+            if self.present is not tag:
+                self._begin(tag)
+            self.fire(turn)
 
-    def fire(self, actor: Actor, rank: int) -> None:
+    def _begin(self, tag: Tag) -> None:
+        """Something happens at a tag, for the first time."""
+        self.present = self.last = tag
+        if tag.microstep > MAX_MICROSTEPS - 10:
+            if tag.microstep > MAX_MICROSTEPS:
+                raise LoopError(tag.time, tuple(dict.fromkeys(self._recent or ())))
+            self._recent = self._recent or []
+        else:
+            self._recent = None
+
+    def _use_wakes(self, turn: Turn) -> bool:
+        """Make the wake-ups of a turn due; false if the actor has nothing to fire for after all."""
+        return turn.use_wakes()
+
+    def fire(self, turn: Turn) -> None:
         """Let an actor fire, in its turn."""
         self.firings += 1
-        if self.last.microstep > MAX_MICROSTEPS - 10:
-            self._recent.append(actor.path)
-        later = self._later_ports.get(rank, ())
-        for port in later:
+        if self._recent is not None:
+            self._recent.append(turn.actor.path)
+        for port in turn.later:
             port.hold()
         try:
-            actor.fire()
+            turn.actor.fire()
         except ActorError:  # of an aspect on the way of a token
             raise
         except Exception as error:
-            doing = "run()" if isinstance(actor, Process) else "fire()"
-            raise ActorError(actor.path, self.last, doing, describe(error)) from error
+            doing = "run()" if isinstance(turn.actor, Process) else "fire()"
+            raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
         finally:
-            for port in actor.inputs.values():
-                port.clear()  # which leaves what is held
-            for port in later:
+            for port in turn.ports:
+                port.clear()
+            for port in turn.later:
                 port.release()
 
     def run(
@@ -260,13 +307,18 @@ class Director:
 
         Returns why it ended.
         """
-        self._find_later_ports(actors)
-        environment = self.environment
+        environment, times = self.environment, self._times
         steps = here = 0
         now: float = _START
         if pace is not None:
             pace.wait_for(now)
-        while (upcoming := environment.peek()) != math.inf:
+        while True:
+            upcoming: float = times[0] if times else math.inf
+            is_of_simpy = environment.comes_by(upcoming)
+            if is_of_simpy:
+                upcoming = environment.peek()
+            if upcoming == math.inf:
+                break
             if self._stop_after is not None and max(upcoming, self.last.time) > self._stop_after.time:
                 break
             if stop is not None and upcoming > stop:
@@ -276,7 +328,10 @@ class Director:
             if pace is not None and upcoming > now:
                 pace.wait_for(upcoming)
             try:
-                environment.step()
+                if is_of_simpy:
+                    environment.step()
+                else:
+                    self._handle(heappop(times))
             except (ActorError, LoopError):
                 raise
             except Exception as error:
@@ -291,12 +346,6 @@ class Director:
             if progress is not None and steps % 16 == 0:
                 progress(now / 1e9)
         return self._reason
-
-    def _find_later_ports(self, actors: list[Actor]) -> None:
-        for actor in actors:
-            ranks = {self.ranks[port.path] for port in actor.inputs.values()} | {self.ranks[actor.path]}
-            for rank in ranks - {max(ranks)}:
-                self._later_ports[rank] = [port for port in actor.inputs.values() if self.ranks[port.path] > rank]
 
     def _of_process(self, error: Exception, actors: list[Actor]) -> ActorError:
         """The error of a process that SimPy resumed: from there, no firing says whose it was."""

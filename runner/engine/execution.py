@@ -15,6 +15,7 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import ActorPoint, Job
 
+from .agenda import Turn
 from .director import ActorError, Director, describe
 from .local import LocalDirector
 
@@ -32,12 +33,13 @@ class Execution:
         self.refresh: list[Callable[[], None]] = []
         self.forget: Callable[[], None] = _nothing
         self.seed = director.seed
+        self.ranks = director.ranks
         self.environment = local.environment
         self.stop = local.stop
         self._director = director
         self._local = local
         # An actor has a turn for each rank at which it takes tokens, and one for its wake-ups.
-        self._turns: dict[int, _Turn] = {}
+        self._turns: dict[int, _StandIn] = {}
         for port in actor.inputs.values():
             self._turn_at(director.ranks[port.path]).inputs[port.name] = port
         self._own = self._turn_at(director.ranks[actor.path])
@@ -50,9 +52,9 @@ class Execution:
         self._held: list[Job] = []
         self._waiting: list[Job] = []
 
-    def _turn_at(self, rank: int) -> _Turn:
+    def _turn_at(self, rank: int) -> _StandIn:
         if rank not in self._turns:
-            self._turns[rank] = _Turn(self, rank)
+            self._turns[rank] = _StandIn(self, rank)
         return self._turns[rank]
 
     # -- as the actor's context -----------------------------------------------------------------------------------
@@ -74,7 +76,7 @@ class Execution:
         """Who fires in place of the actor for a token at a port."""
         return self._turns[self._director.ranks[port.path]]
 
-    def take(self, turn: _Turn) -> None:
+    def take(self, turn: _StandIn) -> None:
         """Use a turn: execute what is ready, and hand what has fallen due to the aspects."""
         self._director.firings -= 1  # the actor's own count, and a turn is none
         job = self._fallen_due(turn)
@@ -88,7 +90,7 @@ class Execution:
         finally:
             self._open = None
 
-    def _fallen_due(self, turn: _Turn) -> Job:
+    def _fallen_due(self, turn: _StandIn) -> Job:
         """Take the tokens out of the ports and the wake-ups back, as if they had not come yet."""
         due = [wake for wake in self._asked if wake.due] if turn is self._own else []
         if self._asked:
@@ -131,7 +133,7 @@ class Execution:
             refresh()
         turn, self._open = self._open, None
         start = perf_counter()
-        self._director.fire(self.actor, job.rank)
+        self._director.fire(self._turns[job.rank].of_actor)
         if job.watch is not None:
             job.watch(perf_counter() - start)
         self._open = turn
@@ -171,21 +173,29 @@ class Execution:
             raise ActorError(self.actor.path, self._director.tag, "restart()", describe(error)) from error
 
 
-class _Turn(Actor):
+class _StandIn(Actor):
     """Fires in place of an actor, in its turns at one rank, for the tokens that it takes there."""
 
     def __init__(self, execution: Execution, rank: int) -> None:
         super().__init__(execution.actor.path)
         self.rank = rank
         self._execution = execution
+        self._of_actor: Turn | None = None
+
+    @property
+    def of_actor(self) -> Turn:
+        """The turn as the actor itself would have it."""
+        if self._of_actor is None:
+            self._of_actor = Turn(self._execution.actor, self.rank, self._execution.ranks)
+        return self._of_actor
 
     def fire(self) -> None:
         self._execution.take(self)
 
 
-def is_turn(actor: Actor) -> bool:
+def is_stand_in(actor: Actor) -> bool:
     """Whether this is not an actor, but stands in for one."""
-    return isinstance(actor, _Turn)
+    return isinstance(actor, _StandIn)
 
 
 def _nothing() -> None:

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
 _TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 FORMATS = (".parquet", ".csv", ".jsonl")
+_PIECES = 3_000  # that are hashed together
+
+Write = Callable[["Tag", Any], None]
 
 
 class LogError(EpicycleError):
@@ -70,25 +73,63 @@ class EventLog:
 
     def __init__(self, keeps: Callable[[str, str, str, str], bool] | None = None) -> None:
         self.records: list[Record] = []
-        self.count = 0
         self._keeps = keeps
+        self._writers: dict[tuple[str, str, str, str, int | None], Write] = {}
+        # What the digest is made of, three pieces a record: tag, names, value.  They are hashed many at a time.
         self._hash = hashlib.sha256()
-        self._heads: dict[tuple[str, str, str, str, int | None], tuple[bytes, bool]] = {}
+        self._pieces: list[bytes] = []
+        self._hashed = 0  # records
+        self._tag: Tag | None = None  # of the last record
+        self._stamp = b""  # the same in bytes
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
+        self.writer(event, actor, port, channel, aspect)(tag, value)
+
+    def writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
+        """What appends records with these names: a tag and a value are all that there is to give for each."""
         names = (event, actor, port, aspect, channel)
-        head = self._heads.get(names)
-        if head is None:
-            is_kept = self._keeps is not None and self._keeps(event, actor, port, aspect)
-            head = self._heads[names] = b"".join(map(canonical, names)), is_kept
-        encoded, is_kept = head
-        time, microstep = tag
-        # This raises what cannot be logged.
-        self._hash.update(_TAG(b"i", time, b"i", microstep) + encoded + canonical(value))
-        self.count += 1
-        if is_kept:
+        write = self._writers.get(names)
+        if write is None:
+            write = self._writers[names] = self._new_writer(event, actor, port, channel, aspect)
+        return write
+
+    def _new_writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
+        head = b"".join(map(canonical, (event, actor, port, aspect, channel)))
+        pieces = self._pieces
+
+        def write(tag: Tag, value: Any) -> None:
+            encoded = canonical(value)  # raises what cannot be logged
+            if tag is not self._tag:
+                self._turn_to(tag)
+            pieces.extend((self._stamp, head, encoded))
+
+        if self._keeps is None or not self._keeps(event, actor, port, aspect):
+            return write
+
+        def write_and_keep(tag: Tag, value: Any) -> None:
+            write(tag, value)
             self.records.append(Record(tag, event, actor, port, channel, aspect, value))
+
+        return write_and_keep
+
+    def _turn_to(self, tag: Tag) -> None:
+        """The records that follow are of this tag."""
+        self._tag = tag
+        time, microstep = tag
+        self._stamp = _TAG(b"i", time, b"i", microstep)
+        if len(self._pieces) > _PIECES:
+            self._hash_pieces()
+
+    def _hash_pieces(self) -> None:
+        self._hash.update(b"".join(self._pieces))
+        self._hashed += len(self._pieces) // 3
+        self._pieces.clear()
+
+    @property
+    def count(self) -> int:
+        """The number of records."""
+        return self._hashed + len(self._pieces) // 3
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each record, with the columns of a log file; raises ``LogError`` if the records were not kept."""
@@ -101,6 +142,7 @@ class EventLog:
     @property
     def digest(self) -> str:
         """SHA-256 over all records so far, as hexadecimal text."""
+        self._hash_pieces()
         return self._hash.hexdigest()
 
 

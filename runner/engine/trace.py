@@ -12,9 +12,10 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import Job
 
+from .agenda import Turn
 from .director import Director
-from .execution import is_turn
-from .log import EventLog, Record
+from .execution import is_stand_in
+from .log import EventLog, Record, Write
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +87,14 @@ class TracingLog(EventLog):
         super().__init__(keeps)
         self._tracer = tracer
 
-    def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
-        super().add(tag, event, actor, port, channel, aspect, value)
-        self._tracer.add(Record(tag, event, actor, port, channel, aspect, value))
+    def _new_writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
+        write = super()._new_writer(event, actor, port, channel, aspect)
+
+        def write_and_tell(tag: Tag, value: Any) -> None:
+            write(tag, value)
+            self._tracer.add(Record(tag, event, actor, port, channel, aspect, value))
+
+        return write_and_tell
 
 
 class TracingDirector(Director):
@@ -108,11 +114,17 @@ class TracingDirector(Director):
             self._asked[wake] = self.tag if self.last.microstep else None
         return wake
 
-    def put(self, port: InputPort[Any], channel: int, token: Any, turn: Actor | None = None) -> None:
-        super().put(port, channel, token, turn)
-        if port.actor.path in self._tracer.actors:
+    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Callable[[Any], None]:
+        enter = super().entry(port, channel, stand_in)
+        if port.actor.path not in self._tracer.actors:
+            return enter
+
+        def enter_and_tell(token: Any) -> None:
+            enter(token)
             arrival = Arrival(port.name, channel, token, *self._tracer.origin)
             self._arrivals.setdefault(port.actor.path, []).append(arrival)
+
+        return enter_and_tell
 
     def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
         origin = self._tracer.origin
@@ -126,11 +138,11 @@ class TracingDirector(Director):
 
         return release
 
-    def _is_idle(self, actor: Actor, key: tuple[int, int, int], rank: int) -> bool:
-        asked = [(wake, self._asked.pop(wake)) for wake in self._wakes.get(key, ()) if wake in self._asked]
-        idle = super()._is_idle(actor, key, rank)
-        self._due = [tag for wake, tag in asked if wake.due]
-        return idle
+    def _use_wakes(self, turn: Turn) -> bool:
+        asked = [(wake, self._asked.pop(wake)) for wake in turn.wakes if wake in self._asked]
+        is_to_fire = super()._use_wakes(turn)
+        self._due = [tag for wake, tag in asked if wake.due and is_to_fire]
+        return is_to_fire
 
     def set_aside(self, job: Job) -> None:
         taken = {port.name for port in job.arrivals}
@@ -142,17 +154,20 @@ class TracingDirector(Director):
         arrivals, self._due = self._aside.pop(job)
         self._arrivals[job.actor.path] = [*arrivals, *self._arrivals.get(job.actor.path, [])]
 
-    def fire(self, actor: Actor, rank: int) -> None:
-        if actor.path not in self._tracer.actors or is_turn(actor):
+    def fire(self, turn: Turn) -> None:
+        actor = turn.actor
+        if actor.path not in self._tracer.actors or is_stand_in(actor):
             self._tracer.end()  # of a process that was resumed before
-            super().fire(actor, rank)
+            super().fire(turn)
+            self._due = []
             return
         waiting = self._arrivals.pop(actor.path, [])
-        later = {port.name for port in self._later_ports.get(rank, ())}
+        later = {port.name for port in turn.later}
         self._arrivals[actor.path] = [arrival for arrival in waiting if arrival.port in later]
         arrivals = [arrival for arrival in waiting if arrival.port not in later]
-        self._tracer.begin(Firing(self.last, actor.path, arrivals, self._due))
+        due, self._due = self._due, []
+        self._tracer.begin(Firing(self.last, actor.path, arrivals, due))
         try:
-            super().fire(actor, rank)
+            super().fire(turn)
         finally:
             self._tracer.end()

@@ -8,6 +8,7 @@ from typing import Any
 
 from epicycle.actors import (
     Context,
+    Emit,
     EpicycleError,
     InputPort,
     OutputPort,
@@ -27,8 +28,6 @@ from .log import EventLog
 from .parameters import VaryingParameter
 from .requests import Requests
 from .signal import Signal
-
-Emit = Callable[[Any, int | None], None]
 
 
 class Wiring:
@@ -171,17 +170,18 @@ class Wiring:
         heard = _all(self._listeners.get(port.path, []))
         ways = [self._way(wire.hops, channels[wire.hops]) for wire in self.graph.wires_from(port)]
         port.width = len(ways)
-        log, director, path, name = self.log.add, self.director, port.actor.path, port.name
+        log, director, path, name = self.log, self.director, port.actor.path, port.name
+        write = log.writer("send", path, name, None, "")
 
-        def emit_one(token: Any, channel: int | None) -> None:
+        def emit_one(token: Any, channel: int | None = None) -> None:
             if channel is None:
-                log(director.tag, "send", path, name, None, "", token)
+                write(director.present or director.tag, token)
                 everywhere(token)
                 return
             if not 0 <= channel < len(ways):
                 known = f"it has {counted(len(ways), 'channel')}, counted from 0"
                 raise PortError(f"{port.path} has no channel {channel}: {known}")
-            log(director.tag, "send", path, name, channel, "", token)
+            log.add(director.tag, "send", path, name, channel, "", token)
             heard(token)
             ways[channel](token)
 
@@ -190,7 +190,7 @@ class Wiring:
             return emit_one
         entries: dict[int | None, Deliver] = {}
 
-        def emit_woven(token: Any, channel: int | None) -> None:
+        def emit_woven(token: Any, channel: int | None = None) -> None:
             entry = entries.get(channel)
             if entry is None:
                 # The channel of a send travels past the aspects in this closure, for they may forward it later.
@@ -237,11 +237,8 @@ class Wiring:
         return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
 
     def _put(self, port: InputPort[Any], channel: int) -> Deliver:
-        put, execution = self.director.put, self._executions.get(port.actor.path)
-        if execution is not None:
-            turn = execution.turn_of(port)
-            return lambda token: put(port, channel, token, turn)
-        return lambda token: put(port, channel, token)
+        execution = self._executions.get(port.actor.path)
+        return self.director.entry(port, channel, None if execution is None else execution.turn_of(port))
 
     def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:
         later = self._directors[self.graph.director_over(hop)].later

@@ -25,7 +25,7 @@ class Harness:
             is_left_out = isinstance(port, InputPort) and not port.required
             port.width = (widths or {}).get(name, 0 if is_left_out else 1)
         for name, port in actor.outputs.items():
-            port.connect(lambda token, channel, name=name: self._keep(name, token, channel))
+            port.connect(lambda token, channel=None, name=name: self._keep(name, token, channel))
         actor.enter(self)
         actor.initialize()
 
@@ -46,7 +46,9 @@ class Harness:
             port.width = max(port.width, len(token) if port.multi else 1)
             for channel, each in enumerate(token if port.multi else [token]):
                 if each is not None:
-                    port.put(each, channel)
+                    put, put_channel = port.entry()
+                    put(each)
+                    put_channel(channel)
         self.actor.fire()
         for port in self.actor.inputs.values():
             port.clear()

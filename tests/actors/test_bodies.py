@@ -154,7 +154,9 @@ def test_separation_monitor_takes_the_smallest_pair_and_no_duplicates() -> None:
     harness.fire(0.1, bodies=[body(0, 0), body(3, 4), body(3, 6)])
     assert harness.sent["distance"] == [(0.1, 2.0)]
     port = harness.actor.inputs["bodies"]
-    port.put(body(9, 0), 0)
+    put, put_channel = port.entry()
+    put(body(9, 0))
+    put_channel(0)
     harness.fire(0.2, bodies=[body(9, 0), body(0, 0)])
     assert harness.last("distance") == 9.0
 
