@@ -1,0 +1,84 @@
+"""All benchmarks that have a goal, into benchmarks/RESULTS.md: `python benchmarks/all.py [NAME ...]`, or `make bench`.
+
+Each part runs in a process of its own, one after the other, so that none warms or fills the other's memory.  Let the
+machine do nothing else meanwhile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+HERE = Path(__file__).parent
+PARTS = ("events", "growth", "start")
+PACKAGES = ("numpy", "numba", "simpy", "networkx")
+
+
+def machine() -> str:
+    """What all this was measured on."""
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                name = line.partition(":")[2].strip()
+                break
+    packages = ", ".join(f"{each} {version(each)}" for each in PACKAGES)
+    return (
+        f"{name}, {os.cpu_count()} cores, {platform.system()}; "
+        f"{platform.python_implementation()} {platform.python_version()}, {packages}."
+    )
+
+
+def part(name: str) -> str:
+    """The section of one part, measured now."""
+    from measure import table
+
+    module = importlib.import_module(name)
+    rows = []
+    for row in module.rows():
+        print(f"{name}: {row.work}, {row.peer}: {row.result}", file=sys.stderr, flush=True)
+        rows.append(row)
+    notes = [f"- {how}: {'; '.join(row.work for row in rows if row.how == how)}." for how in _unique(rows)]
+    return "\n".join([table(rows), "", *dict.fromkeys(notes)])
+
+
+def _unique(rows: Sequence[object]) -> list[str]:
+    return list(dict.fromkeys(row.how for row in rows))  # type: ignore[attr-defined]
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("names", nargs="*", metavar="NAME", help=f"of the parts; all: {', '.join(PARTS)}")
+    options.add_argument("--part", help=argparse.SUPPRESS)
+    given = options.parse_args()
+    if given.part:
+        print(part(given.part))
+        return
+    began = time.perf_counter()
+    sections = []
+    for name in given.names or PARTS:
+        done = subprocess.run(
+            [sys.executable, __file__, "--part", name], stdout=subprocess.PIPE, text=True, check=False
+        )
+        text = done.stdout if done.returncode == 0 else f"This part failed (exit code {done.returncode}).\n"
+        title = (importlib.import_module(name).__doc__ or name).splitlines()[0].partition(": `")[0].rstrip(".")
+        sections.append(f"## {title}\n\n{text}")
+    minutes = (time.perf_counter() - began) / 60
+    head = f"# Benchmarks\n\nWritten by `make bench` in {minutes:.0f} min.\n\n{machine()}\n"
+    report = "\n".join([head, *sections])
+    print(report)
+    if not given.names:
+        (HERE / "RESULTS.md").write_text(report, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,274 @@
+"""The discrete-event core against SimPy, written by hand: `python benchmarks/events.py [--rounds 5]`.
+
+Three pieces of work, each as a model of ours, as SimPy processes with a Store before each, and as bare callbacks on
+SimPy's events:
+
+- pipeline: a clock, ten delays and ten scales in turn; one token is on its way at a time;
+- full pipeline: the same with the period of the clock equal to the delays, so that all actors are busy at each tick;
+- queue: Poisson -> server -> sink, from the same random numbers on all sides.
+
+Ours checks nothing less than in any run: firing order, event log and its digest are there.  Neither SimPy program has
+them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections import deque
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+from typing import Any
+
+import simpy
+from measure import Row, compare, cpu_seconds, table, take_turns
+
+from epicycle.actors import random_stream
+from epicycle.runner import Simulation, load_model
+from epicycle.runner.model import Model
+
+HOPS = 200_000  # in each of five rounds
+JOBS = 200_000
+PAIRS = 10
+DELAY = 0.01  # s
+FULL, SPARSE = 0.01, 1.0  # periods of the clock, s
+BUSY = 0.75  # mean service time, s; customers come every second
+
+PIPELINE = """\
+model: pipeline
+actors:
+  clock: {{type: Clock, period: {period} s, values: [1.0]}}
+  delay: {{type: TimeDelay, count: {pairs}, delay: {delay} s}}
+  scale: {{type: Scale, count: {pairs}, factor: 2}}
+  sink: {{type: Recorder, capacity: 0}}
+connections:
+  - clock.output -> delay[0].input
+  - delay[*].output -> scale[*].input
+  - scale[..-2].output -> delay[1..].input
+  - scale[-1].output -> sink.input
+run: {{stop: {stop} s}}
+"""
+QUEUE = """\
+model: queue
+actors:
+  source: {{type: PoissonClock, mean_interval: 1 s, fire_at_start: false}}
+  server: {{type: Server, distribution: {{type: Exponential, mean: {busy}}}}}
+  sink: {{type: Recorder, capacity: 0}}
+connections:
+  - source.output -> server.input
+  - server.output -> sink.input
+run: {{stop: {stop} s, seed: 1}}
+"""
+
+Events = Generator[simpy.Event, Any, None]
+
+
+def model(text: str, **values: object) -> Model:
+    """The model that a text describes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.yaml"
+        path.write_text(text.format(pairs=PAIRS, delay=DELAY, busy=BUSY, **values), encoding="utf-8")
+        return load_model(path)
+
+
+class Ours:
+    """A model of ours; ``done`` is how many tokens came to its sink."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.done = 0
+
+    def __call__(self) -> float:
+        simulation = Simulation(self.model)
+        seconds = cpu_seconds(simulation.run)
+        self.done = self.model.graph.actors["sink"].seen  # type: ignore[attr-defined]
+        return seconds
+
+
+class Stores:
+    """SimPy processes with a Store before each."""
+
+    def __init__(self, build: Callable[[Stores], None], stop: float) -> None:
+        self.build = build
+        self.stop = stop
+        self.done = 0
+        self.environment = simpy.Environment()
+
+    def __call__(self) -> float:
+        self.environment, self.done = simpy.Environment(), 0
+        self.build(self)
+        return cpu_seconds(lambda: self.environment.run(self.stop + 1e-6))
+
+    def start(self, process: Events) -> None:
+        """Begin a process."""
+        self.environment.process(process)
+
+    def sink(self, source: simpy.Store) -> Events:
+        """Takes whatever comes."""
+        while True:
+            yield source.get()
+            self.done += 1
+
+
+def pipeline_of_stores(period: float) -> Callable[[Stores], None]:
+    """Builds the pipeline of processes."""
+
+    def clock(simulation: Stores, to: simpy.Store) -> Events:
+        while True:
+            yield to.put(1.0)
+            yield simulation.environment.timeout(period)
+
+    def delay(simulation: Stores, source: simpy.Store, to: simpy.Store) -> Events:
+        while True:
+            token = yield source.get()
+            yield simulation.environment.timeout(DELAY)
+            yield to.put(token)
+
+    def scale(simulation: Stores, source: simpy.Store, to: simpy.Store) -> Events:
+        while True:
+            token = yield source.get()
+            yield to.put(2 * token)
+
+    def build(simulation: Stores) -> None:
+        stores = [simpy.Store(simulation.environment) for _ in range(2 * PAIRS + 1)]
+        simulation.start(clock(simulation, stores[0]))
+        for number in range(2 * PAIRS):
+            actor = scale if number % 2 else delay
+            simulation.start(actor(simulation, stores[number], stores[number + 1]))
+        simulation.start(simulation.sink(stores[-1]))
+
+    return build
+
+
+def queue_of_stores(simulation: Stores) -> None:
+    """Builds the queue of processes."""
+    environment = simulation.environment
+    between, service = random_stream(1, "source"), random_stream(1, "server")
+    waiting, served = simpy.Store(environment), simpy.Store(environment)
+
+    def source() -> Events:
+        number = 0
+        while True:
+            yield environment.timeout(between.exponential(1.0))
+            yield waiting.put(number)
+            number += 1
+
+    def server() -> Events:
+        while True:
+            job = yield waiting.get()
+            yield environment.timeout(service.exponential(BUSY))
+            yield served.put(job)
+
+    simulation.start(source())
+    simulation.start(server())
+    simulation.start(simulation.sink(served))
+
+
+class Callbacks(Stores):
+    """Functions that call each other, or let SimPy call them later."""
+
+    def after(self, delay: float, call: Callable[[simpy.Event], None], value: Any = None) -> None:
+        """Let SimPy call a function."""
+        callbacks = self.environment.timeout(delay, value).callbacks
+        assert callbacks is not None
+        callbacks.append(call)
+
+    def count(self, token: Any) -> None:
+        """Take whatever comes."""
+        self.done += 1
+
+
+def pipeline_of_callbacks(period: float) -> Callable[[Stores], None]:
+    """Builds the pipeline of functions."""
+
+    def delay(simulation: Callbacks, onward: Callable[[Any], None]) -> Callable[[Any], None]:
+        return lambda token: simulation.after(DELAY, lambda event: onward(event.value), token)
+
+    def scale(onward: Callable[[Any], None]) -> Callable[[Any], None]:
+        return lambda token: onward(2 * token)
+
+    def build(simulation: Stores) -> None:
+        assert isinstance(simulation, Callbacks)
+        onward: Callable[[Any], None] = simulation.count
+        for _ in range(PAIRS):
+            onward = delay(simulation, scale(onward))
+
+        def tick(_: object) -> None:
+            onward(1.0)
+            simulation.after(period, tick)
+
+        tick(None)
+
+    return build
+
+
+def queue_of_callbacks(simulation: Stores) -> None:
+    """Builds the queue of functions."""
+    assert isinstance(simulation, Callbacks)
+    between, service = random_stream(1, "source"), random_stream(1, "server")
+    waiting: deque[int] = deque()
+    busy = False
+    number = 0
+
+    def come(_: object) -> None:
+        nonlocal number
+        waiting.append(number)
+        number += 1
+        serve()
+        simulation.after(between.exponential(1.0), come)
+
+    def serve() -> None:
+        nonlocal busy
+        if waiting and not busy:
+            busy = True
+            simulation.after(service.exponential(BUSY), leave, waiting.popleft())
+
+    def leave(event: simpy.Event) -> None:
+        nonlocal busy
+        busy = False
+        simulation.count(event.value)
+        serve()
+
+    simulation.after(between.exponential(1.0), come)
+
+
+def rows(rounds: int = 5) -> Iterator[Row]:
+    """The table's lines."""
+    length = 2 * PAIRS
+    ticks = HOPS // length
+    work = [
+        ("pipeline of 20 actors, one token at a time", SPARSE, HOPS, 7.0),
+        ("pipeline of 20 actors, all busy", FULL, HOPS, 7.0),
+        ("Poisson -> server -> sink", 0.0, JOBS, 2.5),
+    ]
+    for name, period, size, goal in work:
+        if period:
+            stop = period * ticks
+            build, build_bare = pipeline_of_stores(period), pipeline_of_callbacks(period)
+            ours = Ours(model(PIPELINE, period=period, stop=stop))
+        else:
+            stop = float(size)
+            build, build_bare = queue_of_stores, queue_of_callbacks
+            ours = Ours(model(QUEUE, stop=stop))
+        stores, bare = Stores(build, stop), Callbacks(build_bare, stop)
+        results = take_turns({"ours": ours, "stores": stores, "bare": bare}, rounds)
+        # Rounding to nanoseconds may move a job over the end.
+        assert ours.done > 0.9 * size / (length if period else 1)
+        assert max(ours.done, stores.done, bare.done) - min(ours.done, stores.done, bare.done) <= 1
+        what = "token hops" if period else "jobs"
+        how = f"{rounds} rounds of {size:,} {what} in one process, taking turns; CPU time of the run alone"
+        unit = size * 1e-6, f"us a {what.rsplit(maxsplit=1)[-1].rstrip('s')}"
+        title = f"{name}: {rounds * size:,} {what}"
+        labelled = {
+            "ours": results["ours"],
+            "SimPy, Stores": results["stores"],
+            "SimPy, bare callbacks": results["bare"],
+        }
+        yield compare(title, labelled, "SimPy, Stores", "ours", how=how, goal=goal, unit=unit)
+        yield compare(title, labelled, "SimPy, bare callbacks", "ours", how=how, unit=unit)
+
+
+if __name__ == "__main__":
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--rounds", type=int, default=5)
+    print(table(rows(options.parse_args().rounds)))
