@@ -10,7 +10,7 @@ import dataclasses
 import math
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any
 
@@ -63,40 +63,103 @@ def canonical(token: Any) -> bytes:
         return b"f" + (_NAN if token != token else _DOUBLE(token))  # noqa: PLR0124  NaN is; asked without a call
     if kind is int and -(2**63) <= token < 2**63:
         return b"i" + _INTEGER(token)
-    if isinstance(token, float):
-        return b"f" + (_NAN if math.isnan(token) else _DOUBLE(token))
-    if isinstance(token, np.ndarray):
-        if token.dtype.kind not in "biuf":
-            return b"A" + canonical(token.dtype.str) + canonical(token.tolist())
-        array = np.ascontiguousarray(token)
-        if array.dtype.kind == "f" and np.isnan(array).any():
-            array = np.where(np.isnan(array), array.dtype.type(np.nan), array)
-        shape = b"".join(_COUNT(size) for size in array.shape)
-        return b"a" + array.dtype.str.encode() + _COUNT(array.ndim) + shape + array.tobytes()
-    if dataclasses.is_dataclass(token) and not isinstance(token, type):
-        names = field_names(type(token))
-        head = b"d" + _text(type(token).__qualname__) + _COUNT(len(names))
-        return head + b"".join(_named(name, getattr(token, name)) for name in names)
-    if token is None:
-        return b"n"
-    if isinstance(token, bool):
-        return b"t" if token else b"u"
-    if isinstance(token, int):
-        if -(2**63) <= token < 2**63:
-            return b"i" + _INTEGER(token)
-        return b"I" + _text(str(token))
-    if isinstance(token, str):
-        return b"s" + _text(token)
-    if isinstance(token, np.generic):
-        item = token.item()
-        return b"r" + _text(_shown(token)) if isinstance(item, np.generic) else canonical(item)
-    if isinstance(token, (list, tuple)):
-        return b"l" + _COUNT(len(token)) + b"".join(canonical(item) for item in token)
-    if isinstance(token, dict):
-        return b"m" + _COUNT(len(token)) + b"".join(sorted(canonical(k) + canonical(v) for k, v in token.items()))
-    if isinstance(token, (set, frozenset)):
-        return b"e" + _COUNT(len(token)) + b"".join(sorted(map(canonical, token)))
+    encode = _ENCODERS.get(kind)
+    if encode is None:
+        encode = _ENCODERS[kind] = _encoder(kind)
+    return encode(token)
+
+
+# By the types that have been met: what a token is, is found out once for each type.
+_ENCODERS: dict[type, Callable[[Any], bytes]] = {}
+
+
+def _encoder(cls: type) -> Callable[[Any], bytes]:
+    """What makes bytes of the tokens of one type."""
+    if issubclass(cls, float):
+        return _float
+    if issubclass(cls, np.ndarray):
+        return _array
+    if dataclasses.is_dataclass(cls) and not issubclass(cls, type):
+        return _fields_encoder(cls)
+    if cls is type(None):
+        return lambda _: b"n"
+    for kinds, encode in _OF_KINDS:
+        if issubclass(cls, kinds):
+            return encode
+    return _other
+
+
+def _float(token: float) -> bytes:
+    return b"f" + (_NAN if math.isnan(token) else _DOUBLE(token))
+
+
+def _integer(token: int) -> bytes:
+    if -(2**63) <= token < 2**63:
+        return b"i" + _INTEGER(token)
+    return b"I" + _text(str(token))
+
+
+def _scalar(token: Any) -> bytes:
+    item = token.item()
+    return _other(token) if isinstance(item, np.generic) else canonical(item)
+
+
+def _sequence(token: Any) -> bytes:
+    return b"l" + _COUNT(len(token)) + b"".join([canonical(item) for item in token])
+
+
+def _mapping(token: Any) -> bytes:
+    return b"m" + _COUNT(len(token)) + b"".join(sorted(canonical(k) + canonical(v) for k, v in token.items()))
+
+
+def _set(token: Any) -> bytes:
+    return b"e" + _COUNT(len(token)) + b"".join(sorted(map(canonical, token)))
+
+
+def _other(token: Any) -> bytes:
     return b"r" + _text(_shown(token))
+
+
+_OF_KINDS: tuple[tuple[Any, Callable[[Any], bytes]], ...] = (
+    (bool, lambda token: b"t" if token else b"u"),
+    (int, _integer),
+    (str, lambda token: b"s" + _text(token)),
+    (np.generic, _scalar),
+    ((list, tuple), _sequence),
+    (dict, _mapping),
+    ((set, frozenset), _set),
+)
+
+
+def _fields_encoder(cls: type) -> Callable[[Any], bytes]:
+    """The encoder of a dataclass: what is the same for all its instances is encoded here."""
+    names = field_names(cls)
+    head = b"d" + _text(cls.__qualname__) + _COUNT(len(names))
+    fields = [(name, _text(name)) for name in names]
+
+    def encode(token: Any) -> bytes:
+        pieces = [head]
+        for name, encoded in fields:
+            pieces += (encoded, canonical(getattr(token, name)))
+        return b"".join(pieces)
+
+    return encode
+
+
+def _array(token: Any) -> bytes:
+    kind = token.dtype.kind
+    if kind not in "biuf":
+        return b"A" + canonical(token.dtype.str) + canonical(token.tolist())
+    array = np.ascontiguousarray(token)
+    # The largest number of an array with a NaN is NaN; asking so takes a quarter of the time of isnan(...).any().
+    if kind == "f" and array.size and math.isnan(array.item(array.argmax())):
+        array = np.where(np.isnan(array), array.dtype.type(np.nan), array)
+    return _array_head(array.dtype, array.shape) + array.tobytes()
+
+
+@cache
+def _array_head(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
+    return b"a" + dtype.str.encode() + _COUNT(len(shape)) + b"".join(map(_COUNT, shape))
 
 
 def _shown(token: Any) -> str:
@@ -112,10 +175,6 @@ def _shown(token: Any) -> str:
 def _text(text: str) -> bytes:
     data = text.encode("utf-8", "surrogatepass")
     return _COUNT(len(data)) + data
-
-
-def _named(name: str, value: Any) -> bytes:
-    return _text(name) + canonical(value)
 
 
 def leaves(token: Any, field: str = "") -> Iterator[tuple[str, Any]]:
