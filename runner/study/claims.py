@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass, replace
 from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
 
+from epicycle.actors import EpicycleError
 from epicycle.actors.expression import Formula
 
 from .dimensions import Factor
@@ -267,12 +268,19 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float)
     """How often a condition holds, at every combination of levels."""
     formula = Formula(claim.condition)
     may_be_none = asks_for_none(claim.condition)
+
+    def is_true(row: Mapping[str, float | None] | None) -> bool | None:
+        if row is None or (None in row.values() and not may_be_none):
+            return None
+        try:
+            return bool(formula(row))
+        except EpicycleError:  # it cannot be calculated for this run
+            return None
+
     for place in samples.places(samples.choices(where)):
-        rows = samples.rows(place, formula.names)
-        known = [row for row in rows if row is not None and (may_be_none or None not in row.values())]
-        holds = sum(bool(formula(row)) for row in known)
-        found = rate(holds, len(known), level)
-        missing = len(rows) - len(known)
+        answers = [is_true(row) for row in samples.rows(place, formula.names)]
+        holds, missing = answers.count(True), answers.count(None)
+        found = rate(holds, len(answers) - missing, level)
         finding = Finding(
             claim.condition, samples.values(place), {}, {}, found.value, found.error, found.low, found.high,
             math.nan, math.nan, found.count, missing, math.nan, math.nan, UNDECIDED,

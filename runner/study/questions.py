@@ -302,8 +302,12 @@ class QuestionReader(NodeReader):
         """The level that is meant, as the table holds it."""
         known = levels_of(self.dimensions, factor)
         value = as_factor(node, self.kinds[factor]) if isinstance(node, (Scalar, Sequence)) else ""
+        is_number = self.kinds[factor] == "float" and isinstance(value, (int, float)) and not isinstance(value, bool)
         for each in known:
             if each == value and isinstance(each, bool) == isinstance(value, bool):
+                return (each,)
+        for each in known:  # 70 % need not be 0.7 in the last digit
+            if is_number and math.isclose(float(each or 0), float(value or 0), rel_tol=1e-9):
                 return (each,)
         shown = node.text if isinstance(node, Scalar) else "what stands here"
         texts = [_level(each) for each in known]
@@ -357,10 +361,10 @@ class QuestionReader(NodeReader):
                 if len(set(claim.where.get(name, levels_of(self.dimensions, name)))) < 2:
                     self.problems.add(f"{what}: there is one level of {name} alone, and nothing to compare", position)
         elif claim.form in (LESS, GREATER):
-            for name, levels in claim.at.items():
-                allowed = claim.where.get(name, ())
-                if any(level not in allowed for level in levels) and allowed:
-                    self.problems.add(f"{what}: 'where' leaves out a level of {name} that 'at' names", position)
+            for key, selection in (("at", claim.at), ("than", claim.than or {})):
+                for name, levels in selection.items():
+                    if not set(levels) <= set(claim.where.get(name, levels)):
+                        self.problems.add(f"{what}: 'where' leaves out a level of {name} that {key!r} names", position)
             if claim.than is None and all(
                 set(levels) >= set(claim.where.get(name, levels_of(self.dimensions, name)))
                 for name, levels in claim.at.items()

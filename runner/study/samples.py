@@ -25,7 +25,7 @@ class Samples:
         self.dimensions = results.plan.study.dimensions
         self._levels = [[each.level(index).values for index in range(each.size)] for each in self.dimensions]
         table = results.table()
-        self._columns = {name: table[name].to_pylist() for name in results.metrics}
+        self._columns = {name: [_number(each) for each in table[name].to_pylist()] for name in results.metrics}
         self._rows: dict[int, dict[int, int | None]] = {}
         for row, (condition, replication, status) in enumerate(
             zip(*(table[name].to_pylist() for name in ("condition", "replication", "status")), strict=True)
@@ -85,6 +85,10 @@ class Samples:
         wanted = list(metrics)
         rows = self._rows.get(self.condition(place), {}).values()
         return [None if row is None else {name: self._columns[name][row] for name in wanted} for row in rows]
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or math.isnan(value) else value
 
 
 def _fits(values: Mapping[str, Factor], where: Selection) -> bool:

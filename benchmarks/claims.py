@@ -1,0 +1,161 @@
+"""What a study says about its claims, as Markdown, for docs/paper.md.
+
+    python benchmarks/claims.py results/table_1 [--into docs/paper.md]
+
+Prints a table of the claims with their verdicts, or, where claims are judged for each level of something as in
+``readings``, one of verdicts by level; then the guideline.  ``--into`` puts it in the place of what stands between
+``<!-- STUDY: begin -->`` and ``<!-- STUDY: end -->`` in a file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from epicycle.runner import StudyResults, open_study
+from epicycle.runner.study.claims import (
+    CONFIRMED,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    REVERSED,
+    UNDECIDED,
+    Finding,
+    Judgement,
+)
+from epicycle.runner.study.guideline import Recommendation
+from epicycle.runner.study.questions import ALWAYS
+
+SHORT = {REPRODUCED: "**yes**", NOT_REPRODUCED: "no", UNDECIDED: "open"}
+
+
+def said(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def levels(values: dict[str, Any]) -> str:
+    return ", ".join(f"{name} {said(value)}" for name, value in values.items())
+
+
+def row(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def head(cells: list[str]) -> Iterator[str]:
+    yield row(cells)
+    yield row("---" for _ in cells)
+
+
+def about(results: StudyResults) -> str:
+    """What was run, when, and with what."""
+    counts = results.counts()
+    folder, seeds = results.folder, results.plan.study.seed
+    when = datetime.fromtimestamp(folder.joinpath("manifest.json").stat().st_mtime, UTC)
+    failed = counts.total() - counts["ok"]
+    return (
+        f"Measured on {when:%Y-%m-%d} with version {results.manifest['versions']['epicycle'] or 'unknown'}: "
+        f"`epicycle study {results.plan.study.name}`, {counts.total():,} runs ({failed or 'none'} failed), "
+        f"{results.plan.replications} of each condition, seeds {seeds} to {seeds + results.plan.replications - 1}."
+    )
+
+
+def weakest(judgement: Judgement, finding: Finding | None) -> str:
+    """The comparison that speaks least for a claim."""
+    if finding is None or not finding.count:
+        return "-"
+    missing = f", {finding.missing} missing" if finding.missing else ""
+    where = levels(finding.where)
+    if judgement.claim.form == ALWAYS:
+        holds = round(finding.value * finding.count)
+        return f"{holds} of {finding.count} runs, {finding.low:.3f} to {finding.high:.3f}{missing} ({where})"
+    pair = f"{levels(finding.level)} less {levels(finding.against)}{f', {where}' if where else ''}"
+    digits = 3 if abs(finding.value) < 0.1 else 2
+    value, low, high = (f"{each:+.{digits}f}" for each in (finding.value, finding.low, finding.high))
+    p = "" if math.isnan(finding.p_holm) else f", p {'< 0.001' if finding.p_holm < 0.001 else f'{finding.p_holm:.3f}'}"
+    return f"{finding.metric} {value} ({low} to {high}{p}{missing}): {pair}"
+
+
+def claims(found: list[Judgement]) -> Iterator[str]:
+    """One line for each claim."""
+    yield from head(["claim", "", "verdict", "confirmed", "undecided", "reversed", "what speaks least for it"])
+    for each in found:
+        counts = (str(each.counts(outcome)) for outcome in (CONFIRMED, UNDECIDED, REVERSED))
+        yield row([each.name, each.claim.doc, f"**{each.verdict}**", *counts, weakest(each, each.weakest)])
+
+
+def by_level(found: list[Judgement]) -> Iterator[str]:
+    """One line for each level of what the claims are judged for, with confirmed, undecided and reversed comparisons."""
+    places = list(dict.fromkeys(levels(each.where) for each in found))
+    names = list(dict.fromkeys(each.name for each in found))
+    verdicts = {(levels(each.where), each.name): each for each in found}
+    yield from head(["", *names])
+    for place in places:
+        cells = []
+        for name in names:
+            each = verdicts[place, name]
+            counts = "/".join(str(each.counts(outcome)) for outcome in (CONFIRMED, UNDECIDED, REVERSED))
+            cells.append(f"{SHORT[each.verdict]} {counts}")
+        yield row([place, *cells])
+
+
+def guideline(found: list[Recommendation]) -> Iterator[str]:
+    """One line for each combination of the other factors."""
+    first = found[0]
+    options = [said(option.level) for option in first.options]
+    means = [f"{first.metric}, {first.choose} {level}" if not index else level for index, level in enumerate(options)]
+    yield from head([*first.where, *means, "best", "confidence", "not worse", "sufficient"])
+    for each in found:
+        cells = [f"{option.estimate.value:.2f} ± {option.estimate.error:.2f}" for option in each.options]
+        advice = [
+            said(each.best),
+            f"{each.confidence:.0%}",
+            ", ".join(map(said, each.not_worse)),
+            said(each.sufficient),
+        ]
+        yield row([*map(said, each.where.values()), *cells, *advice])
+
+
+def text(results: StudyResults) -> str:
+    """All of it."""
+    judged, advice = results.claims(), results.guideline()
+    parts = [about(results)]
+    if judged:
+        parts.append("\n".join((by_level if judged[0].where else claims)(judged)))
+    if advice:
+        parts.append("\n".join(guideline(advice)))
+    return "\n\n".join(parts)
+
+
+def put(file: Path, study: str, block: str) -> bool:
+    """Write the block into its place in a file."""
+    begin, end = f"<!-- {study}: begin -->", f"<!-- {study}: end -->"
+    whole = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
+    before = file.read_text(encoding="utf-8")
+    after, count = whole.subn(lambda _: f"{begin}\n{block}\n{end}", before)
+    file.write_text(after, encoding="utf-8")
+    return count == 1
+
+
+def main() -> int:
+    """Print the block, or write it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--into", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    results = open_study(options.folder)
+    block = text(results)
+    if options.into is None:
+        print(block)
+    elif not put(options.into, results.plan.study.name, block):
+        print(f"{options.into} has no place for {results.plan.study.name}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
