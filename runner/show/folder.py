@@ -7,8 +7,11 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from ..engine import Results
 from ..provenance import versions
+from .columns import categories, numbers
 from .figures import Figure
 from .summary import summary_object
 
@@ -44,15 +47,16 @@ def write_signals(results: Results, path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    types = {
-        "time": pa.float64(),
-        "microstep": pa.int64(),
-        "signal": pa.dictionary(pa.int32(), pa.string()),
-        "field": pa.dictionary(pa.int32(), pa.string()),
-        "value": pa.float64(),
-    }
     columns = results.table()
-    table = pa.table({name: pa.array(columns[name], type=kind) for name, kind in types.items()})
+    table = pa.table(
+        {
+            "time": numbers(columns["time"], np.float64),
+            "microstep": numbers(columns["microstep"], np.int64),
+            "signal": categories(columns["signal"]),
+            "field": categories(columns["field"]),
+            "value": numbers(columns["value"], np.float64),
+        }
+    )
     aside = path.with_name(f".{path.name}")
     pq.write_table(table, aside)
     os.replace(aside, path)
