@@ -18,7 +18,8 @@ import numpy as np
 
 from ..core import EpicycleError
 from .messages import Array
-from .numerics.barrier import TOLERANCE, Solution, violations
+from .numerics.barrier import TOLERANCE, Solution
+from .numerics.constraints import violations
 from .numerics.horizon import INFORM, REACH_GOAL, HorizonProblem, roll_out
 
 _SLACK = 1e-4  # m; what the second stage's bounds are widened by, so that they have an inside

@@ -2,7 +2,9 @@
 
 import importlib
 from collections.abc import Callable
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -13,6 +15,12 @@ information = importlib.import_module(PREFIX + "mutual_information")
 reachability = importlib.import_module(PREFIX + "reachability")
 terms = importlib.import_module(PREFIX + "terms")
 ukf = importlib.import_module(PREFIX + "ukf")
+HorizonProblem = horizon.HorizonProblem
+constraints = importlib.import_module(PREFIX + "constraints")
+newton = importlib.import_module(PREFIX + "newton")
+# Called by kernels only; numba looks them up as globals.
+Blocks, new_feedback, newton_step = newton.Blocks, newton.new_feedback, newton.newton_step
+all_constraints, within_reach = constraints.all_constraints, constraints.within_reach
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -185,7 +193,7 @@ def test_violations_are_the_papers(random: np.random.Generator) -> None:
         2.0 - np.linalg.norm(away, axis=1) + 2.0 * sigma,
         *(3.0 - np.linalg.norm(places - mean, axis=1) for mean in problem.peer_mean),
     ]
-    found = barrier.violations(problem, controls)
+    found = constraints.violations(problem, controls)
     assert (found[:, :2] == -np.inf).all()  # decided before the first control acts
     assert found[:, 2:] == pytest.approx(np.array(expected)[:, 2:], abs=1e-12)
 
@@ -223,3 +231,104 @@ def test_propagate_is_repeated_prediction(random: np.random.Generator, noise: fl
         mean, covariance = ukf.predict(mean, covariance, transition, q)
         assert row == pytest.approx(mean[:2], abs=1e-12)
         assert spread_row == pytest.approx([covariance[0, 0], covariance[0, 1], covariance[1, 1]], abs=1e-12)
+
+
+@numba.njit
+def riccati(position: np.ndarray, velocity: np.ndarray, control: np.ndarray, period: float) -> tuple[float, np.ndarray]:
+    step = np.empty((len(control), 2))
+    blocks = Blocks(position, velocity, control)
+    return newton_step(blocks, period, new_feedback(len(control)), step), step
+
+
+@pytest.mark.parametrize("steps", [3, 10, 40])
+def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, steps: int) -> None:
+    for _ in range(20):
+        blocks = []
+        for scale in 10.0 ** random.uniform(-1.0, 1.0, size=3):
+            curvature = [scale * spread(random, 2) for _ in range(steps)]
+            blocks.append([(*random.normal(size=2), c[0, 0], c[0, 1], c[1, 1]) for c in curvature])
+        gradient, hessian = np.zeros(2 * steps), np.zeros((2 * steps, 2 * steps))
+        for kind, table in enumerate(np.array(blocks)):
+            for s, (gx, gy, xx, xy, yy) in enumerate(table):
+                # What P_s, V_s or U_s is of all controls, from the dynamics with a unit control each.
+                units = np.eye(2 * steps).reshape(2 * steps, steps, 2)
+                driven = [
+                    horizon.trajectory(np.zeros(2), np.zeros(2), each, 0.1, steps + 1)[[s, s + 1]] for each in units
+                ]
+                reached = (
+                    np.array([each[0] for each in driven]),
+                    np.array([(each[1] - each[0]) / 0.1 for each in driven]),
+                    units[:, s],
+                )[kind]
+                gradient += reached @ [gx, gy]
+                hessian += reached @ np.array([[xx, xy], [xy, yy]]) @ reached.T
+        descent, step = riccati(*np.array(blocks), 0.1)
+        expected = np.linalg.solve(hessian, -gradient)
+        assert step.ravel() == pytest.approx(expected, rel=1e-8, abs=1e-10)
+        assert descent == pytest.approx(gradient @ expected)
+
+
+@numba.njit
+def kept_and_all(*fields: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    problem = HorizonProblem(*fields)
+    every = all_constraints(problem)
+    row, step = every.row.copy(), every.step.copy()
+    kept = within_reach(problem, every)
+    return row, step, kept.row, kept.step
+
+
+def crowded_problem(random: np.random.Generator) -> "horizon.HorizonProblem":
+    """Peers, tube and obstacle at any distance."""
+    steps, peers = 10, 6
+    problem = inform_problem(random)
+    position, velocity = random.normal(scale=6.0, size=2), random.uniform(-5.5, 5.5, size=2)
+    coasting = position + 0.1 * np.arange(steps)[:, np.newaxis] * velocity
+    return problem._replace(
+        position=position,
+        velocity=velocity,
+        max_speed=8.0,
+        max_acceleration=8.0,
+        safe_distance=2.0,
+        margin=2.0,
+        tube_centre=coasting + random.normal(scale=0.3, size=2),
+        tube_radius=0.2 + 0.4 * np.arange(1, steps + 1),
+        peer_mean=random.normal(scale=12.0, size=(peers, 1, 2)) + np.zeros((peers, steps, 2)),
+        peer_distance=np.full((peers, steps), 3.0),
+        objective=horizon.REACH_GOAL,
+    )
+
+
+def test_what_is_left_out_no_plan_can_break(random: np.random.Generator) -> None:
+    dropped = 0
+    for _ in range(200):
+        problem = crowded_problem(random)
+        row, step, kept_row, kept_step = kept_and_all(*problem)
+        kept = set(zip(kept_row, kept_step, strict=True))
+        every = set(zip(row, step, strict=True))
+        left = every - kept
+        dropped += len(left)
+        assert kept < every
+        for _ in range(20):  # as hard as f2 allows, in one direction or in many, for as long as f1 allows
+            angle = random.uniform(0.0, 2.0 * np.pi, size=1 if random.random() < 0.5 else 10) + np.zeros(10)
+            controls = 8.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+            speed = problem.velocity.copy()
+            for s in range(10):
+                controls[s] *= next(
+                    f for f in (1.0, 0.5, 0.2, 0.0) if np.hypot(*(speed + 0.1 * f * controls[s])) <= 8.0
+                )
+                speed += 0.1 * controls[s]
+            values = constraints.violations(problem, controls)
+            assert all(values[pair] < 0.0 for pair in left)
+    assert dropped > 1000
+
+
+def test_who_is_out_of_reach_changes_no_bit(random: np.random.Generator) -> None:
+    for _ in range(30):
+        problem = crowded_problem(random)
+        row, _, kept_row, _ = kept_and_all(*problem)
+        near = [peer for peer in range(6) if 2 + peer in set(kept_row)]
+        fewer = problem._replace(
+            peer_mean=problem.peer_mean[near].copy(), peer_distance=problem.peer_distance[near].copy()
+        )
+        assert solve(problem).controls.tobytes() == solve(fewer).controls.tobytes()
+        assert len(near) < 6 or len(row) > len(kept_row)

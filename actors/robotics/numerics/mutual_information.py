@@ -45,50 +45,50 @@ def negative_information(
     grad(-I) = -sum_i w_i sum_j q_ij grad E_ij; the Hessian follows by the usual log-sum-exp rule.
     """
     count = sigma_positions.shape[0]
-    r = np.empty(count)
-    ux = np.empty(count)
-    uy = np.empty(count)
+    # Of each point: its range, the direction u to it, and the range's Hessian (1 - u u^T) / range.
+    r = np.empty((count, 6))
     for i in range(count):
         dx, dy = x - sigma_positions[i, 0], y - sigma_positions[i, 1]
-        r[i] = max(math.hypot(dx, dy), 1e-9)
-        ux[i], uy[i] = dx / r[i], dy / r[i]
-    value = gx = gy = hxx = hxy = hyy = 0.0
-    exponent = np.empty(count)
+        distance = max(math.sqrt(dx * dx + dy * dy), 1e-9)
+        ux, uy = dx / distance, dy / distance
+        r[i, 0], r[i, 1], r[i, 2] = distance, ux, uy
+        r[i, 3], r[i, 4], r[i, 5] = (1.0 - ux * ux) / distance, -ux * uy / distance, (1.0 - uy * uy) / distance
+    # Of each i, sums over j of q_ij, q_ij grad E_ij, and q_ij times the Hessian of E_ij less its outer gradient
+    # product.  E is symmetric and zero on the diagonal, so each pair is visited once, and no exponential overflows.
+    sums = np.zeros((count, 6))
+    for i in range(count):
+        sums[i, 0] = weights[i]
+    precision = 1.0 / variance
     for i in range(count):
         if weights[i] == 0.0:
             continue
-        smallest = math.inf
-        for j in range(count):
-            exponent[j] = (r[i] - r[j]) ** 2 / (2.0 * variance) + others_distance[i, j]
-            if weights[j] > 0.0:
-                smallest = min(smallest, exponent[j])
-        total = mx = my = mxx = mxy = myy = 0.0
-        for j in range(count):
+        for j in range(i):
             if weights[j] == 0.0:
                 continue
-            q = weights[j] * math.exp(smallest - exponent[j])
-            total += q
-            difference = r[i] - r[j]
-            ex = difference * (ux[i] - ux[j]) / variance
-            ey = difference * (uy[i] - uy[j]) / variance
-            # Hessian of E_ij less its outer gradient product; (I - u u^T)/r is the Hessian of a range.
-            exx = ((ux[i] - ux[j]) ** 2 + difference * ((1 - ux[i] ** 2) / r[i] - (1 - ux[j] ** 2) / r[j])) / variance
-            eyy = ((uy[i] - uy[j]) ** 2 + difference * ((1 - uy[i] ** 2) / r[i] - (1 - uy[j] ** 2) / r[j])) / variance
-            exy = (
-                (ux[i] - ux[j]) * (uy[i] - uy[j]) + difference * (-ux[i] * uy[i] / r[i] + ux[j] * uy[j] / r[j])
-            ) / variance
-            mx += q * ex
-            my += q * ey
-            mxx += q * (exx - ex * ex)
-            mxy += q * (exy - ex * ey)
-            myy += q * (eyy - ey * ey)
-        mx /= total
-        my /= total
-        w = weights[i]
-        value += w * (math.log(total) - smallest)
+            difference, dx, dy = r[i, 0] - r[j, 0], r[i, 1] - r[j, 1], r[i, 2] - r[j, 2]
+            likeness = math.exp(-0.5 * precision * difference * difference - others_distance[i, j])
+            ex, ey = precision * difference * dx, precision * difference * dy
+            exx = precision * (dx * dx + difference * (r[i, 3] - r[j, 3])) - ex * ex
+            exy = precision * (dx * dy + difference * (r[i, 4] - r[j, 4])) - ex * ey
+            eyy = precision * (dy * dy + difference * (r[i, 5] - r[j, 5])) - ey * ey
+            for a, b in ((i, j), (j, i)):
+                q = weights[b] * likeness
+                sums[a, 0] += q
+                sums[a, 1] += q * ex
+                sums[a, 2] += q * ey
+                sums[a, 3] += q * exx
+                sums[a, 4] += q * exy
+                sums[a, 5] += q * eyy
+    value = gx = gy = hxx = hxy = hyy = 0.0
+    for i in range(count):
+        if weights[i] == 0.0:
+            continue
+        w, share = weights[i], 1.0 / sums[i, 0]
+        mx, my = share * sums[i, 1], share * sums[i, 2]
+        value += w * math.log(sums[i, 0])
         gx -= w * mx
         gy -= w * my
-        hxx -= w * (mxx / total + mx * mx)
-        hxy -= w * (mxy / total + mx * my)
-        hyy -= w * (myy / total + my * my)
+        hxx -= w * (share * sums[i, 3] + mx * mx)
+        hxy -= w * (share * sums[i, 4] + mx * my)
+        hyy -= w * (share * sums[i, 5] + my * my)
     return value, gx, gy, hxx, hxy, hyy

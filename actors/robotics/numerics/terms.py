@@ -17,7 +17,7 @@ _TINY = 1e-9  # keeps the direction defined at distance zero
 def stay_near(x: float, y: float, cx: float, cy: float, radius: float) -> Term:
     """f3, and f6's inside: distance to (cx, cy) less ``radius``."""
     dx, dy = x - cx, y - cy
-    d = max(math.hypot(dx, dy), _TINY)
+    d = max(math.sqrt(dx * dx + dy * dy), _TINY)
     nx, ny = dx / d, dy / d
     return d - radius, nx, ny, ny * ny / d, -nx * ny / d, nx * nx / d
 
@@ -47,7 +47,7 @@ def keep_away_uncertain(
     sigma^2(a) = n(a)^T C n(a); derivatives are taken there and turned back.
     """
     dx, dy = x - cx, y - cy
-    r = max(math.hypot(dx, dy), _TINY)
+    r = max(math.sqrt(dx * dx + dy * dy), _TINY)
     nx, ny = dx / r, dy / r
     if dx == 0.0 and dy == 0.0:
         nx, ny = 1.0, 0.0

@@ -8,7 +8,8 @@ import threading
 
 import numpy as np
 
-from .barrier import solve, violations
+from .barrier import solve
+from .constraints import violations
 from .horizon import REACH_GOAL, HorizonProblem, trajectory
 from .mutual_information import pairwise_distance
 from .reachability import planned_positions, propagate, tube_radius
