@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +18,7 @@ from scipy import stats
 
 from epicycle.runner import open_study
 from epicycle.runner.model.packaged import packaged_models
-from epicycle.runner.study import Plan, read_study, run_study
+from epicycle.runner.study import Plan, Study, read_study, run_study
 from epicycle.runner.study.claims import Finding, Judgement, judge, verdict
 from epicycle.runner.study.declaration import study_of_text
 from epicycle.runner.study.guideline import Recommendation, recommend
@@ -30,9 +32,14 @@ metrics: {wait: mean_wait, way: mean_wait}
 Numbers = Callable[[float, int, np.random.Generator], float | None]
 
 
+@cache
+def study_of(text: str) -> Study:
+    return study_of_text(HEAD + text, Path("s.yaml"))
+
+
 def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tuple[int, ...] = ()) -> Any:
     """Results of a study, with numbers drawn by condition; ``failed`` are replications."""
-    study = study_of_text(HEAD + text, Path("s.yaml"))
+    study = study_of(text)
     random = np.random.default_rng(seed)
     rows: list[dict[str, Any]] = []
     for replication in range(runs):
@@ -200,8 +207,7 @@ RULES = [
 def test_verdict(form: str, share: float, words: str, expected: str) -> None:
     belongs = {"less": "at: {servers: 2}", "greater": "at: {servers: 2}", "always": ""}.get(form, "over: load")
     text = f"claims: {{c: {{{form}: wait{' > 0' if form == 'always' else ''}, {belongs}}}}}"
-    claim = study_of_text(HEAD + text, Path("s.yaml")).questions.claims[0]
-    object.__setattr__(claim, "share", share)
+    claim = replace(study_of(text).questions.claims[0], share=share)
     names = {"c": "confirmed", "r": "reversed", "u": "undecided"}
     sign = 1 if form in ("greater", "rises") else -1
     findings = [
