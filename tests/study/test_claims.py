@@ -34,7 +34,7 @@ Numbers = Callable[[float, int, np.random.Generator], float | None]
 
 @cache
 def study_of(text: str) -> Study:
-    return study_of_text(HEAD + text, Path("s.yaml"))
+    return study_of_text(text if "study:" in text else HEAD + text, Path("s.yaml"))
 
 
 def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tuple[int, ...] = ()) -> Any:
@@ -45,7 +45,8 @@ def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tu
     for replication in range(runs):
         luck = float(random.normal())  # common to all conditions
         for condition in range(12):
-            load, servers = (0.5, 0.7, 0.9)[condition // 4], condition % 4 + 1
+            load: Any = study.dimensions[0].level(condition // 4).values["load"]
+            servers = condition % 4 + 1
             value = numbers(load, servers, random)
             wait = None if value is None else value + luck
             status = "failed" if replication in failed else "ok"
@@ -232,6 +233,20 @@ def test_truths_and_their_opposites() -> None:
     assert outcomes(found) == ["confirmed"] * 12 + ["undecided"] * 12
     assert (found.verdict, found.counts("confirmed"), found.counts("undecided")) == ("reproduced", 12, 12)
     assert found.weakest == found.findings[12]
+
+
+def test_numbers_are_taken_in_their_order_and_names_in_the_studys() -> None:
+    mixed = HEAD.replace("50 %, 70 %, 90 %", "70 %, 90 %, 50 %")
+    (found,) = judge(table(mixed + "claims: {c: {rises: wait, over: load, where: {servers: 1}}}", grows))
+    pairs = [(each.against["load"], each.level["load"]) for each in found.findings]
+    assert pairs == [(0.5, pytest.approx(0.7)), (pytest.approx(0.7), 0.9)]
+    assert found.verdict == "reproduced"
+    cases = mixed.replace("load: [70 %, 90 %, 50 %]", "load: {cases: {late: , early: , first: {load: 0.5}}}")
+    order = {"late": 2.0, "early": 1.0, "first": 0.0}
+    text = cases + "claims: {c: {falls: wait, over: load}}"
+    (found,) = judge(table(text, lambda load, servers, random: float(9 * order[str(load)] + random.normal())))
+    assert [each.level["load"] for each in found.findings] == ["early", "first"] * 4
+    assert found.verdict == "reproduced"
 
 
 # -- what is missing --------------------------------------------------------------------------------------------------
