@@ -21,7 +21,7 @@ from epicycle.actors.expression import Formula
 
 from .dimensions import Factor
 from .metrics import asks_for_none
-from .questions import ALWAYS, FALLS, GREATER, RISES, Claim, Selection, levels_of
+from .questions import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
 from .samples import MISSING, Place, Samples
 from .statistics import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
 
@@ -53,13 +53,13 @@ class Finding:
     error: float
     low: float
     high: float
-    bootstrap_low: float
-    bootstrap_high: float
     count: int
     missing: int
-    p: float
-    p_holm: float
-    outcome: str
+    bootstrap_low: float = math.nan
+    bootstrap_high: float = math.nan
+    p: float = math.nan
+    p_holm: float = math.nan
+    outcome: str = UNDECIDED
 
     @property
     def has_enough(self) -> bool:
@@ -120,11 +120,8 @@ def judge(results: StudyResults, level: float = LEVEL) -> list[Judgement]:
     if not questions.claims:
         return []
     samples = Samples(results)
-    apart = [levels_of(samples.dimensions, factor) for factor in questions.apart]
     return [
-        _judged(claim, dict(zip(questions.apart, place, strict=True)), samples, level)
-        for place in product(*apart)
-        for claim in questions.claims
+        _judged(claim, apart, samples, level) for apart in samples.levels(questions.apart) for claim in questions.claims
     ]
 
 
@@ -135,7 +132,7 @@ def _judged(claim: Claim, apart: Levels, samples: Samples, level: float) -> Judg
     else:
         contrasts = _ordered if claim.form in (RISES, FALLS) else _compared
         findings = [
-            _finding(claim, contrast, samples, level)
+            _finding(contrast, samples, level)
             for metric in claim.metrics
             for contrast in contrasts(claim, metric.text, where, samples)
         ]
@@ -236,7 +233,7 @@ def _ordered(claim: Claim, metric: str, where: Selection, samples: Samples) -> I
             )
 
 
-def _finding(claim: Claim, contrast: _Contrast, samples: Samples, level: float) -> Finding:
+def _finding(contrast: _Contrast, samples: Samples, level: float) -> Finding:
     """The mean of a contrast over the replications in which all its conditions have a number."""
     numbers = {place: samples.numbers(place, contrast.metric) for place in contrast.weights}
     over = set.intersection(*(samples.over(place) for place in numbers))
@@ -246,21 +243,19 @@ def _finding(claim: Claim, contrast: _Contrast, samples: Samples, level: float) 
     found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
     student, bootstrap = found.estimate, bootstrap_mean(values, level, resamples=RESAMPLES)
     return Finding(
-        contrast.metric,
-        contrast.where,
-        contrast.level,
-        contrast.against,
-        student.value,
-        student.error,
-        student.low,
-        student.high,
-        bootstrap.low,
-        bootstrap.high,
-        student.count,
-        len(over) - len(pairs),
-        found.p,
-        math.nan,
-        UNDECIDED,
+        metric=contrast.metric,
+        where=contrast.where,
+        level=contrast.level,
+        against=contrast.against,
+        value=student.value,
+        error=student.error,
+        low=student.low,
+        high=student.high,
+        bootstrap_low=bootstrap.low,
+        bootstrap_high=bootstrap.high,
+        count=student.count,
+        missing=len(over) - len(pairs),
+        p=found.p,
     )
 
 
@@ -282,9 +277,17 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float)
         holds, missing = answers.count(True), answers.count(None)
         found = rate(holds, len(answers) - missing, level)
         finding = Finding(
-            claim.condition, samples.values(place), {}, {}, found.value, found.error, found.low, found.high,
-            math.nan, math.nan, found.count, missing, math.nan, math.nan, UNDECIDED,
-        )  # fmt: skip
+            metric=claim.condition,
+            where=samples.values(place),
+            level={},
+            against={},
+            value=found.value,
+            error=found.error,
+            low=found.low,
+            high=found.high,
+            count=found.count,
+            missing=missing,
+        )
         yield replace(finding, outcome=_outcome_of_rate(claim, finding, holds))
 
 

@@ -53,6 +53,16 @@ class Samples:
         wanted = range(len(place)) if homes is None else homes
         return {name: value for home in wanted for name, value in self._levels[home][place[home]].items()}
 
+    def levels(self, factors: Iterable[str]) -> list[dict[str, Factor]]:
+        """All combinations of the values of some factors that there are; one without any, if there are no factors."""
+        wanted = list(factors)
+        lists = []
+        for home in self.homes(wanted):
+            names = [name for name in wanted if name in self.dimensions[home].columns]
+            distinct = dict.fromkeys(tuple(values[name] for name in names) for values in self._levels[home])
+            lists.append([dict(zip(names, each, strict=True)) for each in distinct])
+        return [{name: value for part in parts for name, value in part.items()} for parts in product(*lists)]
+
     def level(self, home: int, index: int, factor: str) -> Factor:
         """The value of a factor at a level of its dimension."""
         return self._levels[home][index][factor]

@@ -212,7 +212,7 @@ def test_verdict(form: str, share: float, words: str, expected: str) -> None:
     names = {"c": "confirmed", "r": "reversed", "u": "undecided"}
     sign = 1 if form in ("greater", "rises") else -1
     findings = [
-        Finding("wait", {}, {}, {}, -sign if "-" in word else sign, 0, 0, 0, 0, 0, 9, 0, 0.5, 0.5, names[word[0]])
+        Finding("wait", {}, {}, {}, -sign if "-" in word else sign, 0, 0, 0, 9, 0, outcome=names[word[0]])
         for word in words.split()
     ]
     assert verdict(claim, findings) == expected
