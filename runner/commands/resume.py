@@ -20,4 +20,5 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Go on where the study was left, however it ended."""
     from ..study import plan_of_folder
 
+    study.check_session(options)
     return study.session(plan_of_folder(options.folder), options.folder, options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,18 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def add_session(command: argparse.ArgumentParser) -> None:
     """The options of a session, which ``resume`` has, too."""
+    command.add_argument(
+        "--executor",
+        choices=("local", "dask"),
+        default="local",
+        help="where runs are made: in processes of this machine, or by workers of Dask (default: local)",
+    )
+    command.add_argument(
+        "--scheduler",
+        type=address,
+        metavar="ADDRESS",
+        help="the Dask scheduler whose workers make the runs (default: one of its own, with --jobs workers here)",
+    )
     command.add_argument("--jobs", type=count, metavar="N", help="processes at a time (default: one for each core)")
     command.add_argument(
         "--run-timeout",
@@ -56,6 +69,14 @@ def count(text: str) -> int:
     return int(text)
 
 
+def address(text: str) -> str:
+    """Where a scheduler listens."""
+    found = re.fullmatch(r"((?:tcp|tls|ws|wss)://)?([^\s:/]+|\[[0-9a-fA-F:]+\]):([0-9]{1,5})", text)
+    if found is None or int(found[3]) >= 2**16:
+        raise argparse.ArgumentTypeError(f"{text!r} is not an address such as tcp://localhost:8786")
+    return f"{found[1] or 'tcp://'}{found[2]}:{found[3]}"
+
+
 def seconds(text: str) -> float:
     """A number of seconds."""
     try:
@@ -71,6 +92,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Read, try and run the study."""
     from ..study import Plan, available_cores, check_size, read_study
 
+    check_session(options)
     types = [Path(file) for file in options.types]
     study = read_study(options.study, set=options.set, types=types, replications=options.replications)
     if options.replications is not None and study.until is not None:
@@ -79,6 +101,17 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     if not options.yes:
         check_size(plan, options.jobs or available_cores())
     return session(plan, options.out or Path("results") / study.name, options)
+
+
+def check_session(options: argparse.Namespace) -> None:
+    """Raise ``EpicycleError`` for options that do not go together."""
+    from epicycle.actors import EpicycleError
+
+    if options.scheduler is not None:
+        if options.executor != "dask":
+            raise EpicycleError(f"--scheduler {options.scheduler} is for --executor dask")
+        if options.jobs is not None:
+            raise EpicycleError("--jobs counts the workers of this machine; those of a scheduler are as many as it has")
 
 
 def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
@@ -97,6 +130,8 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
                 timeout=options.run_timeout,
                 retry=options.retry,
                 tell=tell,
+                executor=options.executor,
+                scheduler=options.scheduler,
             )
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is kept: 'epicycle resume {folder}' goes on")

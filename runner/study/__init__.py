@@ -1,7 +1,7 @@
 """Studies: many runs of a model under many conditions, which survive whatever happens to them."""
 
 from .declaration import Study, find_study, is_study, read_study
-from .local import WorkerError
+from .executor import WorkerError
 from .metrics import MetricError, StudyMetric
 from .plan import Condition, Plan
 from .results import StudyResults, open_study

@@ -11,25 +11,15 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from epicycle.actors import EpicycleError
-
 from . import worker
-from .one_run import empty_row
+from .executor import ATTEMPTS, MAX_STILLBORN, THREADS, WorkerError, died, given_up, stillborn, too_long
 from .plan import Plan
 from .schedule import KILLED, TIMEOUT, Done, Schedule, Task
 from .store import Store, WriteError, Writer, cannot_write, writing
 
-ATTEMPTS = 3  # of a run whose worker dies; memory runs out for what others take, too
 # Once, for all workers; pyarrow asks for pandas wherever it is installed.
 _IMPORTED = [worker.__name__, "pyarrow.parquet", "numpy.random", "pandas"]
-MAX_STILLBORN = 5  # workers in a row that die before they can do anything
 _LOOK = 0.5  # s between two looks at the clock
-# One thread a process: N workers of N threads each would only be in each other's way.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
-
-
-class WorkerError(EpicycleError):
-    """Workers that cannot work."""
 
 
 class _Worker:
@@ -67,11 +57,7 @@ class _Worker:
 
 
 class LocalExecutor:
-    """Makes the runs of a schedule in ``jobs`` processes.
-
-    A run that takes longer than ``timeout`` seconds is ended, and gets a row with the status ``timeout``.  A run whose
-    process dies is tried again, and after three times gets a row with the status ``killed``.
-    """
+    """Makes the runs of a schedule in ``jobs`` processes, each of them in at most ``timeout`` seconds."""
 
     def __init__(self, store: Store, plan: Plan, jobs: int, timeout: float | None = None) -> None:
         self._store = store
@@ -160,13 +146,13 @@ class LocalExecutor:
         if not dead.is_ready:
             self._stillborn += 1
             if self._stillborn >= MAX_STILLBORN:
-                raise WorkerError(f"{MAX_STILLBORN} workers in a row ended before they could begin (exit code {code})")
+                raise WorkerError(stillborn(code))
         if dead.task is None:
             return
         if dead.task.attempt < ATTEMPTS:
             schedule.again(dead.task)
         else:
-            self._give_up(dead.task, KILLED, f"its process ended {ATTEMPTS} times (exit code {code})", schedule)
+            self._give_up(dead.task, KILLED, died(code), schedule)
 
     def _end_late_ones(self, schedule: Schedule) -> None:
         if self._timeout is None:
@@ -175,12 +161,11 @@ class LocalExecutor:
             if each.task is not None and time.monotonic() - each.since > self._timeout:
                 self._workers.remove(each)
                 each.end()
-                self._give_up(each.task, TIMEOUT, f"it took longer than {self._timeout:g} s", schedule)
+                self._give_up(each.task, TIMEOUT, too_long(self._timeout), schedule)
 
     def _give_up(self, task: Task, status: str, error: str, schedule: Schedule) -> None:
-        row = empty_row(self._plan, self._plan.condition(task.condition), task) | {"status": status, "error": error}
         with writing(self._store.folder):
-            self._writer.add(row)
+            self._writer.add(given_up(self._plan, task, status, error))
         schedule.finished(task, Done(status))
 
     def _dismiss(self) -> None:
@@ -200,8 +185,8 @@ class LocalExecutor:
 @contextmanager
 def _one_thread() -> Iterator[None]:
     """Pin what the workers inherit."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
         yield
     finally:

@@ -41,6 +41,12 @@ class Runner:
         if len(self._models) > _MODELS_KEPT:
             self._models.popitem(last=False)
 
+    def why_not(self, task: Task) -> str | None:
+        """Why the model of the task's condition cannot be loaded; None if it can."""
+        self.prepare(task)
+        _, model = self._models[task.condition]
+        return model if isinstance(model, str) else None
+
     def row(self, task: Task) -> Row:
         """Make the run; whatever it raises is told in the row."""
         self.prepare(task)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 
 from ..model import Model, ModelError, Problems, did_you_mean, load_model
 from ..model.document import plain
-from ..model.files import noting
+from ..model.files import Noted, noting
 from ..model.own_types import types_of_file
 from ..model.settings import Setting
 from .declaration import RESERVED, Study, study_of_text
@@ -57,11 +57,13 @@ class Plan:
         sources: Sources,
         extra: list[dict[int, Sources]],
         texts: dict[str, str],
+        files: Iterable[str] = (),
     ) -> None:
         self.study = study
         self.metrics = metrics
         self.sources = sources
         self.texts = texts  # the YAML of the model and of all that belongs to it
+        self.files = tuple(files)  # all that were read, by the names by which they were
         self._extra = extra  # by dimension, the files that single levels read beside the others
         self._sizes = [dimension.size for dimension in study.dimensions]
         self.conditions = prod(self._sizes)
@@ -75,22 +77,22 @@ class Plan:
         Raises ``ModelError`` with all that is wrong in any of them.
         """
         problems = Problems()
-        models: list[Model] = []
-        texts: dict[str, str] = {}
+        read = _Read()
         firsts = [0] * len(study.dimensions)
-        sources = _tried(study, firsts, models, texts, problems)
+        sources = _tried(study, firsts, read, problems)
         extra: list[dict[int, Sources]] = [{} for _ in study.dimensions]
         for number, dimension in enumerate(study.dimensions):
             for index in _spread(dimension.size):
-                found = _tried(study, [*firsts[:number], index, *firsts[number + 1 :]], models, texts, problems)
+                indices = [*firsts[:number], index, *firsts[number + 1 :]]
+                found = _tried(study, indices, read, problems)
                 if more := {name: digest for name, digest in found.items() if sources.get(name) != digest}:
                     extra[number][index] = more
         problems.raise_if_any()
         metrics = study.metrics
         if metrics is None:
-            metrics = [StudyMetric(metric.name, metric.name) for metric in models[0].metrics]
+            metrics = [StudyMetric(metric.name, metric.name) for metric in read.models[0].metrics]
         for metric in metrics:
-            metric.check(models, problems)
+            metric.check(read.models, problems)
             if study.metrics is None and (metric.name in RESERVED or metric.name in study.factors):
                 problems.add(
                     f"metric {metric.name!r} of the model has the name of another column of the table",
@@ -106,7 +108,7 @@ class Plan:
             )
         study.questions.check([metric.name for metric in metrics], problems)
         problems.raise_if_any()
-        return cls(study, metrics, sources, extra, texts)
+        return cls(study, metrics, sources, extra, read.texts, read.files)
 
     @classmethod
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
@@ -197,6 +199,14 @@ class Plan:
         """The identity of a run."""
         return _hash([condition.key, self.seed(condition, replication)])
 
+    def unlike(self, noted: Noted) -> list[str]:
+        """What of this was not read when the plan was tried, or was not the same then."""
+        known = [self.sources, *(found for each in self._extra for found in each.values())]
+        digests = {digest for found in known for digest in found.values()}
+        files = [name for name, digest in noted.files.items() if digest not in digests]
+        packages = [(f"package {name}", version) for name, version in noted.packages.items()]
+        return files + [name for name, version in packages if all(found.get(name) != version for found in known)]
+
     def load(self, condition: Condition) -> Model:
         """The model as it is in a condition; raises ``ModelError``."""
         return _load(self.study, condition.settings, condition.disturb)
@@ -235,24 +245,34 @@ def _load(study: Study, settings: tuple[Setting, ...], disturb: tuple[str, ...])
     )
 
 
-def _tried(study: Study, indices: list[int], models: list[Model], texts: dict[str, str], problems: Problems) -> Sources:
+@dataclass
+class _Read:
+    """What trying a study has read."""
+
+    models: list[Model] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
+    files: dict[str, None] = field(default_factory=dict)
+
+
+def _tried(study: Study, indices: list[int], read: _Read, problems: Problems) -> Sources:
     """Load the model with these levels; the files that this reads."""
     levels = [dimension.level(at) for dimension, at in zip(study.dimensions, indices, strict=True)]
     with noting() as noted:
         try:
-            models.append(_load(study, *_together(study, levels)))
+            read.models.append(_load(study, *_together(study, levels)))
         except ModelError as error:
             for problem in error.problems:
                 problems.add(problem.message, problem.position, *problem.help)
     home = Path(next(iter(noted.files), "")).resolve().parent
     found = {f"package {name}": version for name, version in noted.packages.items()}
     for name, digest in [*noted.files.items(), *((str(file), _digest(file)) for file in study.types)]:
+        read.files[name] = None
         path = Path(name).resolve()
         # By names that stay when a study and its model are moved, or Epicycle is.
         shown = path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name
         found[shown] = digest
         if path.suffix in (".yaml", ".yml"):
-            texts[shown] = path.read_text(encoding="utf-8")
+            read.texts[shown] = path.read_text(encoding="utf-8")
     return found
 
 

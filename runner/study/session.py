@@ -13,12 +13,14 @@ from epicycle.actors import EpicycleError, counted
 
 from ..engine import Simulation
 from ..provenance import git_revision, machine, versions
+from .executor import Executor
 from .local import LocalExecutor
 from .plan import Plan
 from .results import StudyResults
 from .schedule import OK, Schedule
-from .store import FORMAT, StoreError, collect, is_wanted, lock, prepare, read_manifest
+from .store import FORMAT, Store, StoreError, collect, is_wanted, lock, prepare, read_manifest
 
+LOCAL, DASK = "local", "dask"  # executors
 MANY = 100_000  # runs that nobody asks for by mistake
 _TRIAL = 5.0  # s that are spent at most to find out how long a run takes
 
@@ -51,24 +53,40 @@ def run_study(
     timeout: float | None = None,
     retry: bool = False,
     tell: Callable[[Schedule], None] | None = None,
+    executor: str = LOCAL,
+    scheduler: str | None = None,
 ) -> Outcome:
     """Make all runs of a plan that are not in the folder yet.
 
-    ``retry``: also those that took too long or whose process died.  Raises ``StoreError`` and ``WorkerError``.
+    ``retry``: also those that took too long or whose process died.  ``executor``: ``local``, or ``dask`` for the
+    workers of the Dask ``scheduler`` at that address, or for a cluster of its own on this machine.  Raises
+    ``StoreError`` and ``WorkerError``, and ``EpicycleError`` where Dask is wanted and not installed.
     """
+    if executor == DASK:
+        from .cluster import distributed_module
+
+        distributed_module()  # before anything is written
     with lock(folder):
         store = prepare(folder, manifest_of(plan))
         until = plan.study.until
         known = store.known(None if until is None else until.metric)
         schedule = Schedule(plan, {key: done for key, done in known.items() if is_wanted(done, retry)})
-        executor = LocalExecutor(store, plan, jobs or available_cores(), timeout)
-        executor.run(schedule, lambda: None if tell is None else tell(schedule))
+        maker = _executor(executor, scheduler, store, plan, jobs or available_cores(), timeout)
+        maker.run(schedule, lambda: None if tell is None else tell(schedule))
         collect(store)
         results = StudyResults(folder)
         table = results.write_table()
         made, there = schedule.made, schedule.there
         failed = made.total() + there.total() - made[OK] - there[OK]
         return Outcome(made.total(), there.total(), failed, schedule.stopped_early, table)
+
+
+def _executor(name: str, scheduler: str | None, store: Store, plan: Plan, jobs: int, timeout: float | None) -> Executor:
+    if name == DASK:
+        from .cluster import DaskExecutor
+
+        return DaskExecutor(store, plan, jobs, timeout, scheduler)
+    return LocalExecutor(store, plan, jobs, timeout)
 
 
 def manifest_of(plan: Plan) -> dict[str, Any]:

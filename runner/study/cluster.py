@@ -1,0 +1,255 @@
+"""The Dask executor: runs on the machines of a cluster, whose rows come back and are written here."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import time
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import CancelledError
+from contextlib import asynccontextmanager
+from dataclasses import astuple
+from operator import call
+from pkgutil import resolve_name
+from typing import Any
+from uuid import uuid4
+
+from epicycle.actors import EpicycleError
+
+from . import host
+from .executor import ATTEMPTS, WorkerError, died, given_up, too_long
+from .parcel import differences, fitness, pack, unfit
+from .plan import Plan
+from .schedule import KILLED, TIMEOUT, Done, Schedule, Task
+from .store import Row, Store, Writer, writing
+
+CONNECT = 10.0  # s in which a scheduler has to answer
+PATIENCE = 60.0  # s without any worker
+_LOOK = 0.5  # s between two looks around
+_BATCH = 0.5  # s that a batch of runs is to take: time enough to bring the next
+_LARGEST = 100  # runs of a batch
+
+_Making = asyncio.Task[list[host.Outcome]]
+
+
+def distributed_module() -> Any:
+    """Dask's scheduler and workers; raises ``EpicycleError`` if they are not installed."""
+    try:
+        import dask
+
+        # Its log is set up when it is imported.  What a user has to know comes as an exception.
+        with dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}}):
+            import distributed
+    except ImportError as error:
+        raise EpicycleError("this needs dask: pip install 'epicycle[dask]'") from error
+    return distributed
+
+
+class DaskExecutor:
+    """Makes the runs of a schedule on the workers of a scheduler, each of them in at most ``timeout`` seconds.
+
+    Without the address of a scheduler there is a cluster of ``jobs`` workers on this machine, for as long as it takes.
+    """
+
+    def __init__(
+        self, store: Store, plan: Plan, jobs: int, timeout: float | None = None, scheduler: str | None = None
+    ) -> None:
+        self._distributed = distributed_module()
+        self._store = store
+        self._plan = plan
+        self._jobs = jobs
+        self._timeout = timeout
+        self._scheduler = scheduler
+        self._writer = Writer(store)
+        self._decides = None if plan.study.until is None else plan.study.until.metric
+        self._study = f"epicycle-{uuid4().hex}"
+        self._parcel: Any = None
+        self._batches = 0
+        self._running: dict[_Making, list[Task]] = {}
+        self._wanted = 1  # batches at a time
+        self._seconds = _BATCH  # that a run takes, as far as known
+        self._workers: set[str] = set()
+        self._looked = 0.0
+        self._seen = time.monotonic()  # when there were workers
+
+    def run(self, schedule: Schedule, tell: Callable[[], None]) -> None:
+        """Make all runs; ``tell`` is called now and then.  Raises ``WriteError`` and ``WorkerError``."""
+        if (first := self._batch(schedule)) is None:
+            return
+        try:
+            asyncio.run(self._run(first, schedule, tell))
+        finally:
+            with writing(self._store.folder):
+                self._writer.flush()
+
+    async def _run(self, first: list[Task], schedule: Schedule, tell: Callable[[], None]) -> None:
+        async with self._client() as client:
+            try:
+                await self._look(client)
+                # The result of a task and no scattered data: it can be made again when all who had it are gone.
+                self._parcel = client.submit(bytes, pack(self._plan), key=f"{self._study}-parcel", pure=False)
+                self._begin(client, first)
+                self._fill(client, schedule)
+                while self._running:
+                    over, _ = await asyncio.wait(self._running, timeout=_LOOK, return_when=asyncio.FIRST_COMPLETED)
+                    for each in over:
+                        self._end(each, self._running.pop(each), schedule)
+                    self._fill(client, schedule)
+                    await self._look(client)
+                    tell()
+            finally:
+                for each in self._running:
+                    each.cancel()
+
+    # -- the cluster ----------------------------------------------------------------------------------------------
+
+    @asynccontextmanager
+    async def _client(self) -> AsyncIterator[Any]:
+        module = self._distributed
+        if self._scheduler is None:
+            async with (
+                module.LocalCluster(
+                    n_workers=self._jobs,
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                    asynchronous=True,
+                ) as cluster,
+                module.Client(cluster, asynchronous=True, set_as_default=False) as client,
+            ):
+                yield client
+            return
+        client = module.Client(self._scheduler, timeout=CONNECT, asynchronous=True, set_as_default=False)
+        try:
+            try:
+                await asyncio.wait_for(client, CONNECT + 1.0)
+            except (OSError, ValueError) as error:
+                raise WorkerError(
+                    f"no scheduler answers at {self._scheduler}\n"
+                    "   help: 'dask scheduler' starts one, and says its address"
+                ) from error
+            yield client
+        finally:
+            await client.close()
+
+    async def _look(self, client: Any) -> None:
+        """Look at the workers, now and then; raises ``WorkerError`` if one cannot work, or none is there for long."""
+        now = time.monotonic()
+        if now - self._looked < _LOOK:
+            return
+        self._looked = now
+        try:
+            threads: dict[str, int] = await asyncio.wait_for(client.nthreads(), CONNECT)
+            new = sorted(threads.keys() - self._workers)
+            found = await client.run(fitness, workers=new, on_error="return") if new else {}
+        except OSError as error:
+            raise self._lost() from error
+        for address, each in found.items():
+            if isinstance(each, ImportError):
+                raise WorkerError(
+                    f"the Dask worker {address} has no Epicycle like this one: {each}\n"
+                    "   help: install it there, in the version that is here"
+                )
+            if isinstance(each, dict) and (unlike := differences(each, fitness())):
+                raise WorkerError(f"the Dask worker {address} {unfit(unlike)}")
+        self._workers = set(threads)
+        # More than the workers take: what is left waits at the scheduler for whoever is free first.
+        self._wanted = 2 * sum(threads.values()) + 4
+        if threads:
+            self._seen = time.monotonic()
+        elif now - self._seen > PATIENCE:
+            raise WorkerError(
+                f"the scheduler {self._scheduler} has had no workers for {PATIENCE:g} s\n"
+                f"   help: 'dask worker {self._scheduler}' starts some"
+            )
+
+    def _lost(self) -> WorkerError:
+        return WorkerError(
+            f"the scheduler{'' if self._scheduler is None else f' {self._scheduler}'} is gone\n"
+            f"   help: what was finished is kept; 'epicycle resume {self._store.folder}' goes on"
+        )
+
+    # -- runs -----------------------------------------------------------------------------------------------------
+
+    def _batch(self, schedule: Schedule) -> list[Task] | None:
+        """The next runs; one that may have ended its process comes alone."""
+        share = (schedule.total - schedule.over) // (2 * self._wanted)
+        most = max(1, min(_LARGEST, int(_BATCH / self._seconds), share))
+        batch: list[Task] = []
+        while len(batch) < most and (task := schedule.next()) is not None:
+            batch.append(task)
+            if task.attempt > 1:
+                break
+        return batch or None
+
+    def _fill(self, client: Any, schedule: Schedule) -> None:
+        """Give as much as is wanted."""
+        while len(self._running) < self._wanted and (batch := self._batch(schedule)):
+            self._begin(client, batch)
+
+    def _begin(self, client: Any, batch: list[Task]) -> None:
+        """Send a batch.  All that the scheduler sees of it is Python's own: it need not know Epicycle."""
+        self._batches += 1
+        key = f"{self._study}-{self._batches}"
+        make = (resolve_name, f"{host.__name__}:{host.make.__name__}")
+        given = {"study": self._study, "timeout": self._timeout, "tasks": [astuple(each) for each in batch]}
+        (future,) = client.get({key: (call, make, self._parcel, json.dumps(given))}, [key], sync=False)
+        self._running[asyncio.ensure_future(_result_of(future))] = batch
+
+    def _end(self, over: _Making, batch: list[Task], schedule: Schedule) -> None:
+        """A batch is over, or has ended its workers."""
+        try:
+            outcomes = over.result()
+        except self._distributed.KilledWorker:
+            for task in batch:
+                if len(batch) > 1 or task.attempt < ATTEMPTS:  # it may have been another one of them
+                    schedule.again(task)
+                else:
+                    error = "the Dask workers that made it ended, one after the other"
+                    self._keep(task, given_up(self._plan, task, KILLED, error), schedule)
+            return
+        except (CancelledError, asyncio.CancelledError) as error:
+            raise self._lost() from error
+        except WorkerError:
+            raise
+        except Exception as error:
+            raise WorkerError(f"the Dask workers cannot make runs: {type(error).__name__}: {error}") from error
+        for task, (what, told) in zip(batch, outcomes, strict=True):
+            if what == host.ROW:
+                row, why_not = told
+                self._take(task, row, why_not, schedule)
+            elif what == host.LATE:
+                assert self._timeout is not None
+                self._keep(task, given_up(self._plan, task, TIMEOUT, too_long(self._timeout)), schedule)
+            elif task.attempt < ATTEMPTS:
+                schedule.again(task)
+            else:
+                self._keep(task, given_up(self._plan, task, KILLED, died(told)), schedule)
+
+    def _take(self, task: Task, row: Row, why_not: str | None, schedule: Schedule) -> None:
+        """A row has come; if it only says that the model cannot be loaded, this must be so here, too."""
+        if why_not is not None:
+            try:
+                self._plan.load(self._plan.condition(task.condition))
+            except EpicycleError:
+                pass
+            else:
+                raise WorkerError(
+                    f"a Dask worker cannot load the model, which is right here:\n{why_not}\n"
+                    "   help: files are sent along if they are named by a path from the study or the model; packages "
+                    "with types of your own have to be installed there"
+                )
+        self._seconds += 0.2 * (row["wall_time"] - self._seconds)
+        self._keep(task, row, schedule)
+
+    def _keep(self, task: Task, row: Row, schedule: Schedule) -> None:
+        with writing(self._store.folder):
+            self._writer.add(row)
+        schedule.finished(task, Done(row["status"], row[self._decides] if self._decides else None))
+
+
+async def _result_of(future: Any) -> list[host.Outcome]:
+    found: list[host.Outcome] = await future.result()
+    return found
