@@ -111,7 +111,9 @@ def check_session(options: argparse.Namespace) -> None:
         if options.executor != "dask":
             raise EpicycleError(f"--scheduler {options.scheduler} is for --executor dask")
         if options.jobs is not None:
-            raise EpicycleError("--jobs counts the workers of this machine; those of a scheduler are as many as it has")
+            raise EpicycleError(
+                "--jobs counts processes of this machine; a scheduler has the workers that were started for it"
+            )
 
 
 def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:

@@ -9,14 +9,14 @@ from __future__ import annotations
 import os
 import pickle
 import queue
-import signal
 import sys
 import threading
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ..model import ModelError
 from ..model.files import noting
-from .executor import WorkerError
+from .executor import SENT, WorkerError
 from .one_run import Runner
 from .parcel import unpack
 from .schedule import Task
@@ -27,7 +27,6 @@ READY, UNFIT, BEGUN, OVER = "ready", "unfit", "begun", "over"  # what it tells
 
 def main() -> None:
     """Serve whoever has started this process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the study decides what an interrupt means
     requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     nothing = os.open(os.devnull, os.O_RDWR)
     for each in (0, 1):  # an actor that prints would break into the answers
@@ -59,19 +58,20 @@ class _Bench:
 
     def __init__(self, parcel: bytes, root: Path) -> None:
         self._root = str(root)
-        self._plan = unpack(parcel, root)
+        try:
+            self._plan = unpack(parcel, root)
+        except ModelError as error:
+            raise WorkerError(
+                f"cannot read the study, which is right here:\n{self._named(str(error))}\n{SENT}"
+            ) from error
         self._runner = Runner(self._plan)
 
     def prepare(self, task: Task) -> None:
         """Load the model; raises ``WorkerError`` if this reads anything else than it does at the study's place."""
         with noting() as noted:
             self._runner.prepare(task)
-        if unlike := self._plan.unlike(noted):
-            raise WorkerError(
-                f"has another {self._named(unlike[0])} than this machine\n"
-                "   help: files are sent along if they are named by a path from the study or the model; packages have "
-                "to be installed there"
-            )
+        if noted.files and (unlike := self._plan.unlike(noted)):
+            raise WorkerError(f"has another {self._named(unlike[0])} than this machine\n{SENT}")
 
     def row(self, task: Task) -> tuple[Row, str | None]:
         """The row of a run; and why its model could not be loaded, if that was so."""

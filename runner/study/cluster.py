@@ -18,7 +18,7 @@ from uuid import uuid4
 from epicycle.actors import EpicycleError
 
 from . import host
-from .executor import ATTEMPTS, WorkerError, died, given_up, too_long
+from .executor import ATTEMPTS, SENT, WorkerError, died, given_up, too_long
 from .parcel import differences, fitness, pack, unfit
 from .plan import Plan
 from .schedule import KILLED, TIMEOUT, Done, Schedule, Task
@@ -49,7 +49,7 @@ def distributed_module() -> Any:
 class DaskExecutor:
     """Makes the runs of a schedule on the workers of a scheduler, each of them in at most ``timeout`` seconds.
 
-    Without the address of a scheduler there is a cluster of ``jobs`` workers on this machine, for as long as it takes.
+    Without the address of a scheduler there is one of its own, with ``jobs`` processes at a time on this machine.
     """
 
     def __init__(
@@ -108,17 +108,18 @@ class DaskExecutor:
     async def _client(self) -> AsyncIterator[Any]:
         module = self._distributed
         if self._scheduler is None:
-            async with (
-                module.LocalCluster(
-                    n_workers=self._jobs,
-                    threads_per_worker=1,
-                    host="127.0.0.1",
-                    dashboard_address=None,
-                    silence_logs=logging.CRITICAL,
-                    asynchronous=True,
-                ) as cluster,
-                module.Client(cluster, asynchronous=True, set_as_default=False) as client,
-            ):
+            # In this process: each run has a process of its own, whatever Dask's worker is.
+            cluster = module.LocalCluster(
+                processes=False,
+                n_workers=1,
+                threads_per_worker=self._jobs,
+                memory_limit=0,
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                silence_logs=logging.CRITICAL,
+                asynchronous=True,
+            )
+            async with cluster, module.Client(cluster, asynchronous=True, set_as_default=False) as client:
                 yield client
             return
         client = module.Client(self._scheduler, timeout=CONNECT, asynchronous=True, set_as_default=False)
@@ -236,11 +237,7 @@ class DaskExecutor:
             except EpicycleError:
                 pass
             else:
-                raise WorkerError(
-                    f"a Dask worker cannot load the model, which is right here:\n{why_not}\n"
-                    "   help: files are sent along if they are named by a path from the study or the model; packages "
-                    "with types of your own have to be installed there"
-                )
+                raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
         self._seconds += 0.2 * (row["wall_time"] - self._seconds)
         self._keep(task, row, schedule)
 

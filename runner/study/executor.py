@@ -16,6 +16,10 @@ ATTEMPTS = 3  # of a run whose process dies; memory runs out for what others tak
 MAX_STILLBORN = 5  # processes in a row that die before they can do anything
 # One thread a process: N processes of N threads each would only be in each other's way.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
+SENT = (
+    "   help: files are sent along if they are named by a path from the study or the model; packages have to be "
+    "installed there"
+)
 
 
 class WorkerError(EpicycleError):
