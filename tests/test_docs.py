@@ -8,10 +8,14 @@ from __future__ import annotations
 import contextlib
 import doctest
 import io
+import os
 import re
 import shlex
+import socket
+import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +29,7 @@ from epicycle.runner.study import Plan, read_study
 
 ROOT = Path(__file__).parent.parent
 TUTORIALS = sorted((ROOT / "docs" / "tutorial").glob("*.md"))
+PORT = "8786"  # of a scheduler in a tutorial
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -82,12 +87,14 @@ class Reader:
 
     def __init__(self) -> None:
         self.names: dict[str, Any] = {"__name__": "tutorial"}
+        self._port = ""  # of this machine, in the place of the one that is shown
+        self._background: list[subprocess.Popen[bytes]] = []
 
     def outputs(self, tutorial: list[Block]) -> Iterator[tuple[Block, str, str]]:
         """What each block shows of its output, and what really came out.
 
         A block whose first line is ``# name`` is a file.  Other Python is run, and its output is the ``text`` block
-        that follows; in ``console`` the output of a command stands below it.
+        that follows; in ``console`` the output of a command stands below it, and ``dask ... &`` goes on until the end.
         """
         for block, after in zip(tutorial, [*tutorial[1:], Block("", "", 0)], strict=True):
             name = re.match(r"# (\w+\.\w+)\n", block.text)
@@ -98,11 +105,40 @@ class Reader:
                 yield block, after.text if after.language == "text" else "", printed
             elif block.language == "console":
                 for command, shown in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", block.text, re.M):
-                    program, *arguments = shlex.split(command)
+                    program, *arguments = shlex.split(command.replace(PORT, self._port or PORT))
+                    if program == "dask" and arguments[-1] == "&":
+                        yield block, shown, self._started(arguments[:-1])
+                        continue
                     assert program == "epicycle", command
                     yield block, shown, self._printed(lambda given=arguments: main(given))
             else:
                 assert block.language == "text", f"line {block.line}: what is this?"
+
+    def _started(self, arguments: list[str]) -> str:
+        """Start a scheduler or worker, and wait until it says where it is."""
+        pytest.importorskip("distributed")
+        if not self._port:
+            with socket.create_server(("127.0.0.1", 0)) as free:
+                self._port = str(free.getsockname()[1])
+        folder = tempfile.mkdtemp(dir=".")
+        said = Path(folder, "said")
+        program = [sys.executable, "-m", "dask", *(each.replace(PORT, self._port) for each in arguments)]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        with said.open("w") as output:
+            self._background.append(
+                subprocess.Popen(program, cwd=folder, env=environment, stdout=output, stderr=output)
+            )
+        deadline = time.monotonic() + 60
+        while " at:" not in said.read_text() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        return "\n"
+
+    def close(self) -> None:
+        """End what goes on in the background."""
+        for each in reversed(self._background):
+            each.terminate()
+        for each in self._background:
+            each.wait()
 
     @staticmethod
     def _printed(act: Any) -> str:
@@ -117,13 +153,14 @@ def test_a_tutorial_shows_what_comes_out(path: Path, tmp_path: Path, monkeypatch
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     modules = set(sys.modules)
-    checker, shown_something = doctest.OutputChecker(), False
+    checker, shown_something, reader = doctest.OutputChecker(), False, Reader()
     try:
-        for block, shown, printed in Reader().outputs(blocks(path)):
+        for block, shown, printed in reader.outputs(blocks(path)):
             where = f"{path.name}, block at line {block.line}, printed:\n{printed}"
             assert checker.check_output(shown or "\n", printed, doctest.ELLIPSIS), where
             shown_something = shown_something or bool(shown)
     finally:
+        reader.close()
         for name in set(sys.modules) - modules:  # the files of this tutorial; the next one may name its own so
             if getattr(sys.modules[name], "__file__", None) and str(tmp_path) in str(sys.modules[name].__file__):
                 del sys.modules[name]
@@ -156,8 +193,8 @@ def test_every_aspect_is_in_the_table_of_families() -> None:
 
 def refresh(path: Path) -> None:
     """Put what comes out now into a tutorial."""
-    document, at = path.read_text(encoding="utf-8"), 0
-    for block, shown, printed in Reader().outputs(blocks(path)):
+    document, at, reader = path.read_text(encoding="utf-8"), 0, Reader()
+    for block, shown, printed in reader.outputs(blocks(path)):
         if block.language == "python":
             at = document.index(block.text, at) + len(block.text)
         if shown:
@@ -165,6 +202,7 @@ def refresh(path: Path) -> None:
             printed = re.sub(r"(wall time +).*", r"\1...", printed)
             document = document[:at] + printed + document[at + len(shown) :]
             at += len(printed)
+    reader.close()
     path.write_text(document, encoding="utf-8")
 
 

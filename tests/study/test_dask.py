@@ -12,78 +12,22 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
 
-from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
-from epicycle.runner.study import Plan, WorkerError, open_study, read_study, run_study
+from epicycle.runner.study import Plan, open_study, read_study, run_study
 from epicycle.runner.study.parcel import fitness, pack
 from epicycle.runner.study.store import Store
 
 sys.path.insert(0, str(Path(__file__).parent))
+from dask_cluster import Cluster, a_cluster
 from study_parts import STUDY, THIS, command, plan_of, write
 
 pytest.importorskip("distributed")
 from epicycle.runner.study import cluster as cluster_module
-
-
-@dataclass
-class Cluster:
-    """A scheduler, and workers by their number."""
-
-    folder: Path
-    address: str = ""
-    scheduler: subprocess.Popen[Any] | None = None
-    workers: list[subprocess.Popen[Any]] = field(default_factory=list)
-
-    def start(self, kind: str, *arguments: str, **environment: str) -> subprocess.Popen[Any]:
-        """A process of Dask, in a folder that holds nothing; a worker without a nanny, as we kill it ourselves."""
-        folder = self.folder / f"{kind}{len(self.workers)}"
-        folder.mkdir()
-        with (folder / "said").open("w") as said:
-            return subprocess.Popen(
-                [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *arguments],
-                cwd=folder,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
-                stdout=said,
-                stderr=said,
-            )
-
-    def add_worker(self, **environment: str) -> subprocess.Popen[Any]:
-        """One more, with one thread."""
-        here = str(self.folder)
-        worker = self.start(
-            "worker", self.address, "--nthreads=1", "--no-nanny", "--local-directory", here, **environment
-        )
-        self.workers.append(worker)
-        return worker
-
-
-@contextmanager
-def a_cluster(folder: Path, workers: int) -> Iterator[Cluster]:
-    folder.mkdir(exist_ok=True)
-    found = Cluster(folder)
-    file = folder / "scheduler.json"
-    found.scheduler = found.start("scheduler", "--host=127.0.0.1", "--port=0", "--scheduler-file", str(file))
-    try:
-        deadline = time.monotonic() + 60
-        while not found.address and time.monotonic() < deadline:
-            time.sleep(0.05)
-            if file.exists() and (text := file.read_text()):
-                found.address = json.loads(text)["address"]
-        for _ in range(workers):
-            found.add_worker()
-        yield found
-    finally:
-        for each in (*found.workers, found.scheduler):
-            each.kill()
-            each.wait()
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +131,10 @@ vary: {recorded.file: [data/first.csv, data/second.csv]}
 disturb: {none: [], lossy: ./lossy.yaml}
 replications: 2
 """,
-    "study/lossy.yaml": "disturbance: lossy\naspects: {lossy: {type: PacketLoss, probability: 0.5, at: filter.input}}\n",
+    "study/lossy.yaml": """
+disturbance: lossy
+aspects: {lossy: {type: PacketLoss, probability: 0.5, at: filter.input}}
+""",
     "model/with_files.yaml": """
 model: with_files
 include: parts/filter.yaml
@@ -197,7 +144,11 @@ actors:
   recorded: {type: Replay, file: data/first.csv}
   noise: {type: Replay, file: data/first.csv}
   sum: {type: AddSubtract}
-connections: [walk.output -> filter.input, filter.output -> sum.plus, recorded.output -> sum.plus, noise.output -> sum.plus]
+connections:
+  - walk.output -> filter.input
+  - filter.output -> sum.plus
+  - recorded.output -> sum.plus
+  - noise.output -> sum.plus
 run: {stop: 10 s}
 metrics: {place: {of: sum.output, take: last}}
 """,
@@ -323,3 +274,24 @@ def test_what_cannot_be(
     with monkeypatch.context() as context:
         context.setitem(sys.modules, "distributed", None)
         assert error_of(tmp_path, capsys) == "2: error: this needs dask: pip install 'epicycle[dask]'\n"
+
+
+@pytest.mark.slow
+def test_workers_that_are_missing_or_have_no_epicycle(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path)
+    monkeypatch.setattr(cluster_module, "PATIENCE", 1.0)
+    with a_cluster(tmp_path / "cluster") as cluster:
+        address = ("--scheduler", cluster.address)
+        assert error_of(tmp_path, capsys, *address) == (
+            f"1: error: the scheduler {cluster.address} has had no workers for 1 s\n"
+            f"   help: 'dask worker {cluster.address}' starts some\n"
+        )
+        (tmp_path / "without").mkdir()
+        (tmp_path / "without" / "sitecustomize.py").write_text("import sys\nsys.modules['epicycle'] = None\n")
+        cluster.add_worker(PYTHONPATH=os.pathsep.join([str(tmp_path / "without"), *sys.path]))
+        monkeypatch.setattr(cluster_module, "PATIENCE", 60.0)
+        assert re.sub(r"127.0.0.1:[0-9]+ has", "WORKER has", error_of(tmp_path, capsys, *address)) == (
+            "1: error: the Dask worker tcp://WORKER has no Epicycle like this one: ?"
+        )

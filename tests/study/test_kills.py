@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -59,8 +60,13 @@ def wait_for_rows(folder: Path, process: subprocess.Popen[Any]) -> None:
         time.sleep(0.01)
 
 
-def kill_and_resume(tmp_path: Path, *, jobs: int, kills: int, replications: int, seed: int) -> None:
-    """Kill a study that often, the whole group or one of its processes, and compare it with one that was left alone."""
+def kill_and_resume(
+    tmp_path: Path, *options: object, kills: int, replications: int, seed: int, others: Callable[[], list[int]] = list
+) -> None:
+    """Kill a study that often, the whole group, one of its processes, or one of ``others`` that work for it.
+
+    Then compare it with one that was left alone.
+    """
     pause = "pause=0.05"
     write(tmp_path, STUDY.replace("replications: 5", f"replications: {replications}"))
     run_study(plan_of(tmp_path / "walks.yaml", set=(pause,)), tmp_path / "calm", jobs=2)
@@ -69,8 +75,8 @@ def kill_and_resume(tmp_path: Path, *, jobs: int, kills: int, replications: int,
 
     def next_command() -> list[str]:
         if (out / "manifest.json").is_file():
-            return command("resume", out, "--jobs", jobs)
-        return command("study", tmp_path / "walks.yaml", "--types", THIS, "--set", pause, "--out", out, "--jobs", jobs)
+            return command("resume", out, *options)
+        return command("study", tmp_path / "walks.yaml", "--types", THIS, "--set", pause, "--out", out, *options)
 
     done = 0
     finished: set[str] = set()
@@ -81,12 +87,12 @@ def kill_and_resume(tmp_path: Path, *, jobs: int, kills: int, replications: int,
                 if random.random() < 0.8:  # most of the time while it works, not while it starts
                     wait_for_rows(out, process)
                 time.sleep(float(random.uniform(0.0, 0.2)))
-                others = members(process.pid)
+                victims = [*members(process.pid), *others()]
                 done += 1
-                if random.random() < 0.5 or not others:
+                if random.random() < 0.5 or not victims:
                     break
                 with suppress(ProcessLookupError):
-                    os.kill(others[int(random.integers(len(others)))], signal.SIGKILL)
+                    os.kill(victims[int(random.integers(len(victims)))], signal.SIGKILL)
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -101,7 +107,7 @@ def kill_and_resume(tmp_path: Path, *, jobs: int, kills: int, replications: int,
 
 
 def test_nothing_is_lost(tmp_path: Path) -> None:
-    kill_and_resume(tmp_path, jobs=2, kills=2, replications=15, seed=2)
+    kill_and_resume(tmp_path, "--jobs", 2, kills=2, replications=15, seed=2)
 
 
 def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
@@ -123,5 +129,24 @@ def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_nothing_is_lost_in_twenty_kills(jobs: int, tmp_path: Path) -> None:
-    kill_and_resume(tmp_path, jobs=jobs, kills=20, replications=200, seed=jobs)
+@pytest.mark.parametrize("executor", ["local", "dask"])
+def test_nothing_is_lost_in_twenty_kills(executor: str, jobs: int, tmp_path: Path) -> None:
+    if executor == "dask":
+        pytest.importorskip("distributed")
+    kill_and_resume(tmp_path, "--executor", executor, "--jobs", jobs, kills=20, replications=200, seed=jobs)
+
+
+@pytest.mark.slow
+def test_nothing_is_lost_in_twenty_kills_on_a_cluster(tmp_path: Path) -> None:
+    """The workers of a scheduler are killed, too, and the processes that make runs for them."""
+    pytest.importorskip("distributed")
+    from dask_cluster import a_cluster
+
+    with a_cluster(tmp_path / "cluster") as cluster:
+        nannies = [cluster.add_worker("--nanny") for _ in range(2)]  # which start new workers
+
+        def others() -> list[int]:
+            return [each for nanny in nannies for each in members(nanny.pid)]
+
+        options = ("--executor", "dask", "--scheduler", cluster.address)
+        kill_and_resume(tmp_path, *options, kills=20, replications=200, seed=3, others=others)
