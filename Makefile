@@ -7,10 +7,11 @@ USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 
 .NOTPARALLEL:
-.PHONY: help run test check fuzz lint reference wheel clean
+.PHONY: help run paper test check fuzz lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
+	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
 	@echo "make lint   ruff, formatting and types"
 	@echo "make check  lint and every test, the slow ones too"
@@ -21,6 +22,10 @@ help:
 
 run: $(USE)
 	$(BIN)/epicycle run collision_avoidance --set observers=3 --set disturbance=0.25 --seed 7 --out results/collision_avoidance
+
+paper: $(USE)
+	$(BIN)/epicycle study table_1 --out results/table_1
+	$(BIN)/epicycle report results/table_1
 
 test: $(DEV)
 	$(BIN)/python -m pytest -n 2 -q

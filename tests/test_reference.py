@@ -18,9 +18,11 @@ def texts() -> dict[str, str]:
     from epicycle.runner.model.catalogue import built_in
     from epicycle.runner.model.schema import json_schema, schema_text
     from epicycle.runner.show import figure_types, markdown
+    from epicycle.runner.show.report import study_figure_types
 
-    own = built_in()
-    return dict(zip(FILES, (schema_text(json_schema(own, figure_types())), markdown(own, figure_types())), strict=True))
+    own, figures, of_studies = built_in(), figure_types(), study_figure_types()
+    schema = schema_text(json_schema(own, figures, of_studies))
+    return dict(zip(FILES, (schema, markdown(own, figures, of_studies)), strict=True))
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ returns the exit code.  Nothing heavy is imported before ``run``, so that ``--he
 
 from __future__ import annotations
 
-from . import actors, aspects, graph, models, replay, resume, run, schema, status, study, trace, validate
+from . import actors, aspects, graph, models, replay, report, resume, run, schema, status, study, trace, validate
 
-COMMANDS = (run, study, resume, status, replay, trace, validate, graph, models, actors, aspects, schema)
+COMMANDS = (run, study, resume, status, replay, report, trace, validate, graph, models, actors, aspects, schema)
 
 __all__ = ["COMMANDS"]

@@ -24,11 +24,12 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from ..model.catalogue import installed
     from ..model.schema import json_schema, schema_text
     from ..show import figure_types
+    from ..show.report import study_figure_types
 
     catalogue, errors = installed().with_types(own_types(options)).loaded()
     for error in errors:
         complain(f"warning: {error}")
-    text = schema_text(json_schema(catalogue, figure_types()))
+    text = schema_text(json_schema(catalogue, figure_types(), study_figure_types()))
     if options.out is None:
         print(text, end="")
     else:

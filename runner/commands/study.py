@@ -90,6 +90,7 @@ def seconds(text: str) -> float:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Read, try and run the study."""
+    from ..show.report import check_figures
     from ..study import Plan, available_cores, check_size, read_study
 
     check_session(options)
@@ -98,6 +99,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     if options.replications is not None and study.until is not None:
         complain(f"{study.name} decides itself how many replications it needs: --replications counts for nothing")
     plan = Plan.made(study)
+    check_figures(plan)
     if not options.yes:
         check_size(plan, options.jobs or available_cores())
     return session(plan, options.out or Path("results") / study.name, options)

@@ -39,6 +39,7 @@ def check_study(options: argparse.Namespace) -> int:
     """Load the model at every level of what the study varies."""
     from epicycle.actors import EpicycleError, counted
 
+    from ..show.report import check_figures
     from ..study import Plan, read_study
 
     for option in ("overrides", "disturb", "aspect", "without"):
@@ -46,6 +47,7 @@ def check_study(options: argparse.Namespace) -> int:
             raise EpicycleError(f"--{option} is for models: a study says itself what it changes")
     types = [Path(file) for file in options.types]
     plan = Plan.made(read_study(options.model, set=options.set, types=types))
+    check_figures(plan)
     print(
         f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
         f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"

@@ -42,6 +42,7 @@ STUDY_KEYS = (
     "metrics",
     "claims",
     "guideline",
+    "figures",
 )
 RANGE_KEYS = ("from", "to", "step")
 HYPERCUBE_KEYS = ("size", "seed", "ranges")

@@ -86,6 +86,7 @@ class Elaborator(AspectElaborator):
         model.graph, model.aspects = self.graph, self.aspects
         model.warnings = self.problems.warnings
         model.parameters = {name: _shown(value, root.parameters[name].unit) for name, value in names.items()}
+        model.declared = {name: (text.unit, text.doc) for name, text in root.parameters.items()}
         Observation(model, self.values, self.problems).read(self.text, names)
         for name, part in self.text.figures.items():
             values = {

@@ -55,6 +55,7 @@ class Model(Scope):
         self.graph = ModelGraph()
         self.scopes = Scopes(self)
         self.parameters: dict[str, object] = dict(parameters or {})
+        self.declared: dict[str, tuple[str, str]] = {}  # unit and doc of the parameters
         self.aspects: list[WovenAspect] = []
         self.stop_time: int | None = None  # ns
         self.stop_ports: list[str] = []

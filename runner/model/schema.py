@@ -40,10 +40,14 @@ PATTERN = f"^{_PATH}$"
 POINTCUT = rf"^\s*!?\s*{_PATH}(\s*->\s*{_PATH})?\s*$"
 
 
-def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]]) -> Schema:
+def json_schema(
+    catalogue: Catalogue,
+    figures: Mapping[str, type[Configurable]],
+    study_figures: Mapping[str, type[Configurable]],
+) -> Schema:
     """The schema of model files, of files of composites that are included, of disturbances, and of studies."""
     actors, aspects = dict(sorted(catalogue.actors.items())), dict(sorted(catalogue.aspects.items()))
-    parts = parts_of([*actors.values(), *aspects.values(), *figures.values()])
+    parts = parts_of([*actors.values(), *aspects.values(), *figures.values(), *study_figures.values()])
     definitions: Schema = {
         "name": {"type": "string", **text(f"^{NAME}$", "a name has letters, digits and _, no digit first")},
         "text": TEXT,
@@ -75,11 +79,13 @@ def json_schema(catalogue: Catalogue, figures: Mapping[str, type[Configurable]])
         "aspect": _typed(aspects, "aspect", Aspect.reserved, ("type", "at"), open_to=f"^{NAME}(\\.{NAME})?$"),
         "added_aspect": _typed(aspects, "aspect", Aspect.reserved, open_to=f"^{NAME}(\\.{NAME})?$"),
         "figure": _typed(figures, "figure", frozenset({"type"})),
+        "study_figure": _typed(study_figures, "study_figure", frozenset({"type"})),
     }
     for kind, types, reserved in (
         ("actor", actors, Actor.reserved),
         ("aspect", aspects, Aspect.reserved),
         ("figure", figures, frozenset({"type"})),
+        ("study_figure", study_figures, frozenset({"type"})),
     ):
         for name, cls in types.items():
             definitions[f"{kind}.{name}"] = _type(name, cls, reserved)
@@ -350,7 +356,7 @@ def _typed(
     beside = {key: _beside(key) for key in sorted(reserved - {"type"})}
     return {
         "type": "object",
-        "properties": {"type": {**choice, "description": f"The type of the {kind}."}, **beside},
+        "properties": {"type": {**choice, "description": f"The type of the {kind.replace('_', ' ')}."}, **beside},
         "required": list(required),
         "allOf": _by_type(types, kind),
     }

@@ -90,6 +90,10 @@ _STUDY: dict[str, tuple[Schema, str]] = {
         },
         "Hypotheses on the results, by name; or the study whose claims are judged here, too.",
     ),
+    "figures": (
+        {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": ref("study_figure")},
+        "What the report shows: 'name: {type, ...}' (default: means and distributions of all metrics).",
+    ),
     "guideline": (
         {
             **mapping(language.GUIDELINE_KEYS, _GUIDELINE, None),

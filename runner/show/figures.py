@@ -66,7 +66,7 @@ class Trajectories(Figure):
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
         scale = min(6.5 / (right - left), 5.0 / (high - low))
         canvas.set_size_inches(max(1.5, scale * (right - left)) + 1.0, max(1.5, scale * (high - low)) + 0.8)
-        canvas.savefig(path, dpi=200, bbox_inches="tight")
+        save(canvas, path)
 
     def _path(self, axes: Any, signal: Signal, colour: str, *, main: bool, legend: bool) -> None:
         points = positions(signal)
@@ -166,7 +166,7 @@ class TimeSeries(Figure):
         axes.set_xlim(0.0 if self.start is None and self.end is not None else self.start, self.end)
         if len(lines) > 1:
             axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, fontsize=8, frameon=False)
-        canvas.savefig(path, dpi=200, bbox_inches="tight")
+        save(canvas, path)
 
 
 class Histogram(Figure):
@@ -195,7 +195,7 @@ class Histogram(Figure):
         axes.set_xlabel(self.label or (next(iter(columns)) if len(columns) == 1 else ""))
         axes.set_ylabel("share per unit")
         axes.legend(fontsize=8, frameon=False)
-        canvas.savefig(path, dpi=200, bbox_inches="tight")
+        save(canvas, path)
 
 
 def _selected(patterns: tuple[str, ...], results: Results) -> list[str]:
@@ -226,6 +226,15 @@ def _sheet(results: Results, width: float, height: float) -> tuple[Any, Any]:
     axes.set_axisbelow(True)
     axes.set_title(f"{results.model}, seed {results.seed}, {results.end:g} s", fontsize=10)
     return canvas, axes
+
+
+def save(canvas: Any, path: Path) -> None:
+    """Write a matplotlib figure so that the same one gives the same file."""
+    import matplotlib
+
+    with matplotlib.rc_context({"svg.hashsalt": "epicycle"}):
+        metadata = {"Date": None} if path.suffix == ".svg" else {}
+        canvas.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)
 
 
 def positions(signal: Signal) -> NDArray[np.float64]:

@@ -131,10 +131,13 @@ and `epicycle aspects` print the same for what is installed, with the types of o
 """
 
 
-def markdown(catalogue: Catalogue, figures: Mapping[str, type[Figure]]) -> str:
+def markdown(
+    catalogue: Catalogue, figures: Mapping[str, type[Figure]], study_figures: Mapping[str, type[Configurable]]
+) -> str:
     """The whole reference as a Markdown document."""
     lines = [INTRODUCTION]
     every: list[type[Configurable]] = [*catalogue.actors.values(), *catalogue.aspects.values(), *figures.values()]
+    every += study_figures.values()
     actors, aspects = described(catalogue.actors), described(catalogue.aspects)
     for title, references in (("Actors", actors), ("Aspects", aspects)):
         lines.append(f"## {title}\n")
@@ -147,8 +150,9 @@ def markdown(catalogue: Catalogue, figures: Mapping[str, type[Figure]]) -> str:
             f"## {base}\n\nThe value of a parameter, such as `{{type: {known[0].name}, ...}}`.\n" if known else ""
         )
         lines += [block for each in known for block in _markdown(each)]
-    lines.append("## Figures\n")
-    lines += [block for each in described(figures) for block in _markdown(each)]
+    for title, types in (("Figures", figures), ("Figures of studies", study_figures)):
+        lines.append(f"## {title}\n")
+        lines += [block for each in described(types) for block in _markdown(each)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

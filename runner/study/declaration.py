@@ -12,7 +12,7 @@ from typing import Any
 from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
 
 from ..model import Position, Problems, did_you_mean
-from ..model.declarations import HYPERCUBE_KEYS, RANGE_KEYS, STUDY_KEYS, UNTIL_KEYS
+from ..model.declarations import HYPERCUBE_KEYS, RANGE_KEYS, STUDY_KEYS, UNTIL_KEYS, DeclarationReader, PartText
 from ..model.disturbance import find_disturbance
 from ..model.document import Entry, Mapping, Node, Scalar, Sequence, parse, read
 from ..model.observation import MAX_SEED
@@ -57,6 +57,7 @@ class Study:
     paired: bool = True
     until: Until | None = None
     metrics: list[StudyMetric] | None = None  # None: all of the model
+    figures: dict[str, PartText] | None = None  # None: those that suit the table
     questions: Questions = field(default_factory=Questions)
     changes: tuple[str, ...] = ()  # --set, as given
     types: tuple[Path, ...] = ()
@@ -196,6 +197,10 @@ class _StudyReader(NodeReader):
             study.metrics = self.metrics(entries["metrics"].value)
         if "until" in entries:
             study.until = self.until(entries["until"].value, study)
+        if "figures" in entries:
+            reader = DeclarationReader(self.problems)
+            parts = (reader.part(name, entry, "figure") for name, entry in self.named(entries, "figures"))
+            study.figures = {part.name: part for part in parts if part is not None}
         before = len(self.problems)
         self.columns(study)
         if len(self.problems) == before:

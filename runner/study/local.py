@@ -65,17 +65,14 @@ class LocalExecutor:
         self._jobs = jobs
         self._timeout = timeout
         self._writer = Writer(store)
-        method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-        self._context: Any = multiprocessing.get_context(method)
-        if method == "forkserver":
-            self._context.set_forkserver_preload(_IMPORTED)
+        self._context = process_context()
         self._workers: list[_Worker] = []
         self._stillborn = 0
 
     def run(self, schedule: Schedule, tell: Callable[[], None]) -> None:
         """Make all runs; ``tell`` is called now and then.  Raises ``WriteError`` and ``WorkerError``."""
         try:
-            with _one_thread():
+            with one_thread():
                 self._run(schedule, tell)
             with writing(self._store.folder):
                 self._writer.flush()
@@ -182,8 +179,17 @@ class LocalExecutor:
                 each.process.join()
 
 
+def process_context() -> Any:
+    """How processes of this machine are started, so that each begins with what all need."""
+    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    context: Any = multiprocessing.get_context(method)
+    if method == "forkserver":
+        context.set_forkserver_preload(_IMPORTED)
+    return context
+
+
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def one_thread() -> Iterator[None]:
     """Pin what the workers inherit."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
 from pathlib import Path
@@ -16,6 +16,7 @@ from ..model.document import plain
 from ..model.files import Noted, noting
 from ..model.own_types import types_of_file
 from ..model.settings import Setting
+from .columns import Column, columns_of, columns_of_manifest
 from .declaration import RESERVED, Study, study_of_text
 from .dimensions import Factor, Level
 from .metrics import StudyMetric
@@ -57,6 +58,7 @@ class Plan:
         sources: Sources,
         extra: list[dict[int, Sources]],
         texts: dict[str, str],
+        columns: dict[str, Column],
         files: Iterable[str] = (),
     ) -> None:
         self.study = study
@@ -64,6 +66,7 @@ class Plan:
         self.sources = sources
         self.texts = texts  # the YAML of the model and of all that belongs to it
         self.files = tuple(files)  # all that were read, by the names by which they were
+        self.columns = columns
         self._extra = extra  # by dimension, the files that single levels read beside the others
         self._sizes = [dimension.size for dimension in study.dimensions]
         self.conditions = prod(self._sizes)
@@ -108,7 +111,8 @@ class Plan:
             )
         study.questions.check([metric.name for metric in metrics], problems)
         problems.raise_if_any()
-        return cls(study, metrics, sources, extra, read.texts, read.files)
+        columns = columns_of(study.dimensions, metrics, read.models[0])
+        return cls(study, metrics, sources, extra, read.texts, columns, read.files)
 
     @classmethod
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
@@ -123,7 +127,8 @@ class Plan:
         )
         metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
         extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
-        return cls(study, metrics, manifest["sources"], extra, manifest["model"])
+        columns = columns_of_manifest(manifest)
+        return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns)
 
     def manifest(self) -> dict[str, Any]:
         """What ``of_manifest`` needs."""
@@ -138,6 +143,7 @@ class Plan:
             "lender": study.questions.lender,
             "factors": study.factors,
             "metrics": {metric.name: metric.source for metric in self.metrics},
+            "columns": {name: asdict(column) for name, column in self.columns.items()},
             "model": self.texts,
             "sources": self.sources,
             "level_sources": [{str(index): found for index, found in each.items()} for each in self._extra],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections import Counter
 from dataclasses import asdict
@@ -41,6 +43,12 @@ class StudyResults:
         self._store = Store(folder)
         self.manifest = self._store.manifest
         self.plan = Plan.of_manifest(self.manifest)
+        self._frozen: pa.Table | None = None
+
+    def freeze(self) -> StudyResults:
+        """Keep to the rows that are there now, however many may come; reading is quicker then.  Returns itself."""
+        self._frozen = self.table(times=True)
+        return self
 
     @property
     def factors(self) -> list[str]:
@@ -58,6 +66,10 @@ class StudyResults:
         Without times the table of a study is the same bit for bit, whatever happened while it was made.  Rows of runs
         that the study no longer has, as its file or model has changed, are left out.
         """
+        table = self._frozen if self._frozen is not None else self._read()
+        return table if times else table.drop_columns(list(TIMES))
+
+    def _read(self) -> pa.Table:
         import pyarrow as pa
         import pyarrow.compute as pc
 
@@ -79,7 +91,7 @@ class StudyResults:
                 for name in ("condition", "replication")
             )
             table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
-        return table.drop_columns(["_rank", *(() if times else TIMES)]).combine_chunks().replace_schema_metadata(None)
+        return table.drop_columns(["_rank"]).combine_chunks().replace_schema_metadata(None)
 
     def _order(self, table: pa.Table) -> dict[str, int]:
         """The numbers of the plan's conditions by their keys; a plan may be too large to be gone through."""
@@ -88,6 +100,14 @@ class StudyResults:
             if (index := self.plan.find(row["condition"], row)) is not None:
                 found[row["condition"]] = index
         return found
+
+    def digest(self) -> str:
+        """SHA-256 of all rows, by which tables are told apart: the same wherever and however often they are made."""
+        digest = hashlib.sha256()
+        for batch in self.table().to_batches():
+            for row in batch.to_pylist():
+                digest.update(json.dumps(row).encode())
+        return digest.hexdigest()
 
     def counts(self) -> Counter[str]:
         """How many runs are over, by status."""

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,7 @@ def manifest_of(plan: Plan) -> dict[str, Any]:
         "versions": versions(),
         "machine": machine(),
         "git": git_revision(study.path.resolve().parent),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 

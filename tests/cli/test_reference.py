@@ -135,13 +135,15 @@ def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None
     found = json.loads(printed(capsys, "aspects", "collision_avoidance", *options, "--json"))
     assert {port: [each[:2] for each in aspects] for port, aspects in found.items()} == {
         "main.peer_measurement": [["packet_loss", "PacketLoss"]],
-        "main.peer_plan": [["packet_loss", "PacketLoss"], ["late", "Latency"]],
+        "main.peer_plan": [["plans_due", "Count"], ["packet_loss", "PacketLoss"], ["late", "Latency"]],
+        "main.controller.peer_plans": [["plans_heard", "Count"]],
         "main.sensor.measurement": [["measurement_failure", "MeasurementFailure"]],
     }
     rows = [line.split() for line in printed(capsys, "aspects", "collision_avoidance", *options).splitlines()]
-    assert [row[:4] for row in rows[2:4]] == [
-        ["main.peer_plan", "1", "packet_loss", "PacketLoss"],
-        ["2", "late", "Latency", "delay:"],
+    assert [row[:4] for row in rows[2:5]] == [
+        ["main.peer_plan", "1", "plans_due", "Count"],
+        ["2", "packet_loss", "PacketLoss", "probability:"],
+        ["3", "late", "Latency", "delay:"],
     ]
 
 

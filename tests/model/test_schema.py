@@ -35,6 +35,7 @@ from epicycle.runner.model.schema import CONNECTION, PATTERN, QUANTITY, RULES, j
 from epicycle.runner.model.schema import _value as value_schema
 from epicycle.runner.model.wiring import _ENDPOINT as ENDPOINT
 from epicycle.runner.show import figure_types
+from epicycle.runner.show.report import study_figure_types
 
 sys.path.insert(0, str(Path(__file__).parent))
 from model_parts import TYPES
@@ -62,7 +63,7 @@ NOT_SHAPE = re.compile(
 @cache
 def validator() -> Draft202012Validator:
     """For Epicycle's own types."""
-    return Draft202012Validator(json_schema(built_in(), figure_types()))
+    return Draft202012Validator(json_schema(built_in(), figure_types(), study_figure_types()))
 
 
 def document(text: str) -> Any:
@@ -109,7 +110,7 @@ def test_models_of_the_documents_validate(path: Path) -> None:
 def validator_of_bad_models() -> Draft202012Validator:
     """For the types that the bad models name."""
     catalogue = Catalogue({}, {"PacketLoss": PacketLoss, "MeasurementFailure": MeasurementFailure})
-    return Draft202012Validator(json_schema(catalogue.with_types(TYPES), figure_types()))
+    return Draft202012Validator(json_schema(catalogue.with_types(TYPES), figure_types(), study_figure_types()))
 
 
 @pytest.mark.parametrize(("options", "model", "message"), CASES)

@@ -22,6 +22,7 @@ from epicycle.runner.model.catalogue import built_in
 from epicycle.runner.model.document import parse, plain
 from epicycle.runner.model.schema import json_schema
 from epicycle.runner.show import figure_types
+from epicycle.runner.show.report import check_figures, study_figure_types
 
 sys.path.insert(0, str(Path(__file__).parent))
 from study_parts import STUDY, plan_of, write
@@ -38,7 +39,7 @@ def message(options: str, study: str) -> str:
     write(Path("."), study)
     (Path("gusts.yaml")).write_text("disturbance: gusts\nset: {dirft: 1}\n", encoding="utf-8")
     try:
-        plan_of(Path("walks.yaml"), set=tuple(options.replace("$ ", "").splitlines()))
+        check_figures(plan_of(Path("walks.yaml"), set=tuple(options.replace("$ ", "").splitlines())))
     except ModelError as error:
         return LISTS.sub(r"\1...", str(error)) + "\n"
     return "nothing\n"
@@ -102,7 +103,7 @@ def test_schema_refuses_what_is_misshapen() -> None:
         assert node is not None
         return plain(node)
 
-    validator = Draft202012Validator(json_schema(built_in(), figure_types()))
+    validator = Draft202012Validator(json_schema(built_in(), figure_types(), study_figure_types()))
     refused = [name for name, _, study, _ in CASES if not validator.is_valid(document(study))]
     assert [name for name in SHAPES if name not in refused] == []
     said = {name: message for name, _, _, message in CASES}

@@ -1,0 +1,137 @@
+"""The last sections of a report: what came of the claims, and what to choose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from epicycle.actors import counted
+
+from ...study.claims import CONFIRMED, REVERSED, UNDECIDED, Finding, Judgement
+from ...study.guideline import Recommendation
+from ...study.questions import ALWAYS
+from .data import Data, Names, shown
+from .html import Content, Html, table, tag, with_class
+from .numbers import estimated, rounded
+
+
+def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
+    """The verdict of each claim, and all comparisons behind it."""
+    if not judgements:
+        return
+    apart = list(judgements[0].where)
+    head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
+    yield with_class(
+        table(
+            head,
+            [
+                [
+                    *(shown(level) for level in each.where.values()),
+                    tag("b", each.name),
+                    [each.claim.doc, " ", tag("small", each.claim.statement)],
+                    tag("b", each.verdict, class_=each.verdict.replace(" ", "-")),
+                    *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
+                ]
+                for each in judgements
+            ],
+            names=len(apart) + 1,
+        ),
+        "words",
+    )
+    yield tag(
+        "p",
+        "A comparison is a mean of differences between runs of the same replication, with Student's 95 % interval; the "
+        "p-values of one claim are corrected together (Holm). It is confirmed or reversed if the corrected p-value is "
+        "below 0.05, and no more than one run in twenty is missing; otherwise undecided.",
+        class_="note",
+    )
+    for each in judgements:
+        place = data.names.place(each.where)
+        title = f"{each.name}{f' ({place})' if place else ''}: {each.verdict}"
+        yield tag(
+            "details",
+            tag("summary", f"{title}, {counted(len(each.findings), 'comparison')}"),
+            _findings(data.names, each),
+        )
+
+
+def _findings(names: Names, judgement: Judgement) -> Html:
+    is_rate = judgement.claim.form == ALWAYS
+    head = ["comparison", "share of runs" if is_rate else "difference", "95 % interval", "runs" if is_rate else "pairs"]
+    rows = [
+        [
+            _compared(names, judgement, each),
+            _value(each),
+            "–"
+            if math.isnan(each.low)
+            else " to ".join(rounded(end, each.high - each.low) for end in (each.low, each.high)),
+            f"{each.count}{f' ({each.missing} missing)' if each.missing else ''}",
+            *([] if is_rate else ["–" if math.isnan(each.p_holm) else f"{each.p_holm:.2g}"]),
+            tag("span", each.outcome, class_={CONFIRMED: "reproduced", REVERSED: "not-reproduced"}.get(each.outcome)),
+        ]
+        for each in judgement.findings
+    ]
+    return tag("div", table([*head, *([] if is_rate else ["p (Holm)"]), "outcome"], rows), class_="scroll")
+
+
+def _compared(names: Names, judgement: Judgement, finding: Finding) -> str:
+    claim, where = judgement.claim, names.place(finding.where)
+    if claim.form == ALWAYS:
+        return where or "all runs"
+    what = names.axis(finding.metric)
+    if claim.per:
+        what = f"slope of {names.words(finding.metric)} over {names.words(claim.per)}"
+    pair = f"{what}, {names.place(finding.level)} less {names.place(finding.against)}"
+    return f"{pair}; {where}" if where else pair
+
+
+def _value(finding: Finding) -> str:
+    if not finding.count:
+        return "–"
+    return rounded(finding.value, finding.high - finding.low)
+
+
+def guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:
+    """What to choose in each case, and how sure that is."""
+    if not found:
+        return
+    names = data.names
+    asked = data.plan.study.questions.guideline
+    choose, metric = names.words(found[0].choose), names.words(found[0].metric)
+    which = "greatest" if asked is not None and asked.greatest else "least"
+    tolerance = asked.tolerance if asked is not None else 0.0
+    unit = names.unit(found[0].metric)
+    yield tag("p", f"Which {choose} make the mean {metric} {which}:", class_="label")
+    head = [*map(names.axis, found[0].where), f"best {choose}", f"mean {names.axis(found[0].metric)}"]
+    yield tag(
+        "div",
+        table(
+            [*head, "confidence", "not worse", "enough"],
+            [_row(each) for each in found],
+            names=len(found[0].where),
+        ),
+        class_="scroll",
+    )
+    yield tag(
+        "p",
+        f"best: the {which} mean. confidence: how often it is the best if the replications are drawn anew. not worse: "
+        "no other is significantly better, and the truly best is among these with a confidence of 95 %. enough: the "
+        "first of these in the order of the study"
+        + (f", or of those within {tolerance:g}{f' {unit}' if unit else ''} of the best." if tolerance else "."),
+        class_="note",
+    )
+
+
+def _row(each: Recommendation) -> list[Content]:
+    best = next((option for option in each.options if option.is_fit and option.level == each.best), None)
+    where = [shown(level) for level in each.where.values()]
+    if best is None:
+        return [*where, "–", "too few runs have a number", "", "", ""]
+    return [
+        *where,
+        tag("b", shown(each.best)),
+        estimated(best.estimate),
+        f"{each.confidence:.0%}",
+        ", ".join(map(shown, each.not_worse)),
+        shown(each.sufficient),
+    ]

@@ -1,0 +1,192 @@
+"""Figures of a study: what its ``figures`` may ask for, and what they have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, ClassVar
+
+from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
+
+from ...engine import Results
+from ...model import Model
+from ...study import Plan
+from ...study.dimensions import Dimension, Factor
+from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
+from .style import MAX_LINES, MAX_PANELS
+
+RunKey = tuple[int, int]  # a condition's number, and a replication
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """What is wrong with a figure: a parameter (and the ``key`` within), what is said of it, and what to do."""
+
+    parameter: str
+    message: str
+    help: str = ""
+    key: str = ""
+
+
+@dataclass
+class Roles:
+    """What each factor is for in a figure: along the axis, a line, a panel."""
+
+    over: str | None
+    lines: str | None
+    panels: tuple[str, ...]
+
+
+class StudyFigure(Configurable):
+    """Base of the figures of a study: declare parameters, write ``draw``."""
+
+    reserved: ClassVar[frozenset[str]] = frozenset({"type"})
+
+    doc = Parameter(str, "", doc="what the figure shows, for the line under it")
+    where: Parameter[Mapping[str, Any]] = MappingParameter(
+        Parameter(object), {}, doc="levels to which the figure keeps, such as {load: 0.5} or {load: [0.5, 0.9]}"
+    )
+    labels: Parameter[Mapping[str, str]] = MappingParameter(
+        Parameter(str), {}, doc="what metrics and factors are called in it, without their units"
+    )
+
+    def check(self, plan: Plan) -> Iterator[Complaint]:
+        """What is wrong with the figure in this study."""
+        yield from unknown("where", list(self.where), list(plan.study.factors), "factor")
+        for name, wanted in self.where.items():
+            dimension = _dimension_of(plan, name)
+            if dimension is None:
+                continue
+            for level in wanted if isinstance(wanted, list) else [wanted]:
+                if not _has(dimension, name, level):
+                    message = f"{name} never is {shown(level)}"
+                    yield Complaint("where", message, f"it is {_listed(dimension, name)}", name)
+        columns = [*plan.study.factors, *(metric.name for metric in plan.metrics)]
+        yield from unknown("labels", list(self.labels), columns, "column")
+
+    def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
+        """Write the figure to the files, and return what is to be said of it; ``extracts`` are of repeated runs."""
+        raise NotImplementedError
+
+    def conditions(self, data: Data) -> list[Condition]:
+        """The conditions to which the figure keeps."""
+        return data.where(self.where)
+
+    def names(self, data: Data) -> Names:
+        """How it calls columns."""
+        return data.names.called(self.labels)
+
+
+class SignalFigure(StudyFigure):
+    """Base of the figures that are drawn from signals: a study keeps none, but runs can be repeated."""
+
+    def runs_of(self, data: Data) -> list[RunKey]:
+        """The runs that it wants to be repeated."""
+        raise NotImplementedError
+
+    def ports(self, model: Model) -> tuple[str, ...]:
+        """The output ports that are to be recorded in these, as patterns."""
+        raise NotImplementedError
+
+    def extract(self, model: Model, results: Results) -> Any:
+        """What it needs of one of them, as plain data; called in the process that has made the run."""
+        raise NotImplementedError
+
+    def check_model(self, model: Model) -> Iterator[Complaint]:
+        """What is wrong with it in this model, its signals apart."""
+        yield from ()
+
+
+def unknown(parameter: str, names: Sequence[str], known: Sequence[str], noun: str) -> Iterator[Complaint]:
+    """Complaints about names that the study does not have."""
+    for name in names:
+        if name not in known:
+            message = f"the study has no {noun} {name!r}{did_you_mean(name, known)}"
+            yield Complaint(parameter, message, f"its {noun}s: {', '.join(known) or 'none'}", name)
+
+
+def _dimension_of(plan: Plan, factor: str) -> Dimension | None:
+    return next((each for each in plan.study.dimensions if factor in each.columns), None)
+
+
+def _has(dimension: Dimension, factor: str, level: Any) -> bool:
+    try:
+        if len(dimension.columns) == 1:
+            return dimension.find({factor: level}) is not None
+        return any(dimension.level(index).values[factor] == level for index in range(dimension.size))
+    except (TypeError, ValueError):
+        return False
+
+
+def _listed(dimension: Dimension, factor: str) -> str:
+    few = range(min(dimension.size, MAX_LISTED))
+    texts = list(dict.fromkeys(shown(dimension.level(index).values[factor]) for index in few))
+    return ", ".join(texts) + (", ..." if dimension.size > MAX_LISTED else "")
+
+
+# -- panels and lines -------------------------------------------------------------------------------------------------
+
+
+def roles(
+    plan: Plan, fixed: Mapping[str, Any], over: str | None, lines: str | None, panels: Sequence[str], *, has_axis: bool
+) -> Roles:
+    """What each factor is for: as it is said, otherwise the first numbers are along the axis, the next factor makes
+    lines, and all others panels.  Columns that vary together count once."""
+    said = [name for name in (over, lines, *panels) if name]
+    free = []
+    for dimension in plan.study.dimensions:
+        names = list(dimension.columns)
+        settled = any(name in fixed and not isinstance(fixed[name], list) for name in names)
+        if not settled and not set(names) & set(said):
+            free.append(names[0])
+    if has_axis and over is None and free:
+        over = next((name for name in free if is_numeric(plan, name)), free[0])
+        free.remove(over)
+    if lines is None and free:
+        lines = free.pop(0)
+    return Roles(over, lines, (*panels, *free))
+
+
+@dataclass
+class Panel:
+    """One panel: its conditions, by the level of its lines."""
+
+    title: str
+    lines: dict[Factor, list[Condition]]
+
+
+@dataclass
+class Layout:
+    """All panels, what their lines are, and what had to be left out of them."""
+
+    panels: list[Panel]
+    levels: list[Factor]
+    omitted: str
+    columns: int | None
+
+
+def layout(data: Data, figure: StudyFigure, found: Roles) -> Layout:
+    """Sort conditions into panels and lines; more than can be told apart are left out, and it is said."""
+    names, chosen = figure.names(data), figure.conditions(data)
+    levels: list[Factor] = data.levels(found.lines, chosen, figure.where) if found.lines else [None]
+    choices = [data.levels(name, chosen, figure.where) for name in found.panels]
+    panels = []
+    for combination in product(*choices):
+        place = dict(zip(found.panels, combination, strict=True))
+        here = [each for each in chosen if all(each.values[name] == level for name, level in place.items())]
+        if here:
+            by_line = {
+                level: [each for each in here if not found.lines or each.values[found.lines] == level]
+                for level in levels[:MAX_LINES]
+            }
+            panels.append(Panel(names.place(place), by_line))
+    omitted = []
+    if len(levels) > MAX_LINES:
+        omitted.append(f"Of {len(levels)} lines the first {MAX_LINES} are shown.")
+    if len(panels) > MAX_PANELS:
+        omitted.append(f"Of {counted(len(panels), 'panel')} the first {MAX_PANELS} are shown.")
+    # Two factors make rows and columns.
+    columns = len(choices[1]) if len(choices) == 2 and 1 < len(choices[1]) <= 4 else None
+    return Layout(panels[:MAX_PANELS], levels[:MAX_LINES], " ".join(omitted), columns)

@@ -1,0 +1,313 @@
+"""Figures of signals of a study: runs are repeated for them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.actors import (
+    EpicycleError,
+    MappingParameter,
+    Parameter,
+    array_parameter,
+    counted,
+    did_you_mean,
+    texts_parameter,
+)
+from epicycle.actors.expression import PortFormula, PortFormulaParameter
+
+from ...engine import Results
+from ...model import Model, Problems
+from ...model.patterns import select
+from ...study import Plan
+from ...study.statistics import half_width
+from ..drawing import figures_of
+from ..figures import Figure, positions
+from .data import Condition, Data
+from .figure import Complaint, Layout, Roles, RunKey, SignalFigure, layout, roles, unknown
+from .style import DASHES, FORMATS, PALETTE, Sheet
+
+TOKEN = "token"
+MOST, LEAST = "most", "least"
+_GRID = 400  # points of a mean over time, where tokens come at more times than that
+_FEWEST = 0.5  # share of the runs that a mean over time needs
+
+
+class RepeatedFigure(SignalFigure):
+    """Base of the figures that show the first runs of each condition, in lines or panels."""
+
+    runs = Parameter(int, 10, min=1, max=10_000, doc="how many runs of each condition are shown, from the first one on")
+    panels = texts_parameter((), doc="factors with a panel for each level; all that are left, if left out")
+
+    def check(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().check(plan)
+        yield from unknown("panels", self.panels, list(plan.study.factors), "factor")
+
+    def runs_of(self, data: Data) -> list[RunKey]:
+        return [run for condition in self.shown(data) for run in self._first(condition)]
+
+    def shown(self, data: Data) -> list[Condition]:
+        """The conditions that are in some panel."""
+        arranged, _ = self.arranged(data)
+        return [each for panel in arranged.panels for line in panel.lines.values() for each in line]
+
+    def arranged(self, data: Data) -> tuple[Layout, Roles]:
+        """Panels and lines."""
+        raise NotImplementedError
+
+    def _first(self, condition: Condition) -> list[RunKey]:
+        return [(condition.index, row["replication"]) for row in condition.good[: self.runs]]
+
+
+class Series(RepeatedFigure):
+    """A number over time: its mean over runs with the 95 % interval of the mean (Student) as a band.
+
+    Of a run that is over nothing is known any more; the mean is drawn as long as half of the runs go on.
+    """
+
+    signal = Parameter(str, doc="an output port")
+    value = PortFormulaParameter(TOKEN, given=(TOKEN,), doc="the number as an expression over its token: token.speed")
+    label = Parameter(str, "", doc="what the number is, with its unit; the expression if left out")
+    lines: Parameter[str | None] = Parameter(
+        str, None, doc="factor with a line for each level; the next one if left out"
+    )
+
+    def check(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().check(plan)
+        yield from unknown("lines", [self.lines] if self.lines else [], list(plan.study.factors), "factor")
+        if self._formula.references:
+            yield Complaint("value", f"{self._formula.references[0]!r} is no part of the token", "write 'token.name'")
+
+    @property
+    def _formula(self) -> PortFormula:
+        assert self.value is not None
+        return self.value
+
+    def ports(self, model: Model) -> tuple[str, ...]:
+        return (self.signal,)
+
+    def extract(self, model: Model, results: Results) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Times, values, and when the run was over."""
+        signal = results[self.signal]
+        values = []
+        for token in signal.tokens:
+            value = self._formula((), token=token)
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise EpicycleError(f"{self._formula.source!r} is no number for a token of {self.signal}: {value!r}")
+            values.append(float(value))
+        return signal.times, np.array(values), results.end
+
+    def arranged(self, data: Data) -> tuple[Layout, Roles]:
+        found = roles(data.plan, self.where, None, self.lines, self.panels, has_axis=False)
+        return layout(data, self, found), found
+
+    def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
+        names = self.names(data)
+        arranged, found = self.arranged(data)
+        sheet = Sheet(
+            [panel.title for panel in arranged.panels] or [""], columns=arranged.columns, same_x=True, same_y=True
+        )
+        handles: dict[str, Any] = {}
+        for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
+            for number, (level, conditions) in enumerate(panel.lines.items()):
+                runs = [extracts[run] for condition in conditions for run in self._first(condition)]
+                times, means, halves = over_time(runs)
+                if not len(times):
+                    continue
+                look = {"color": PALETTE[number], "linestyle": DASHES[number]}
+                (line,) = axes.plot(times, means, **look)
+                axes.fill_between(times, means - halves, means + halves, color=PALETTE[number], alpha=0.18, linewidth=0)
+                if found.lines:
+                    handles.setdefault(names.level(found.lines, level), line)
+        sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
+        sheet.legend(list(handles.values()), list(handles), names.axis(found.lines) if found.lines else "")
+        sheet.save(paths)
+        said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"
+        return f"{said}, as long as half of them go on. {arranged.omitted}".rstrip()
+
+
+def over_time(
+    runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Times, means and half widths of their intervals; between two tokens of a run the first one holds."""
+    begun = [each for each in runs if len(each[0])]
+    if not begun:
+        return np.empty(0), np.empty(0), np.empty(0)
+    times = np.unique(np.concatenate([each[0] for each in begun]))
+    if len(times) > _GRID:
+        times = np.linspace(times[0], times[-1], _GRID)
+    columns = np.full((len(begun), len(times)), np.nan)
+    for row, (at, values, end) in zip(columns, begun, strict=True):
+        place = np.searchsorted(at, times, side="right") - 1
+        is_known = (place >= 0) & (times <= end)
+        row[is_known] = values[place[is_known]]
+    known = (~np.isnan(columns)).sum(axis=0)
+    kept = known >= max(1.0, _FEWEST * len(runs))
+    means, halves = [], []
+    for column in columns.T[kept]:
+        values = column[~np.isnan(column)].tolist()
+        means.append(sum(values) / len(values))
+        halves.append(half_width(values) if len(values) > 1 else 0.0)
+    return times[kept], np.array(means), np.array(halves)
+
+
+class Tracks(RepeatedFigure):
+    """The ways of moving things, the first runs of a condition in one panel, in the manner of the paper's Fig. 6.
+
+    Signals are of states with a ``position``; a circle is where a way begins.
+    """
+
+    signals = texts_parameter(doc="signals of the states whose ways are shown (patterns)")
+    around = texts_parameter((), doc="signals of further states, of the first run alone, as dashed lines (patterns)")
+    marks: Parameter[Mapping[str, Any]] = MappingParameter(
+        array_parameter((2,), unit="m"), {}, doc="places by what they are called, such as {goal: [0, 0]}"
+    )
+
+    def ports(self, model: Model) -> tuple[str, ...]:
+        return (*self.signals, *self.around)
+
+    def extract(self, model: Model, results: Results) -> dict[str, list[tuple[str, NDArray[np.float64]]]]:
+        """Signals and ways, by what they are shown as."""
+        return {
+            kind: [
+                (name, _way(results, name))
+                for name in dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals))
+            ]
+            for kind, patterns in (("ways", self.signals), ("around", self.around))
+        }
+
+    def arranged(self, data: Data) -> tuple[Layout, Roles]:
+        found = roles(data.plan, self.where, None, None, self.panels, has_axis=False)
+        found = Roles(None, None, (*([found.lines] if found.lines else []), *found.panels))
+        return layout(data, self, found), found
+
+    def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
+        arranged, _ = self.arranged(data)
+        columns = arranged.columns or (1 if len(arranged.panels) == 1 else 2)
+        seen = [way for extract in extracts.values() for ways in extract.values() for _, way in ways]
+        points = np.concatenate([*seen, *(place[None] for place in self.marks.values())])
+        low, high = points.min(axis=0), points.max(axis=0)
+        room = 0.04 * max(*(high - low), 1e-9)
+        width, depth = high - low + 2 * room
+        sheet = Sheet(
+            [panel.title for panel in arranged.panels] or [""],
+            columns=columns,
+            height=min(6.0, (3.8 if columns == 1 else 6.4 / columns) * depth / width + 0.35),
+            same_x=True,
+            same_y=True,
+        )
+        handles: dict[str, Any] = {}
+        for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
+            runs = [run for conditions in panel.lines.values() for each in conditions for run in self._first(each)]
+            for number, run in enumerate(runs):
+                colour = PALETTE[number % len(PALETTE)]
+                for _, way in extracts[run]["ways"]:
+                    axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9, alpha=0.85)
+                    look = {"markersize": 4.5, "color": "white", "markeredgecolor": "0.2", "zorder": 4}
+                    (handles["start"],) = axes.plot(*way[:1].T, "o", **look)
+                for name, way in extracts[run]["around"] if number == 0 else ():
+                    (handles[name.rpartition(".")[0]],) = axes.plot(
+                        way[:, 0], way[:, 1], "--", color="0.3", linewidth=1.0
+                    )
+            for (name, place), marker in zip(self.marks.items(), cycle("*XPDv"), strict=False):
+                look = {"marker": marker, "markersize": 8, "color": "black", "linestyle": "none", "zorder": 5}
+                (handles[name],) = axes.plot(*place, **look)
+            axes.set_aspect("equal")
+            axes.set_xlim(low[0] - room, high[0] + room)
+            axes.set_ylim(low[1] - room, high[1] + room)
+        sheet.call_axes("x (m)", "y (m)")
+        sheet.legend(list(handles.values()), list(handles))
+        sheet.save(paths)
+        return f"The first {counted(self.runs, 'run')} of each condition. {arranged.omitted}".rstrip()
+
+
+def _way(results: Results, name: str) -> NDArray[np.float64]:
+    try:
+        return positions(results[name])
+    except AttributeError:
+        raise EpicycleError(f"the tokens of {name} have no 'position'") from None
+
+
+class SingleRun(SignalFigure):
+    """One run, drawn by a figure of the model: the one with the most or the least of a metric among the first runs."""
+
+    figure = Parameter(str, doc="name of a figure of the model")
+    metric = Parameter(str, doc="column of the table by which the run is chosen")
+    choose = Parameter(str, MOST, choices=(MOST, LEAST), doc="whether it has the most or the least of it")
+    runs: Parameter[int | None] = Parameter(
+        int,
+        None,
+        min=1,
+        doc="among how many runs of each condition it is chosen, from the first one on; all if left out",
+    )
+
+    def check(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().check(plan)
+        yield from unknown("metric", [self.metric], [metric.name for metric in plan.metrics], "metric")
+
+    def check_model(self, model: Model) -> Iterator[Complaint]:
+        if self.figure not in model.figures:
+            known = list(model.figures)
+            yield Complaint(
+                "figure",
+                f"the model has no figure {self.figure!r}{did_you_mean(self.figure, known)}",
+                f"its figures: {', '.join(known) or 'none'}",
+            )
+
+    def _chosen(self, data: Data) -> tuple[Condition, dict[str, Any]] | None:
+        rows = [
+            (condition, row)
+            for condition in self.conditions(data)
+            for row in condition.good[: self.runs]
+            if row[self.metric] is not None
+        ]
+        choose = max if self.choose == MOST else min
+        return choose(rows, key=lambda each: each[1][self.metric], default=None)
+
+    def runs_of(self, data: Data) -> list[RunKey]:
+        chosen = self._chosen(data)
+        return [] if chosen is None else [(chosen[0].index, chosen[1]["replication"])]
+
+    def ports(self, model: Model) -> tuple[str, ...]:
+        return self._drawn(model).signal_patterns()
+
+    def _drawn(self, model: Model) -> Figure:
+        problems = Problems()
+        recorded, model.recorded = model.recorded, [*model.graph.ports]
+        try:
+            found = figures_of(model, problems)
+        finally:
+            model.recorded = recorded
+        problems.raise_if_any()
+        return found[self.figure]
+
+    def extract(self, model: Model, results: Results) -> dict[str, bytes]:
+        """The files, by their endings."""
+        figure, files = self._drawn(model), {}
+        with tempfile.TemporaryDirectory() as folder:
+            for ending in FORMATS:
+                path = Path(folder) / f"run.{ending}"
+                figure.draw(results, path)
+                files[ending] = path.read_bytes()
+        return files
+
+    def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
+        chosen = self._chosen(data)
+        if chosen is None:
+            raise EpicycleError(f"no run has a {self.metric} by which one could be chosen")
+        condition, row = chosen
+        for path in paths:
+            path.write_bytes(extracts[condition.index, row["replication"]][path.suffix.removeprefix(".")])
+        names = self.names(data)
+        value = names.level(self.metric, row[self.metric])
+        among = f" among the first {self.runs}" if self.runs else ""
+        return (
+            f"Run {row['replication'] + 1} ({names.place(condition.values)}, seed {row['seed']}), which has the "
+            f"{self.choose} {names.words(self.metric)}{among}: {value}."
+        )
