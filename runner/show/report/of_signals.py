@@ -101,7 +101,9 @@ class Series(RepeatedFigure):
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise EpicycleError(f"{self._formula.source!r} is no number for a token of {self.signal}: {value!r}")
             values.append(float(value))
-        return signal.times, np.array(values), results.end
+        # What was last sent holds up to the stop time, even if nothing happens between.
+        end = results.end if results.stopped != "stop time" or model.stop is None else model.stop
+        return signal.times, np.array(values), end
 
     def arranged(self, data: Data) -> tuple[Layout, Roles]:
         found = roles(data.plan, self.where, None, self.lines, self.panels, has_axis=False)
@@ -126,7 +128,7 @@ class Series(RepeatedFigure):
                 if found.lines:
                     handles.setdefault(names.level(found.lines, level), line)
         sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
-        sheet.legend(list(handles.values()), list(handles), names.axis(found.lines) if found.lines else "")
+        sheet.legend(list(handles.values()), list(handles), names.words(found.lines) if found.lines else "")
         sheet.save(paths)
         said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"
         return f"{said}, as long as half of them go on. {arranged.omitted}".rstrip()

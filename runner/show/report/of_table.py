@@ -67,7 +67,7 @@ class Means(TableFigure):
                     handles.setdefault(names.level(found.lines, level), line)
             axis.dress(axes)
         sheet.call_axes(names.axis(found.over) if found.over else "", f"mean {names.axis(self.metric)}")
-        sheet.legend(list(handles.values()), list(handles), names.axis(found.lines) if found.lines else "")
+        sheet.legend(list(handles.values()), list(handles), names.words(found.lines) if found.lines else "")
         sheet.save(paths)
         return " ".join(
             part
@@ -146,7 +146,7 @@ class Distributions(TableFigure):
         if is_grid or len(self.metrics) == 1:  # the panels of a row have one axis
             for axes in sheet.axes:
                 axes.label_outer(remove_inner_ticks=False)
-        sheet.legend(list(handles.values()), list(handles), names.axis(found.lines) if found.lines else "")
+        sheet.legend(list(handles.values()), list(handles), names.words(found.lines) if found.lines else "")
         sheet.save(paths)
         parts = [
             "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
