@@ -54,6 +54,13 @@ def add_changes(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--without", metavar="NAME", action="append", default=[], help="remove an aspect; may be repeated"
     )
+    command.add_argument(
+        "--max-actors",
+        metavar="N",
+        type=positive,
+        help="how many actors and composites are not taken for a mistake, and a fifth of how many connections "
+        "(default: 20,000)",
+    )
     add_types(command)
 
 
@@ -83,6 +90,14 @@ def seed(text: str) -> int:
     return number
 
 
+def positive(text: str) -> int:
+    """A whole number from 1 on."""
+    number = int(text) if text.isdecimal() and len(text) < 10 else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 999999999")
+    return number
+
+
 def seconds(option: str, text: str) -> float:
     """A model time that an option gives, in seconds or with a unit."""
     from epicycle.actors import EpicycleError, convert
@@ -105,6 +120,7 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, d
         aspects=options.aspect,
         without_aspects=options.without,
         types=own_types(options),
+        **({} if options.max_actors is None else {"max_actors": options.max_actors}),
     )
     if not strict:
         for warning in model.warnings:

@@ -11,10 +11,10 @@ import networkx as nx
 from epicycle.actors import InputPort, accepts, counted, type_name
 
 from .graph import Detour, Hop, ModelGraph, Wire
+from .limits import RAISE_IT
 from .problems import Position, Problems
 from .schedule import dependencies
 
-MAX_WIRES = 200_000
 MAX_PASSAGE = 200  # composite ports in a row
 MAX_SHOWN = 10  # names in one message
 
@@ -58,8 +58,9 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
     for actor in graph.actors.values():
         for port in actor.outputs.values():
             wires += sum(onward.get(far, 1) for _, far in ports.out_edges(port.path))
-            if wires > MAX_WIRES:
-                problems.add(f"the model has more than {MAX_WIRES:,} wires", graph.positions.get(actor.path))
+            limit = graph.limits.wires
+            if wires > limit:
+                problems.add(f"the model has more than {limit:,} wires", graph.positions.get(actor.path), RAISE_IT)
                 return False
     return True
 

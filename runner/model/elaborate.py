@@ -26,6 +26,7 @@ from .declarations import CompositeText, ModelText, PartText, PortText
 from .document import Entry
 from .elaborate_aspects import AspectElaborator
 from .graph import ModelGraph
+from .limits import NORMAL, RAISE_IT, Limits
 from .model import Model
 from .observation import Observation
 from .port_types import PortTypeError, read_type, token_types
@@ -34,8 +35,6 @@ from .settings import Settings
 from .wiring import Child, Wiring
 from .woven import WovenAspect, check_processors
 
-MAX_COUNT = 20_000
-MAX_INSTANCES = 20_000  # of actors and composites together
 MAX_DEPTH = 50
 
 
@@ -54,8 +53,10 @@ class Elaborator(AspectElaborator):
         problems: Problems,
         catalogue: Catalogue,
         broken: Collection[str] = (),
+        limits: Limits = NORMAL,
     ) -> None:
         super().__init__(composites, settings, problems, catalogue, broken)
+        self.graph.limits = limits
         self.text = text
         self.made: set[str] = set()  # the composite classes of which there are instances
         self._instances = 0
@@ -207,9 +208,12 @@ class Elaborator(AspectElaborator):
     def _enlist(self, path: str, part: PartText) -> None:
         """Count one more instance; raises ``TooLargeError`` if there are too many."""
         self._instances += 1
-        if self._instances > MAX_INSTANCES:
+        limit = self.graph.limits.actors
+        if self._instances > limit:
             self.problems.muted = False
-            self.problems.add(f"{path}: the model has more than {MAX_INSTANCES:,} actors and composites", part.position)
+            self.problems.add(
+                f"{path}: the model has more than {limit:,} actors and composites", part.position, RAISE_IT
+            )
             raise TooLargeError
 
     def _kinds(self, part: PartText) -> set[str]:
@@ -232,7 +236,7 @@ class Elaborator(AspectElaborator):
         if value is self.values.missing:
             return None
         try:
-            return Parameter(int, min=0, max=MAX_COUNT).convert(value)
+            return Parameter(int, min=0, max=self.graph.limits.actors).convert(value)
         except ParameterError as error:
             self.problems.add(f"{path}: count: {error}", part.count.position, scope=composite)
             return None
@@ -364,6 +368,7 @@ class Elaborator(AspectElaborator):
             return self._actor(full, path, as_actor(part), names, within)
         graph, mark = self.graph, len(self._to_weave)
         self.graph = ModelGraph()
+        self.graph.limits = graph.limits
         self._actor(full, path, as_actor(part), names, within)
         self.graph = graph
         del self._to_weave[mark:]

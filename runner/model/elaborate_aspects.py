@@ -13,13 +13,13 @@ from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .configuration import Configurator
 from .declarations import CompositeText, PartText, PointcutText
 from .decorated import arranged, weave_decorations
+from .limits import RAISE_IT
 from .patterns import PathIndex
 from .problems import Problems, did_you_mean
 from .settings import Settings
 from .weave import Weaving
 from .woven import WovenAspect
 
-MAX_PLACES = 100_000  # of all aspects together
 MAX_SHOWN = 12  # types in one message
 
 
@@ -95,8 +95,9 @@ class AspectElaborator(Configurator):
             weaving.check(woven)
             weaving.connect(woven)
         self._places += len(woven.places)
-        if self._places > MAX_PLACES:
-            self.problems.add(f"aspect {name}: aspects stand at more than {MAX_PLACES:,} places", part.position)
+        limit = self.graph.limits.places
+        if self._places > limit:
+            self.problems.add(f"aspect {name}: aspects stand at more than {limit:,} places", part.position, RAISE_IT)
             self.problems.raise_if_any()
         if is_enabled:
             self.aspects.append(woven)

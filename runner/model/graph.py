@@ -16,6 +16,7 @@ from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_ow
 from epicycle.aspects import Request
 
 from .clock import Clock
+from .limits import NORMAL
 from .patterns import could_be_within
 from .problems import Position
 
@@ -77,6 +78,7 @@ class ModelGraph:
         self.absent: set[str] = set()  # types and tags of what would stand in empty arrays, and of unmade actors
         self.is_wired = True  # whether every connection that the model declares has been made
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
+        self.limits = NORMAL
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}

@@ -15,6 +15,7 @@ from .document import Mapping as MappingNode
 from .document import read
 from .elaborate import Elaborator
 from .inheritance import inherit
+from .limits import NORMAL, Limits
 from .model import Model
 from .packaged import find, model_folders, packaged_models
 from .problems import Problems, did_you_mean
@@ -58,6 +59,7 @@ def load_model(
     without_aspects: Iterable[str] = (),
     disturb: str | Path | Iterable[str | Path] = (),
     types: Iterable[type] = (),
+    max_actors: int = NORMAL.actors,
 ) -> Model:
     """Read, change and check a model; raises ``ModelError`` with all that is wrong.
 
@@ -66,7 +68,8 @@ def load_model(
     a parameter the last one wins, and ``set`` wins over files.  ``disturb`` names packaged disturbances, or files of
     aspects, which are added to the model's one after the other; ``without_aspects`` and ``aspects`` count after that,
     and all settings win over what a disturbance sets.  ``types`` are actor and aspect classes of your own that the
-    model may name beside the installed ones.  What is odd but not wrong is in ``Model.warnings``.
+    model may name beside the installed ones.  ``max_actors`` is how many actors and composites are not taken for a
+    mistake, and a fifth of how many connections.  What is odd but not wrong is in ``Model.warnings``.
     """
     problems = Problems()
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
@@ -84,7 +87,7 @@ def load_model(
             without(text, change, problems)
         for change in aspects:
             change_aspect(text, change, problems)
-        elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken)
+        elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken, Limits(max_actors))
         model = elaborator.model()
         try_classes(composites, elaborator.made, problems, catalogue, broken)
         problems.raise_if_any()

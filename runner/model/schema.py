@@ -20,7 +20,7 @@ from epicycle.aspects import Aspect
 
 from . import declarations as language
 from .catalogue import Catalogue
-from .elaborate import MAX_COUNT
+from .limits import NORMAL
 from .observation import MAX_SEED
 from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
 from .schema_parts import QUANTITY, TEXT, Schema, mapping, one_or_more, ref, text
@@ -232,7 +232,7 @@ _METRIC: dict[str, tuple[Schema, str]] = {
 }
 # What stands beside the parameters of an actor, aspect or figure.
 _BESIDE: dict[str, tuple[Schema, str]] = {
-    "count": (_number("integer", 0, MAX_COUNT), "How many instances, name[0] to name[count - 1]; see 'index'."),
+    "count": (_number("integer", 0, NORMAL.actors), "How many instances, name[0] to name[count - 1]; see 'index'."),
     "priority": (
         _number("integer"),
         "Of two actors that could fire at the same tag and depth, the smaller one is first.",

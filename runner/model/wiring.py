@@ -12,12 +12,12 @@ from .declarations import CompositeText, ConnectionText
 from .document import Scalar
 from .graph import ModelGraph
 from .indices import BadIndexError, resolve
+from .limits import RAISE_IT
 from .problems import Problems, did_you_mean
 from .reading import Text, within
 from .values import Values
 
 _ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
-MAX_CONNECTIONS = 100_000  # each takes about a kilobyte
 
 
 @dataclass
@@ -96,9 +96,10 @@ class Wiring:
                     continue
                 in_pairs = source.several and target.several and not connection.to_all
                 count = len(source.ports) * (1 if in_pairs else len(target.ports))
-                if self.graph.connections + count > MAX_CONNECTIONS:
+                limit = self.graph.limits.connections
+                if self.graph.connections + count > limit:
                     self.graph.is_wired = False
-                    self._problem(f"the model has more than {MAX_CONNECTIONS:,} connections", source.text)
+                    self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)
                     return
                 for one, other in self._pairs(source, target, in_pairs, connection.to_all):
                     self.graph.connect(one, other, delay, source.text.position)

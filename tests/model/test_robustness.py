@@ -22,6 +22,7 @@ from epicycle.actors import (
     UnitError,
 )
 from epicycle.actors.expression import ExpressionError
+from epicycle.runner.cli import main
 from epicycle.runner.engine import ActorError, LogError, LoopError
 from epicycle.runner.engine.encoding import TokenError
 from epicycle.runner.model import ModelError, Position, Problem, load_model
@@ -158,3 +159,25 @@ def test_errors_travel_between_processes(error: EpicycleError) -> None:
 def test_all_public_errors_are_tried() -> None:
     public = {value for name in epicycle.actors.__all__ if isinstance(value := getattr(epicycle.actors, name), type)}
     assert {each for each in public if issubclass(each, EpicycleError)} <= {type(error) for error in ERRORS}
+
+
+def test_limits_are_raised_by_who_wants_a_larger_model(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "model: m\n"
+        "actors: {a: {type: Const, value: 1, count: 30}, b: {type: Recorder, count: 11}}\n"
+        'connections: ["a[..9].output => b[*].input"]\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(ModelError) as refused:
+        load_model(path, max_actors=40)
+    assert f"{refused.value}" == (
+        f"{path}:2:49: error: b: the model has more than 40 actors and composites\n"
+        "    2 | actors: {a: {type: Const, value: 1, count: 30}, b: {type: Recorder, count: 11}}\n"
+        "      |                                                 ^\n"
+        "   help: if it is to be so large, say so: --max-actors N, or load_model(..., max_actors=N)"
+    )
+    model = load_model(path, max_actors=41)
+    assert (len(model.graph.actors), model.graph.connections) == (41, 110)
+    assert main(["validate", str(path), "--max-actors", "41"]) == 0
+    assert main(["validate", str(path), "--max-actors", "40"]) == 2

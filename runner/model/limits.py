@@ -1,0 +1,35 @@
+"""How large a model may be before it is taken for a mistake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """``actors`` counts composites as well; of connections, and of places where aspects stand, five for each will do.
+
+    A model as large as this loads in seconds and takes about 200 MB.  A slip of the pen that asks for a million is told
+    before it has filled the memory; who wants a million says so.
+    """
+
+    actors: int = 20_000
+
+    @property
+    def connections(self) -> int:
+        """How many there may be."""
+        return 5 * self.actors
+
+    @property
+    def wires(self) -> int:
+        """How many ways there may be from actor to actor, through composites."""
+        return 10 * self.actors
+
+    @property
+    def places(self) -> int:
+        """At how many ports and actors aspects may stand."""
+        return 5 * self.actors
+
+
+NORMAL = Limits()
+RAISE_IT = "if it is to be so large, say so: --max-actors N, or load_model(..., max_actors=N)"
