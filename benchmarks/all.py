@@ -18,8 +18,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PARTS = ("events", "growth", "start")
-PACKAGES = ("numpy", "numba", "simpy", "networkx")
+PARTS = ("controllers", "events", "growth", "start")
+PACKAGES = ("numpy", "numba", "casadi", "scipy", "filterpy", "simpy", "networkx")
 
 
 def machine() -> str:

@@ -1,0 +1,221 @@
+"""The controllers: `python benchmarks/controllers.py [--problems 1000]`.
+
+- The horizon problem of eqs. (2)-(5): problems that the solver was given in runs of collision_avoidance, without
+  disturbance and at 50 %, with none to four observers, solved by ours and by the programs of ``programs.py``.
+- The unscented Kalman filter against FilterPy's, on the same measurements.
+- The whole scenario against the authors' own model, and what compiling costs once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from statistics import median
+from typing import Any
+
+import numpy as np
+from measure import Row, compare, cpu_seconds, table, take_turns
+
+from epicycle.actors import Barrier
+from epicycle.actors.robotics.numerics import barrier, ukf
+from epicycle.runner import Results, Simulation, load_model
+
+PROBLEMS = 1000
+ROUNDS = 5
+SEEDS = (0, 1)  # of each of the ten conditions that problems are recorded from
+BETTER = 1e-3  # relative, or absolute below 1: objectives nearer than this are equal
+KEPT = 1e-4  # m; peers keep constraints to their own tolerances
+AUTHORS = 155.0 / 10.0  # s of CPU for a second of model time, on two cores like those that all this was made for
+OURS = "ours"
+
+Recorded = tuple[Any, np.ndarray]
+
+
+def record(count: int) -> list[Recorded]:
+    """Problems with their starts, evenly from runs under all conditions."""
+    found: list[Recorded] = []
+    solve = Barrier.solve
+
+    def note(self: Barrier, problem: Any, starts: np.ndarray) -> Any:
+        found.append((problem, starts))
+        return solve(self, problem, starts)
+
+    Barrier.solve = note  # type: ignore[method-assign]
+    try:
+        for level in (0.0, 0.5):
+            for observers in range(5):
+                model = load_model("collision_avoidance", set={"disturbance": level, "observers": observers})
+                for seed in SEEDS:
+                    Simulation(model, seed=seed).run()
+    finally:
+        Barrier.solve = solve  # type: ignore[method-assign]
+    picked = np.linspace(0, len(found) - 1, count).astype(int)
+    return [found[i] for i in picked]
+
+
+def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
+    """What a call takes, and returns."""
+    before = time.perf_counter()
+    result = work()
+    return time.perf_counter() - before, result
+
+
+def horizon_problems(count: int) -> Iterator[Row]:
+    """Ours and the peers take turns, problem by problem."""
+    from programs import PEERS, bounds_of, numbers_of, shape_of, worth
+
+    problems = record(count)
+    how = (
+        f"{count} problems recorded from 20 runs of collision_avoidance (0 to 4 observers, 0 % and 50 %), in {ROUNDS} "
+        "rounds; all from the same start, with tolerance 1e-5 and exact derivatives; programs are built before; what "
+        "cannot be kept, peers need to keep as well as ours only, which spares them the search; medians of each round"
+    )
+    times: dict[str, list[list[float]]] = {name: [[] for _ in range(ROUNDS)] for name in (OURS, *PEERS)}
+    cases = {name: {"equal": 0, "better": 0, "worse": 0, "lost": 0} for name in PEERS}
+    built: set[tuple[int, ...]] = set()
+    barrier.solve(*problems[0])
+    for number, (problem, starts) in enumerate(problems):
+        took, solution = seconds(lambda p=problem, s=starts: barrier.solve(p, s))
+        bounds = bounds_of(problem, solution.controls)
+        own, beyond = worth(problem, solution.controls, bounds)
+        assert beyond <= KEPT
+        numbers_of(problem, bounds)
+        times[OURS][number % ROUNDS].append(took)
+        for name, solve in PEERS.items():
+            if shape_of(problem) not in built:
+                solve(problem, starts[0], bounds)
+            took, controls = seconds(lambda p=problem, s=starts, b=bounds, solve=solve: solve(p, s[0], b))
+            times[name][number % ROUNDS].append(took)
+            other, beyond = worth(problem, controls, bounds)
+            gap = (own - other) / max(1.0, abs(other))
+            case = "lost" if not beyond <= KEPT else "worse" if gap > BETTER else "better" if gap < -BETTER else "equal"
+            cases[name][case] += 1
+        built.add(shape_of(problem))
+    results = {name: [median(each) for each in rounds] for name, rounds in times.items()}
+    work = "horizon problem, one solve"
+    for name, goal in zip(PEERS, (150.0, 30.0, None), strict=True):
+        yield compare(work, results, name, OURS, how=how, goal=goal, unit=(1e-3, "ms"))
+    scaled = 30.0 * median(results[OURS]) / median(results["CasADi IPOPT"])
+    limit = "0.15 ms where IPOPT takes 30"
+    yield Row(work, "CasADi IPOPT", f"{scaled:.2g} ms where IPOPT takes 30", limit, scaled <= 0.15, how)
+    for name, found in cases.items():
+        text = (
+            f"ours equal in {found['equal']}, better in {found['better']}, worse in {found['worse']}; "
+            f"no plan within its bounds by the peer in {found['lost']}"
+        )
+        yield Row("horizon problem, objective (within 1e-3)", name, text, "none worse", not found["worse"], how)
+
+
+def filters() -> Iterator[Row]:
+    """A prediction and an update with three measurements at once, on both sides the textbook's."""
+    from filterpy.kalman import JulierSigmaPoints, UnscentedKalmanFilter
+
+    steps, count = 200, 3
+    random = np.random.default_rng(7)
+    noise = np.diag([0.002, 0.002, 0.4, 0.4])
+    prior = np.array([10.0, 0.0, 0.0, 0.0]), np.diag([4.0, 4.0, 4.0, 4.0])
+    kinds, transition = np.full(count, float(ukf.RELATIVE_POSITION)), ukf.constant_velocity(0.1)
+    observers = random.uniform(-20.0, 30.0, size=(steps, count, 2))
+    values = np.array([12.0, 0.0]) - observers + random.normal(size=observers.shape)
+    ellipse = np.array([[1.0, 0.3, 2.0]] * count)
+    stacked = np.kron(np.eye(count), [[1.0, 0.3], [0.3, 2.0]])
+    ended: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+
+    def ours() -> None:
+        mean, covariance = prior
+        for step in range(steps):
+            mean, covariance = ukf.predict(mean, covariance, transition, noise)
+            mean, covariance = ukf.update(mean, covariance, 0.0, kinds, observers[step], values[step], ellipse)
+        ended[OURS] = mean, covariance
+
+    def theirs() -> None:
+        points = JulierSigmaPoints(4, kappa=0.0)
+        used = UnscentedKalmanFilter(4, 2 * count, 0.1, hx=None, fx=lambda x, dt: transition @ x, points=points)
+        used.x, used.P, used.Q = prior[0].copy(), prior[1].copy(), noise
+        for step in range(steps):
+            used.predict()
+            used.sigmas_f = points.sigma_points(used.x, used.P)
+            places = observers[step]
+            used.update(values[step].ravel(), R=stacked, hx=lambda x, places=places: (x[:2] - places).ravel())
+        ended["FilterPy"] = np.array(used.x), np.array(used.P)
+
+    contenders = {OURS: ours, "FilterPy": theirs}
+    results = take_turns({name: lambda work=work: cpu_seconds(work) / steps for name, work in contenders.items()}, 7)
+    for mine, other in zip(ended[OURS], ended["FilterPy"], strict=True):
+        np.testing.assert_allclose(mine, other, atol=1e-8)
+    how = "200 steps in each of 7 rounds, three relative positions a step; both end in the same state to 1e-8; CPU time"
+    yield compare("filter, predict + update", results, "FilterPy", OURS, how=how, goal=30.0, unit=(1e-6, "us"))
+
+
+def scenario() -> Iterator[Row]:
+    """CPU time of whole runs for each second of model time."""
+    model = load_model("collision_avoidance", set={"observers": 3, "disturbance": 0.5})
+    Simulation(model, seed=0).run()
+    found = []
+    for seed in range(10):
+        results: list[Results] = []
+        took = cpu_seconds(lambda seed=seed, results=results: results.append(Simulation(model, seed=seed).run()))
+        found.append(took / results[0].end)
+    ratio = AUTHORS / median(found)
+    yield Row(
+        "collision_avoidance, 3 observers, 50 %",
+        "the authors' Ptolemy II model",
+        f"{ratio:.0f}x ({1000 * median(found):.1f} ms of CPU for a second of model time against {AUTHORS:.1f} s)",
+        ">= 1000x",
+        ratio >= 1000.0,
+        "10 runs to the arrival, seeds 0 to 9, with log digest and metrics, CPU time; the authors' figure is 155 s of "
+        "CPU for 10 s of model time, measured once on a machine with 2 cores",
+    )
+
+
+def compiling() -> Iterator[Row]:
+    """The first call of all kernels on a machine."""
+    program = (
+        "import time\n"
+        "from epicycle.actors.robotics.numerics.warm_up import compile_kernels\n"
+        "before = time.process_time()\n"
+        "compile_kernels()\n"
+        "print(time.process_time() - before)\n"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        took = [
+            float(
+                subprocess.run(
+                    [sys.executable, "-c", program],
+                    env={**os.environ, "NUMBA_CACHE_DIR": os.path.join(folder, name)},
+                    check=True,
+                    capture_output=True,
+                    text=True,
+                ).stdout
+            )
+            for name in ("a", "a", "b", "b")
+        ]
+    how = "an empty cache, then a filled one, each in a new process, twice; CPU time"
+    for work, limit, found in (
+        ("compiling all kernels", 20.0, median(took[::2])),
+        ("loading the compiled kernels", None, median(took[1::2])),
+    ):
+        yield Row(work, "", f"{found:.2g} s", f"<= {limit:g} s" if limit else "", limit and found <= limit, how)
+
+
+def rows(problems: int = PROBLEMS) -> Iterator[Row]:
+    """The lines of the table."""
+    yield from horizon_problems(problems)
+    yield from filters()
+    yield from scenario()
+    yield from compiling()
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--problems", type=int, default=PROBLEMS)
+    print(table(rows(options.parse_args().problems)))
+
+
+if __name__ == "__main__":
+    main()
