@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -18,6 +19,8 @@ from scipy import stats
 
 from epicycle.runner import open_study
 from epicycle.runner.model.packaged import packaged_models
+from epicycle.runner.show.report import answers
+from epicycle.runner.show.report.data import Data
 from epicycle.runner.study import Plan, Study, read_study, run_study
 from epicycle.runner.study.claims import Finding, Judgement, judge, verdict
 from epicycle.runner.study.declaration import study_of_text
@@ -412,3 +415,13 @@ def test_claims_of_another_study_are_judged_at_each_level_of_what_it_has_not(que
         ("false_by_theory", {"variant": "slow"}, "not reproduced"),
     ]
     assert all(finding.where == {} for each in found for finding in each.findings)
+    # The report shows first which of them survive what.
+    html = next(iter(answers.claims(Data(open_study(tmp_path / "out")), found)))
+    rows = [
+        re.findall("<(?:th|td)[^>]*>(.*?)</(?:th|td)>", row) for row in re.findall("<tr>(.*?)</tr>", html, re.DOTALL)
+    ]
+    assert [[re.sub("<.*?>", "", cell) for cell in row] for row in rows] == [
+        ["variant", "true_by_theory", "false_by_theory"],
+        ["usual", "reproduced", "not reproduced"],
+        ["slow", "reproduced", "not reproduced"],
+    ]

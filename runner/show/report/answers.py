@@ -20,6 +20,8 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
     if not judgements:
         return
     apart = list(judgements[0].where)
+    if apart:
+        yield tag("div", _by_level(data.names, judgements), class_="scroll")
     head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
     yield with_class(
         table(
@@ -29,7 +31,7 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
                     *(shown(level) for level in each.where.values()),
                     tag("b", each.name),
                     [each.claim.doc, " ", tag("small", each.claim.statement)],
-                    tag("b", each.verdict, class_=each.verdict.replace(" ", "-")),
+                    _verdict(each),
                     *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
                 ]
                 for each in judgements
@@ -53,6 +55,24 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
             tag("summary", f"{title}, {counted(len(each.findings), 'comparison')}"),
             _findings(data.names, each),
         )
+
+
+def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
+    """Which claims survive which level of what they are judged for."""
+    found = {(tuple(each.where.values()), each.name): each for each in judgements}
+    claims = list(dict.fromkeys(each.name for each in judgements))
+    return table(
+        [*map(names.axis, judgements[0].where), *claims],
+        [
+            [*map(shown, levels), *(_verdict(found[levels, claim]) for claim in claims)]
+            for levels in dict.fromkeys(levels for levels, _ in found)
+        ],
+        names=len(judgements[0].where),
+    )
+
+
+def _verdict(judgement: Judgement) -> Html:
+    return tag("b", judgement.verdict, class_=judgement.verdict.replace(" ", "-"))
 
 
 def _findings(names: Names, judgement: Judgement) -> Html:
