@@ -9,6 +9,7 @@ from typing import Any
 
 from epicycle.actors import Actor, to_nanoseconds, to_seconds
 
+from ..collection import without_collection
 from ..model import Metric, Model, firing_order
 from .director import ActorError, Director, describe
 from .local import Deliver
@@ -48,7 +49,8 @@ class Simulation:
         if self.seed < 0:
             raise ValueError(f"a seed is a whole number from 0 up, not {self.seed}")
         self._tracer = tracer
-        order = firing_order(model.graph)
+        with without_collection():
+            order = firing_order(model.graph)
         keeps = keep_log.keeps if keep_log else None
         self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
         self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
@@ -56,7 +58,8 @@ class Simulation:
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
         self._has_run = False
         self._started = 0.0
-        self._wiring = Wiring(model, self.director, self.log, self._listeners(), self.signals)
+        with without_collection():
+            self._wiring = Wiring(model, self.director, self.log, self._listeners(), self.signals)
 
     # -- what is watched ------------------------------------------------------------------------------------------
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from ..collection import without_collection
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
 from .disturbance import add_disturbances, load_disturbances
@@ -38,18 +37,6 @@ def find_library(path: Path) -> Path:
     return next((each for each in (path, *packaged) if each.is_file()), path)
 
 
-@contextmanager
-def _without_collection() -> Iterator[None]:
-    """Keep the garbage collector from looking through a model again and again while it grows: all of it is kept."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
-
-
 def load_model(
     name: str | Path,
     *,
@@ -74,7 +61,7 @@ def load_model(
     problems = Problems()
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += _settings(set, problems)
-    with _without_collection():
+    with without_collection():
         text, path, reader = _read_model(str(name), problems)
         declared = included_composites(text, path, reader, problems)
         catalogue = installed().with_types(types)
