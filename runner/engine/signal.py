@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from array import array
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +26,6 @@ class SignalError(EpicycleError):
     """A signal, or a field of its tokens, that is not there."""
 
 
-@dataclass(repr=False)
 class Signal:
     """What one port sent: tags and tokens, in order.
 
@@ -33,27 +33,60 @@ class Signal:
     >>> state.times, state["position"]          # arrays of shape (n,) and (n, 2)
     """
 
-    name: str
-    tags: list[Tag] = field(default_factory=list)
-    tokens: list[Any] = field(default_factory=list)
+    def __init__(self, name: str, tags: Iterable[Tag] = (), tokens: Iterable[Any] = ()) -> None:
+        self.name = name
+        # Tags, and tokens that are all floats or all ints, are kept as the numbers that they are: about 20 bytes for
+        # both together, where a tag and a float as objects take 130.
+        self._times = array("q")
+        self._microsteps = array("i")
+        self._tokens: Any = array("d")
+        self._kind: type | None = float  # of all tokens; None: there are others, and ``_tokens`` is a list
+        for tag, token in zip(tags, tokens, strict=True):
+            self.add(tag, token)
 
     def add(self, tag: Tag, token: Any) -> None:
         """Append a token."""
-        self.tags.append(tag)
-        self.tokens.append(token)
+        time, microstep = tag
+        if type(token) is not self._kind and self._kind is not None:
+            self._make_room(token)
+        try:
+            self._tokens.append(token)
+        except OverflowError:  # an int of more than 64 bits
+            self._tokens = [*self._tokens, token]
+            self._kind = None
+        self._times.append(time)
+        self._microsteps.append(microstep)
+
+    def _make_room(self, token: Any) -> None:
+        """See to it that a token of another type than before can be kept."""
+        if type(token) is int and not self._tokens:
+            self._tokens, self._kind = array("q"), int
+        else:
+            self._tokens, self._kind = list(self._tokens), None
+
+    @property
+    def tags(self) -> list[Tag]:
+        """When each token was sent."""
+        return list(map(Tag, self._times, self._microsteps))
+
+    @property
+    def tokens(self) -> list[Any]:
+        """What was sent."""
+        found: list[Any] = self._tokens if self._kind is None else self._tokens.tolist()
+        return found
 
     def __len__(self) -> int:
-        return len(self.tokens)
+        return len(self._times)
 
     @property
     def times(self) -> NDArray[np.float64]:
         """The times in seconds."""
-        return np.array([to_seconds(tag.time) for tag in self.tags], dtype=float)
+        return np.array([to_seconds(time) for time in self._times], dtype=float)
 
     @property
     def microsteps(self) -> NDArray[np.int64]:
         """The microsteps."""
-        return np.array([tag.microstep for tag in self.tags], dtype=np.int64)
+        return np.array(self._microsteps, dtype=np.int64)
 
     @property
     def values(self) -> NDArray[Any]:
@@ -98,10 +131,10 @@ class Signal:
         return frame
 
     def __repr__(self) -> str:
-        if not self.tokens:
+        if not len(self):
             return f"<Signal {self.name}: no tokens>"
-        kind = type(self.tokens[0]).__name__
-        first, last = self.tags[0].seconds, self.tags[-1].seconds
+        kind = type(self._tokens[0]).__name__
+        first, last = to_seconds(self._times[0]), to_seconds(self._times[-1])
         tokens = counted(len(self), "token")
         return f"<Signal {self.name}: {tokens} ({kind}) from {first:g} s to {last:g} s>"
 
@@ -127,11 +160,11 @@ def as_array(tokens: list[Any]) -> NDArray[Any]:
     if kinds <= {bool, int, float, str} and (len(kinds) < 2 or str not in kinds):
         return np.array(tokens, dtype=None if tokens else float)
     try:
-        array = np.array(tokens)
+        found = np.array(tokens)
     except ValueError:  # of different shapes
-        array = np.empty(0, dtype=object)
-    if array.ndim > 0 and len(array) == len(tokens) and array.dtype.kind in "biuf":
-        return array
+        found = np.empty(0, dtype=object)
+    if found.ndim > 0 and len(found) == len(tokens) and found.dtype.kind in "biuf":
+        return found
     return np.fromiter(tokens, dtype=object, count=len(tokens))
 
 

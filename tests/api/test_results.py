@@ -111,3 +111,24 @@ def test_tables_are_cut_and_escaped() -> None:
     assert html.endswith("</table><p>... and 2 more</p></div>")
     assert "empty" not in html
     assert re.fullmatch(r"a < b\n\nname\n(<b>\d+\n){40}\.\.\. and 2 more", as_text("a < b", [table]))
+
+
+@pytest.mark.parametrize(
+    "tokens",
+    [
+        [],
+        [1.5, -0.0, float("inf")],
+        [1, -(2**63), 2**63 - 1],
+        [1, 2, 2**63, 3],
+        [1, 2.5, 3],
+        [2.5, 1, True],
+        [True, 1, 2.0],
+        [1.5, "text", None, (1, 2)],
+        [1, np.float64(2.5), np.int64(3)],
+    ],
+)
+def test_a_signal_keeps_what_was_sent_in_value_and_type(tokens: list[Any]) -> None:
+    kept = signal(*tokens)
+    assert [(type(token), token) for token in kept.tokens] == [(type(token), token) for token in tokens]
+    assert kept.tags == [Tag(250_000_000 * index, index % 2 + 1) for index in range(len(tokens))]
+    assert (len(kept), kept.times.tolist()) == (len(tokens), [0.25 * index for index in range(len(tokens))])
