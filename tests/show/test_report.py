@@ -22,7 +22,7 @@ from epicycle.runner.show.report.figure import layout, roles
 from epicycle.runner.show.report.numbers import rounded
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
-from epicycle.runner.study import Plan, read_study
+from epicycle.runner.study import Plan, StudyMetric, read_study
 from epicycle.runner.study.columns import Column, si_unit
 from epicycle.runner.study.replays import Replay, ReplayError, repeat
 from epicycle.runner.study.statistics import half_width
@@ -351,6 +351,29 @@ def test_every_factor_is_shown_somewhere(
     plan = Plan(read_study(tmp_path / "s.yaml"), [], {}, [{}, {}, {}, {}], {}, {})
     found = roles(plan, fixed, over, lines, panels, has_axis=True)
     assert (found.over, found.lines, found.panels) == expected
+
+
+@pytest.mark.parametrize(
+    ("vary", "figures"),
+    [
+        ("", ["one_runs"]),
+        ("vary: {load: [0.5, 0.9]}", ["one_mean", "one_runs"]),
+        ("vary: {day: {cases: {calm: , busy: {load: 0.9}}}}", ["one_mean", "one_runs"]),
+        (
+            "vary: {box: {latin_hypercube: {size: 4, ranges: {load: [0.1, 0.9], mean_service: [1 s, 2 s]}}}}",
+            ["one_mean_1", "one_mean_2"],
+        ),
+    ],
+)
+def test_figures_of_a_study_that_names_none(vary: str, figures: list[str], tmp_path: Path) -> None:
+    (tmp_path / "s.yaml").write_text(f"study: s\nmodel: mm1\n{vary}\n")
+    study = read_study(tmp_path / "s.yaml")
+    plan = Plan(study, [StudyMetric("one", "1")], {}, [{} for _ in study.dimensions], {}, {})
+    problems = Problems()
+    found = figures_of_study(plan, problems)
+    assert list(found) == figures
+    assert [complaint for figure in found.values() for complaint in figure.check(plan)] == []
+    assert len(problems) == 0
 
 
 def test_panels_and_lines_keep_apart_what_differs(queue: Path) -> None:

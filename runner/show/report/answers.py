@@ -13,6 +13,7 @@ from ...study.questions import ALWAYS
 from .data import Data, Names, shown
 from .html import Content, Html, table, tag, with_class
 from .numbers import estimated, rounded
+from .of_table import mean_of
 
 
 def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
@@ -121,8 +122,8 @@ def guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:
     which = "greatest" if asked is not None and asked.greatest else "least"
     tolerance = asked.tolerance if asked is not None else 0.0
     unit = names.unit(found[0].metric)
-    yield tag("p", f"Which {choose} make the mean {metric} {which}:", class_="label")
-    head = [*map(names.axis, found[0].where), f"best {choose}", f"mean {names.axis(found[0].metric)}"]
+    yield tag("p", f"Which {choose} make the {mean_of(metric)} {which}:", class_="label")
+    head = [*map(names.axis, found[0].where), f"best {choose}", mean_of(names.axis(found[0].metric))]
     yield tag(
         "div",
         table(

@@ -14,7 +14,7 @@ from ...study import Plan
 from ...study.dimensions import in_si, split_number
 from .figure import Complaint, SignalFigure, StudyFigure
 from .of_signals import Series, SingleRun, Tracks
-from .of_table import Distributions, Means
+from .of_table import CURVES, Distributions, Means
 
 __all__ = [
     "Distributions",
@@ -151,14 +151,22 @@ def _add(complaint: Complaint, name: str, part: PartText, problems: Problems) ->
 
 
 def default_figures(plan: Plan) -> dict[str, StudyFigure]:
-    """Of every metric the mean over what was varied, and the distribution."""
+    """Of every metric the mean over what was varied, and the distribution.
+
+    Of points in a box (a Latin hypercube) there is a figure for each side of it, and no distribution: each point has
+    runs of its own.
+    """
+    dimensions = plan.study.dimensions
+    boxes = [each for each in dimensions if len(each.columns) > 1 and set(each.columns.values()) <= {"int", "float"}]
     found: dict[str, StudyFigure] = {}
     for metric in plan.metrics:
         about = plan.columns.get(metric.name)
-        doc = about.doc if about is not None else ""
-        if plan.study.dimensions:
-            found[f"{metric.name}_mean"] = Means(metric=metric.name, doc=doc)
+        given = {"doc": about.doc} if about is not None else {}
+        for number, column in enumerate((column for box in boxes for column in box.columns), start=1):
+            found[f"{metric.name}_mean_{number}"] = Means(metric=metric.name, over=column, **given)
+        if dimensions and not boxes:
+            found[f"{metric.name}_mean"] = Means(metric=metric.name, **given)
             found[f"{metric.name}_runs"] = Distributions(metrics=metric.name)
-        else:
-            found[f"{metric.name}_runs"] = Distributions(metrics=metric.name, style="curves", doc=doc)
+        elif not dimensions:
+            found[f"{metric.name}_runs"] = Distributions(metrics=metric.name, style=CURVES, **given)
     return found

@@ -66,13 +66,13 @@ class Means(TableFigure):
                 if found.lines:
                     handles.setdefault(names.level(found.lines, level), line)
             axis.dress(axes)
-        sheet.call_axes(names.axis(found.over) if found.over else "", f"mean {names.axis(self.metric)}")
+        sheet.call_axes(names.axis(found.over) if found.over else "", mean_of(names.axis(self.metric)))
         sheet.legend(list(handles.values()), list(handles), names.words(found.lines) if found.lines else "")
         sheet.save(paths)
         return " ".join(
             part
             for part in (
-                f"Mean {names.words(self.metric)} with its 95 % interval (Student).",
+                f"{mean_of(names.words(self.metric)).capitalize()} with its 95 % interval (Student).",
                 counts(chosen, [self.metric]),
                 arranged.omitted,
             )
@@ -237,6 +237,11 @@ class Distributions(TableFigure):
         if self.limit is not None:
             axes.axvline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
         return handles
+
+
+def mean_of(what: str) -> str:
+    """What the mean of something is called; that of a mean is one, too."""
+    return what if what.startswith("mean ") else f"mean {what}"
 
 
 def numbers(condition: Condition, metric: str) -> list[float]:
