@@ -15,6 +15,7 @@ help:
 	@echo "make test   the quick tests"
 	@echo "make lint   ruff, formatting and types"
 	@echo "make check  lint and every test, the slow ones too"
+	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
 	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
 	@echo "make wheel  build dist/epicycle-*.whl"
@@ -32,6 +33,9 @@ test: $(DEV)
 
 check: lint
 	$(BIN)/python -m pytest -n 2 -q -m ""
+
+bench: $(DEV)
+	$(BIN)/python benchmarks/all.py
 
 fuzz: $(DEV)
 	$(BIN)/python tests/fuzz/fuzz.py

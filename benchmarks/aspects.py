@@ -28,6 +28,8 @@ from statistics import median
 from types import FrameType
 from typing import Any
 
+from measure import interval
+
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.model import Model
 
@@ -94,12 +96,6 @@ def calls(model: Model) -> int:
         sys.setprofile(None)
         gc.enable()
     return count
-
-
-def interval(values: list[float]) -> tuple[float, float]:
-    """A 95 % interval of the median: order statistics, normal approximation of the binomial law."""
-    ordered, reach = sorted(values), 0.98 * len(values) ** 0.5
-    return ordered[max(0, int(len(values) / 2 - reach))], ordered[min(len(values) - 1, int(len(values) / 2 + reach))]
 
 
 def main() -> None:

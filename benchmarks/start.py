@@ -1,0 +1,68 @@
+"""How long it takes to start: `python benchmarks/start.py [--rounds 9]`.
+
+A model of two actors and ten firings is validated and run in processes of their own, with warm caches; wall-clock time,
+as a person waits it, and CPU time.  What Python takes to start and import NumPy is told for comparison.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+
+from measure import Row, table
+
+TINY = """\
+model: tiny
+actors: {clock: {type: Clock, period: 1 s}, scale: {type: Scale, factor: 2}}
+connections: [clock.output -> scale.input]
+run: {stop: 10 s, record: [scale.output]}
+"""
+
+
+def seconds_of(command: list[str], folder: str) -> tuple[float, float]:
+    """The wall-clock and the CPU time of a process."""
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": f"{folder}/pycache"}
+    wall, usage = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL, env=environment)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - usage.ru_utime - usage.ru_stime
+    return time.perf_counter() - wall, cpu
+
+
+def rows(rounds: int = 9) -> Iterator[Row]:
+    """The table's lines."""
+    epicycle = [sys.executable, "-m", "epicycle.runner.cli"]
+    commands = {
+        "epicycle run of a tiny model": ([*epicycle, "run", "tiny.yaml"], 0.8),
+        "epicycle validate of a tiny model": ([*epicycle, "validate", "tiny.yaml"], None),
+        "python -c 'import numpy'": ([sys.executable, "-c", "import numpy"], None),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "tiny.yaml").write_text(TINY, encoding="utf-8")
+        took: dict[str, list[tuple[float, float]]] = {name: [] for name in commands}
+        for number in range(rounds + 1):
+            for name, (command, _) in commands.items():
+                measured = seconds_of(command, folder)
+                if number:
+                    took[name].append(measured)
+    how = f"{rounds} processes each, taking turns, after one that fills the caches"
+    for name, (_, goal) in commands.items():
+        wall, cpu = (median(each[index] for each in took[name]) for index in (0, 1))
+        result = f"{wall:.2f} s ({cpu:.2f} s CPU)"
+        yield Row(
+            name, "", result, "" if goal is None else f"<= {goal:g} s", None if goal is None else wall <= goal, how
+        )
+
+
+if __name__ == "__main__":
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--rounds", type=int, default=9)
+    print(table(rows(options.parse_args().rounds)))
