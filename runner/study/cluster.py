@@ -144,17 +144,10 @@ class DaskExecutor:
         try:
             threads: dict[str, int] = await asyncio.wait_for(client.nthreads(), CONNECT)
             new = sorted(threads.keys() - self._workers)
-            found = await client.run(fitness, workers=new, on_error="return") if new else {}
+            if new:
+                await self._check(client, new)
         except OSError as error:
             raise self._lost() from error
-        for address, each in found.items():
-            if isinstance(each, ImportError):
-                raise WorkerError(
-                    f"the Dask worker {address} has no Epicycle like this one: {each}\n"
-                    "   help: install it there, in the version that is here"
-                )
-            if isinstance(each, dict) and (unlike := differences(each, fitness())):
-                raise WorkerError(f"the Dask worker {address} {unfit(unlike)}")
         self._workers = set(threads)
         # More than the workers take: what is left waits at the scheduler for whoever is free first.
         self._wanted = 2 * sum(threads.values()) + 4
@@ -165,6 +158,17 @@ class DaskExecutor:
                 f"the scheduler {self._scheduler} has had no workers for {PATIENCE:g} s\n"
                 f"   help: 'dask worker {self._scheduler}' starts some"
             )
+
+    async def _check(self, client: Any, workers: list[str]) -> None:
+        """Raise ``WorkerError`` for workers that are not like this machine."""
+        for address, there in (
+            await client.run(resolve_name, _name(fitness), workers=workers, on_error="return")
+        ).items():
+            if isinstance(there, ImportError | AttributeError):
+                raise WorkerError(f"the Dask worker {address} {_without(there)}")
+        for address, there in (await client.run(fitness, workers=workers, on_error="return")).items():
+            if isinstance(there, dict) and (unlike := differences(there, fitness())):
+                raise WorkerError(f"the Dask worker {address} {unfit(unlike)}")
 
     def _lost(self) -> WorkerError:
         return WorkerError(
@@ -194,7 +198,7 @@ class DaskExecutor:
         """Send a batch.  All that the scheduler sees of it is Python's own: it need not know Epicycle."""
         self._batches += 1
         key = f"{self._study}-{self._batches}"
-        make = (resolve_name, f"{host.__name__}:{host.make.__name__}")
+        make = (resolve_name, _name(host.make))
         given = {"study": self._study, "timeout": self._timeout, "tasks": [astuple(each) for each in batch]}
         (future,) = client.get({key: (call, make, self._parcel, json.dumps(given))}, [key], sync=False)
         self._running[asyncio.ensure_future(_result_of(future))] = batch
@@ -215,6 +219,8 @@ class DaskExecutor:
             raise self._lost() from error
         except WorkerError:
             raise
+        except (ImportError, AttributeError) as error:  # of a worker that has just come
+            raise WorkerError(f"a Dask worker {_without(error)}") from error
         except Exception as error:
             raise WorkerError(f"the Dask workers cannot make runs: {type(error).__name__}: {error}") from error
         for task, (what, told) in zip(batch, outcomes, strict=True):
@@ -250,3 +256,12 @@ class DaskExecutor:
 async def _result_of(future: Any) -> list[host.Outcome]:
     found: list[host.Outcome] = await future.result()
     return found
+
+
+def _name(function: Callable[..., object]) -> str:
+    """What ``resolve_name`` finds a function by."""
+    return f"{function.__module__}:{function.__name__}"
+
+
+def _without(error: Exception) -> str:
+    return f"has no Epicycle like this one: {error}\n   help: install it there, in the version that is here"
