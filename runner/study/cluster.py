@@ -26,6 +26,7 @@ from .store import Row, Store, Writer, writing
 
 CONNECT = 10.0  # s in which a scheduler has to answer
 PATIENCE = 60.0  # s without any worker
+_ANSWER = 30.0  # s in which one that is busy has to answer
 _LOOK = 0.5  # s between two looks around
 _BATCH = 0.5  # s that a batch of runs is to take: time enough to bring the next
 _LARGEST = 100  # runs of a batch
@@ -64,12 +65,12 @@ class DaskExecutor:
         self._writer = Writer(store)
         self._decides = None if plan.study.until is None else plan.study.until.metric
         self._study = f"epicycle-{uuid4().hex}"
-        self._parcel: Any = None
+        self._parcel = b""
+        self._sent: dict[str, Any] = {}  # parcels, by worker
         self._batches = 0
         self._running: dict[_Making, list[Task]] = {}
         self._wanted = 1  # batches at a time
         self._seconds = _BATCH  # that a run takes, as far as known
-        self._workers: set[str] = set()
         self._looked = 0.0
         self._seen = time.monotonic()  # when there were workers
 
@@ -86,9 +87,8 @@ class DaskExecutor:
     async def _run(self, first: list[Task], schedule: Schedule, tell: Callable[[], None]) -> None:
         async with self._client() as client:
             try:
+                self._parcel = pack(self._plan)
                 await self._look(client)
-                # The result of a task and no scattered data: it can be made again when all who had it are gone.
-                self._parcel = client.submit(bytes, pack(self._plan), key=f"{self._study}-parcel", pure=False)
                 self._begin(client, first)
                 self._fill(client, schedule)
                 while self._running:
@@ -141,14 +141,11 @@ class DaskExecutor:
         if now - self._looked < _LOOK:
             return
         self._looked = now
-        try:
-            threads: dict[str, int] = await asyncio.wait_for(client.nthreads(), CONNECT)
-            new = sorted(threads.keys() - self._workers)
-            if new:
-                await self._check(client, new)
-        except OSError as error:
-            raise self._lost() from error
-        self._workers = set(threads)
+        threads: dict[str, int] = await self._asked(client.nthreads())
+        for address in self._sent.keys() - threads.keys():
+            del self._sent[address]
+        if new := sorted(threads.keys() - self._sent.keys()):
+            await self._welcome(client, new)
         # More than the workers take: what is left waits at the scheduler for whoever is free first.
         self._wanted = 2 * sum(threads.values()) + 4
         if threads:
@@ -159,16 +156,26 @@ class DaskExecutor:
                 f"   help: 'dask worker {self._scheduler}' starts some"
             )
 
-    async def _check(self, client: Any, workers: list[str]) -> None:
-        """Raise ``WorkerError`` for workers that are not like this machine."""
-        for address, there in (
-            await client.run(resolve_name, _name(fitness), workers=workers, on_error="return")
-        ).items():
+    async def _welcome(self, client: Any, workers: list[str]) -> None:
+        """Send new workers the parcel; raises ``WorkerError`` if one is not like this machine."""
+        options = {"workers": workers, "on_error": "return"}
+        for address, there in (await self._asked(client.run(resolve_name, _name(fitness), **options))).items():
             if isinstance(there, ImportError | AttributeError):
                 raise WorkerError(f"the Dask worker {address} {_without(there)}")
-        for address, there in (await client.run(fitness, workers=workers, on_error="return")).items():
+        for address, there in (await self._asked(client.run(fitness, **options))).items():
             if isinstance(there, dict) and (unlike := differences(there, fitness())):
                 raise WorkerError(f"the Dask worker {address} {unfit(unlike)}")
+        # To each its own, that they have before they have any work: nobody is preferred as he has it, or waited for.
+        for address in workers:
+            parcel = {host.parcel_key(self._study, address): self._parcel}
+            self._sent[address] = await self._asked(client.scatter(parcel, workers=[address]))
+
+    async def _asked(self, question: Any) -> Any:
+        """What the scheduler answers; raises ``WorkerError`` if it does not."""
+        try:
+            return await asyncio.wait_for(question, _ANSWER)
+        except Exception as error:  # of many kinds, whose only reason can be this
+            raise self._lost() from error
 
     def _lost(self) -> WorkerError:
         return WorkerError(
@@ -200,7 +207,7 @@ class DaskExecutor:
         key = f"{self._study}-{self._batches}"
         make = (resolve_name, _name(host.make))
         given = {"study": self._study, "timeout": self._timeout, "tasks": [astuple(each) for each in batch]}
-        (future,) = client.get({key: (call, make, self._parcel, json.dumps(given))}, [key], sync=False)
+        (future,) = client.get({key: (call, make, json.dumps(given))}, [key], sync=False)
         self._running[asyncio.ensure_future(_result_of(future))] = batch
 
     def _end(self, over: _Making, batch: list[Task], schedule: Schedule) -> None:

@@ -20,6 +20,7 @@ from .executor import MAX_STILLBORN, THREADS, WorkerError, stillborn
 from .schedule import Task
 
 _LOOK = 0.5  # s between two looks whether a run is still wanted
+_SOON = 0.05  # s
 _IDLE = 20.0  # s after which a process without work is ended: its study is over
 
 # What becomes of a run: its row, and why its model could not be loaded; or that it took too long, or the exit code of
@@ -123,7 +124,12 @@ class _Child:
             self._told.put((DEAD, self._process.wait()))
 
 
-def make(parcel: bytes, batch: str) -> list[Outcome]:
+def parcel_key(study: str, address: str) -> str:
+    """The name under which the worker at an address has the parcel of a study."""
+    return f"{study}-parcel-{address}"
+
+
+def make(batch: str) -> list[Outcome]:
     """Make runs, on a Dask worker; raises ``WorkerError`` if it cannot."""
     from distributed import get_worker
 
@@ -141,7 +147,7 @@ def make(parcel: bytes, batch: str) -> list[Outcome]:
     try:
         for task in (Task(*each) for each in given["tasks"]):
             for _ in range(MAX_STILLBORN):
-                busy = busy or _taken(study) or _Child(parcel, worker.local_directory)
+                busy = busy or _taken(study) or _Child(_parcel(worker, study, is_wanted), worker.local_directory)
                 outcome = busy.run(task, given["timeout"], is_wanted)
                 if busy.is_ready:
                     break
@@ -164,6 +170,16 @@ def make(parcel: bytes, batch: str) -> list[Outcome]:
         if busy is not None:
             busy.end()
     return outcomes
+
+
+def _parcel(worker: Any, study: str, is_wanted: Callable[[], bool]) -> bytes:
+    """The parcel, which comes soon after a worker that has just come; raises ``_Unwanted``."""
+    while (found := worker.data.get(parcel_key(study, worker.address))) is None:
+        if not is_wanted():
+            raise _Unwanted
+        time.sleep(_SOON)
+    parcel: bytes = found
+    return parcel
 
 
 def _taken(study: str) -> _Child | None:

@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,13 +19,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.runner.cli import main
-from epicycle.runner.study import Plan, open_study, read_study, run_study
+from epicycle.runner.study import Plan, open_study, read_study
+from epicycle.runner.study.one_run import Runner
 from epicycle.runner.study.parcel import fitness, pack
-from epicycle.runner.study.store import Store
+from epicycle.runner.study.schedule import Schedule
 
 sys.path.insert(0, str(Path(__file__).parent))
 from dask_cluster import Cluster, a_cluster
-from study_parts import STUDY, THIS, command, plan_of, write
+from study_parts import STUDY, THIS, command, write
 
 pytest.importorskip("distributed")
 from epicycle.runner.study import cluster as cluster_module
@@ -47,8 +49,8 @@ def study(folder: Path, *arguments: object, out: str = "out") -> int:
 
 
 def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Runs that are ok, raise, hang, and end their process; and a model that cannot be loaded at one level."""
-    text = STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]").replace("replications: 5", "replications: 10")
+    """Runs that are ok, raise, hang, and end their process, batch by batch until the interval is narrow enough."""
+    text = STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]") + "until: {metric: place, half_width: 2.2, batch: 5}\n"
     write(tmp_path, text + "set: {fails: [3], hangs: [5], dies: [7]}\n")
     assert study(tmp_path, "--jobs", 2, "--run-timeout", 1, out="local") == 1
     said = capsys.readouterr()
@@ -57,23 +59,18 @@ def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, caps
     expected = [each.replace(str(tmp_path / "local"), str(tmp_path / "dask")) for each in said]
     assert list(capsys.readouterr()) == expected
     assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
-    assert pq.read_table(tmp_path / "dask" / "table.parquet")["status"].to_pylist().count("ok") == 7
-    # It is gone on with, without anything to do, and until it is narrow enough.
+    statuses = Counter(pq.read_table(tmp_path / "dask" / "table.parquet")["status"].to_pylist())
+    assert statuses.keys() == {"ok", "failed", "timeout", "killed"}
+    # Where there is nothing to do, no scheduler is asked.
     assert main(["resume", str(tmp_path / "dask"), "--executor", "dask", "--scheduler", "127.0.0.1:9"]) == 1
-    assert capsys.readouterr().out.startswith("walks: 1 condition, 0 new runs, 10 there before\n")
+    assert f"0 new runs, {statuses.total()} there before" in capsys.readouterr().out
 
 
-def test_sequential_stopping_is_that_of_local_processes(cluster: Cluster, tmp_path: Path) -> None:
-    plan = plan_of(write(tmp_path, STUDY + "until: {metric: place, half_width: 2, batch: 4, at_most: 24}\n"))
-    run_study(plan, tmp_path / "local", jobs=1)
-    run_study(plan, tmp_path / "dask", executor="dask", scheduler=cluster.address)
-    assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
-
-
-def test_workers_and_the_scheduler_are_lost(tmp_path: Path) -> None:
+def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, STUDY.replace("replications: 5", "replications: 20"))
     pause = ("--set", "pause=0.1")
     assert study(tmp_path, *pause, "--jobs", 2, out="local") == 0
+    capsys.readouterr()
     arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--out", tmp_path / "dask", *pause)
     with a_cluster(tmp_path / "cluster", workers=2) as cluster:
         on_dask = ("--executor", "dask", "--scheduler", cluster.address)
@@ -99,8 +96,8 @@ def test_workers_and_the_scheduler_are_lost(tmp_path: Path) -> None:
     assert process.returncode == 1
     kept = len(open_study(tmp_path / "dask").table())
     assert 8 <= kept < 40
-    done = subprocess.run(command("resume", tmp_path / "dask"), capture_output=True, text=True, check=True)
-    assert done.stdout.startswith(f"walks: 2 conditions, {40 - kept} new runs, {kept} there before\n")
+    assert main(["resume", str(tmp_path / "dask"), "--jobs", "2"]) == 0
+    assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {40 - kept} new runs, {kept} there before\n")
     assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
 
 
@@ -186,6 +183,7 @@ UNPACKED = """
 import json, sys
 from pathlib import Path
 from epicycle.runner.study.one_run import Runner
+from epicycle.runner.study.one_run import Runner
 from epicycle.runner.study.parcel import unpack
 from epicycle.runner.study.schedule import Schedule
 
@@ -210,8 +208,8 @@ def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     plan = Plan.made(read_study("../../link/study/travels.yaml", set=changes, types=[link / "types" / "strolls.py"]))
     parcel = tmp_path / "parcel"
     parcel.write_bytes(pack(plan))
-    run_study(plan, tmp_path / "out", jobs=1)
-    rows = [each for batch in Store(tmp_path / "out").rows() for each in batch.to_pylist()]
+    schedule, runner = Schedule(plan, {}), Runner(plan)
+    rows = [runner.row(task) | {"wall_time": 0} for task in iter(schedule.next, None)]
     shutil.rmtree(home)
     done = subprocess.run(
         [sys.executable, "-c", UNPACKED, str(parcel), str(root)],
@@ -223,7 +221,7 @@ def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     found = json.loads(done.stdout)
     assert [each["error"] for each in found] == [None] * 8
     assert len({each["digest"] for each in found}) == 8
-    assert sorted(found, key=str) == sorted((each | {"wall_time": 0} for each in rows), key=str)
+    assert found == rows
 
 
 # -- who cannot take part ---------------------------------------------------------------------------------------------
