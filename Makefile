@@ -7,7 +7,7 @@ USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 
 .NOTPARALLEL:
-.PHONY: help run paper test check fuzz lint reference wheel clean
+.PHONY: help run paper test check fuzz robust lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
@@ -17,6 +17,7 @@ help:
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
+	@echo "make robust 100,000 problems that no scenario poses: does the solver answer each within its limits?"
 	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
 	@echo "make wheel  build dist/epicycle-*.whl"
 	@echo "make clean  remove all that these made, except results/"
@@ -39,6 +40,9 @@ bench: $(DEV)
 
 fuzz: $(DEV)
 	$(BIN)/python tests/fuzz/fuzz.py
+
+robust: $(DEV)
+	$(BIN)/python tests/numerics/robustness.py
 
 lint: $(DEV)
 	$(BIN)/ruff check .

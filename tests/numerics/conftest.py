@@ -1,6 +1,6 @@
-"""Lets the tests of this folder use the scenario loop of the actors' tests."""
+"""Lets the tests of this folder import the scenario loop of the actors' tests, and ``robustness``."""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "actors"))
+sys.path[:0] = [str(Path(__file__).parents[1] / "actors"), str(Path(__file__).parent)]

@@ -89,13 +89,14 @@ def _drive(task: _Task, controls: Array) -> None:
 
 @inner
 def _excess(task: _Task, controls: Array) -> float:
-    """The largest value of f3-f5; negative if all are kept strictly."""
+    """The largest value of f3-f5: negative if all are kept strictly, inf if one is not a number."""
     _drive(task, controls)
     largest = -math.inf
     for i in range(task.values.shape[0]):
         s = task.constraints.step[i]
         task.values[i] = term(task.constraints, i, task.positions[s, 0], task.positions[s, 1])[0]
-        largest = max(largest, task.values[i])
+        if not task.values[i] <= largest:
+            largest = task.values[i] if task.values[i] < math.inf else math.inf
     return largest
 
 
@@ -186,6 +187,8 @@ def _evaluate(task: _Task, controls: Array, phase: float, mu: float, dual: float
             product = 1.0
     for i in range(constraints.row.shape[0]):
         s = constraints.step[i]
+        if phase == _RESTORE and term(constraints, i, positions[s, 0], positions[s, 1])[0] <= task.bounds[i]:
+            continue  # most are kept, and their derivatives are not even computed
         h, gx, gy, hxx, hxy, hyy = term(constraints, i, positions[s, 0], positions[s, 1])
         slack = task.bounds[i] - h
         if phase == _OPTIMISE:
@@ -197,7 +200,7 @@ def _evaluate(task: _Task, controls: Array, phase: float, mu: float, dual: float
                 product = 1.0
             slope = 1.0 / slack
             add(blocks.position, s, mu * slope, dual * slope, dual * slope * slope, gx, gy, hxx, hxy, hyy)
-        elif slack < 0.0:
+        else:
             value += 0.5 * slack * slack
             add(blocks.position, s, -slack, -slack, 1.0, gx, gy, hxx, hxy, hyy)
     value -= mu * math.log(product)
@@ -218,6 +221,8 @@ def _minimise(task: _Task, controls: Array, phase: float, mu: float, dual: float
     steps = controls.shape[0]
     step, trial = task.step, task.trial
     value = _evaluate(task, controls, phase, mu, dual)
+    if not value < math.inf:  # numbers too large to be squared, or none
+        return 0
     for iteration in range(_NEWTON_STEPS):
         descent = newton_step(task.blocks, task.problem.period, task.feedback, step)
         if not -0.5 * descent > tolerance:
@@ -259,7 +264,7 @@ def _braking(problem: HorizonProblem, steps: int, share: float) -> Array:
     """Controls that brake with at most ``share`` of f2's limit, and per step at most that share of the speed left."""
     controls = np.zeros((steps, 2))
     speed = math.hypot(problem.velocity[0], problem.velocity[1])
-    if not speed > 1e-9:
+    if not 1e-9 < speed < math.inf:
         return controls
     left = speed
     for j in range(steps):
@@ -308,7 +313,7 @@ def _optimise(task: _Task, controls: Array) -> tuple[int, float]:
     mu = dual = max(1e-3, _OPTIMISE_FROM * abs(objective) / count)
     while True:
         least = _GAP * max(1e-2, abs(objective)) / count
-        last = mu <= 1.1 * least
+        last = not mu > 1.1 * least  # also if it is not a number
         iterations += _minimise(task, controls, _OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * mu)
         _drive(task, controls)
         objective = _objective(task, 0.0)
@@ -321,7 +326,8 @@ def solve(problem: HorizonProblem, starts: Array) -> Solution:
     """Solve from the first of ``starts`` (k, N, 2) that is feasible, or else from the least violating restoration.
 
     A start that breaks f1 or f2 is skipped; if all do (the vehicle is faster than it may be), the answer is the
-    hardest braking that f2 allows.  Never raises; the result is finite for finite input.
+    hardest braking that f2 allows.  Never raises, and the controls are finite and keep f2 whatever is asked; where
+    numbers of the problem are not finite, or too large to be squared, the violation may be inf.
     """
     # Field by field, as numba takes 4 us longer to look at a named tuple.
     return Solution(*_solve(*problem, starts))
@@ -353,7 +359,8 @@ def _solve(*fields: Any) -> tuple[Array, float, float, int]:
             break
     if least == math.inf:
         best = _braking(problem, steps, 0.999)
-        return best, max(0.0, violations(problem, best).max()), math.inf, iterations
+        largest = violations(problem, best).max()
+        return best, max(0.0, largest) if largest < math.inf else math.inf, math.inf, iterations
     taken, objective = _optimise(task, best)
     largest = _excess(task, best)
     return best, largest if largest > TOLERANCE else 0.0, objective, iterations + taken
