@@ -57,8 +57,10 @@ def about(results: StudyResults) -> str:
     folder, seeds = results.folder, results.plan.study.seed
     when = datetime.fromtimestamp(folder.joinpath("manifest.json").stat().st_mtime, UTC)
     failed = counts.total() - counts["ok"]
+    version, revision = results.manifest["versions"]["epicycle"], results.manifest["git"]
+    made_with = f"version {version}" if version else f"revision {revision[:10]}" if revision else "no version"
     return (
-        f"Measured on {when:%Y-%m-%d} with version {results.manifest['versions']['epicycle'] or 'unknown'}: "
+        f"Measured on {when:%Y-%m-%d} with {made_with}: "
         f"`epicycle study {results.plan.study.name}`, {counts.total():,} runs ({failed or 'none'} failed), "
         f"{results.plan.replications} of each condition, seeds {seeds} to {seeds + results.plan.replications - 1}."
     )
