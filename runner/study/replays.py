@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -72,6 +75,8 @@ _LOADED: dict[int, Model] = {}
 
 
 def _begin(manifest: dict[str, Any]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who waits for it decides what an interrupt means
+    sys.stdout = open(os.devnull, "w")  # noqa: SIM115  of actors that print
     _PLAN[:] = [Plan.of_manifest(manifest)]
 
 

@@ -291,7 +291,7 @@ def test_report_repeats_runs(wheels: Path, tmp_path: Path, capsys: pytest.Captur
     assert main(["report", str(wheels), "--jobs", "2"]) == 0
     found = page(wheels)
     assert "The first 2 runs of each condition." in found.text
-    assert "Run 1 (speed: 2 m/s, seed 0), which has the most ticks: 21." in found.text
+    assert "Replication 0 (speed: 2 m/s, seed 0), which has the most ticks: 21." in found.text
     shutil.copytree(wheels.parent, tmp_path / "copy")
     manifest = json.loads((tmp_path / "copy" / "out" / "manifest.json").read_text())
     manifest["file"] = str(tmp_path / "copy" / "wheels.yaml")

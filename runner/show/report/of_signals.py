@@ -310,6 +310,6 @@ class SingleRun(SignalFigure):
         value = names.level(self.metric, row[self.metric])
         among = f" among the first {self.runs}" if self.runs else ""
         return (
-            f"Run {row['replication'] + 1} ({names.place(condition.values)}, seed {row['seed']}), which has the "
+            f"Replication {row['replication']} ({names.place(condition.values)}, seed {row['seed']}), which has the "
             f"{self.choose} {names.words(self.metric)}{among}: {value}."
         )

@@ -38,9 +38,7 @@ _STYLE: dict[str, Any] = {
     "lines.markersize": 4.5,
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
-    "svg.hashsalt": "epicycle",
     "svg.fonttype": "path",
-    "savefig.dpi": 200,
 }
 
 
