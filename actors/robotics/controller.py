@@ -138,7 +138,9 @@ class RobustController(Actor):
 
         positions = trajectory(problem.position, problem.velocity, controls, self.period, self._steps)
         self._standing = _Standing(self.now, controls, positions)
-        self.plan.send(Plan(self._name, self.now, own, np.vstack([self._applied, controls[: self.horizon]])))
+        announced = np.empty((self.horizon + 1, 2))
+        announced[0], announced[1:] = self._applied, controls[: self.horizon]
+        self.plan.send(Plan(self._name, self.now, own, announced))
         self._applied = controls[0].copy()
         self.control.send(controls[0].copy())
 
@@ -243,9 +245,11 @@ def braking(problem: HorizonProblem, steps: int) -> Array:
     speed = math.hypot(problem.velocity[0], problem.velocity[1])
     if not 1e-9 < speed < math.inf:
         return controls
-    direction = problem.velocity / speed
-    for row in controls:
+    x, y = (problem.velocity / speed).tolist()  # floats: arithmetic on arrays of two takes ten times as long
+    rows = []
+    for _ in range(steps):
         push = min(0.95 * problem.max_acceleration, speed / problem.period)
-        row[:] = -push * direction
+        rows.append((-push * x, -push * y))
         speed -= push * problem.period
+    controls[:] = rows
     return controls
