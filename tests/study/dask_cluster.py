@@ -44,13 +44,23 @@ class Cluster:
         return self.workers[-1]
 
 
+def without_epicycle(folder: Path) -> dict[str, str]:
+    """What to set for a process that is not to find Epicycle."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "sitecustomize.py").write_text("import sys\n\nsys.modules['epicycle'] = None\n")
+    return {"PYTHONPATH": os.pathsep.join([str(folder), *sys.path])}
+
+
 @contextmanager
 def a_cluster(folder: Path, workers: int = 0) -> Iterator[Cluster]:
-    """A scheduler with workers, until the end."""
+    """A scheduler, which need not know Epicycle, with workers; until the end."""
     folder.mkdir(exist_ok=True)
+    unknowing = without_epicycle(folder / "without")
     found = Cluster(folder)
     file = folder / "scheduler.json"
-    found.scheduler = found.start("scheduler", "--host=127.0.0.1", "--port=0", "--scheduler-file", str(file))
+    found.scheduler = found.start(
+        "scheduler", "--host=127.0.0.1", "--port=0", "--scheduler-file", str(file), **unknowing
+    )
     try:
         deadline = time.monotonic() + 60
         while not found.address and time.monotonic() < deadline:

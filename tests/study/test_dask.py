@@ -25,7 +25,7 @@ from epicycle.runner.study.parcel import fitness, pack
 from epicycle.runner.study.schedule import Schedule
 
 sys.path.insert(0, str(Path(__file__).parent))
-from dask_cluster import Cluster, a_cluster
+from dask_cluster import Cluster, a_cluster, without_epicycle
 from study_parts import STUDY, THIS, command, write
 
 pytest.importorskip("distributed")
@@ -286,10 +286,8 @@ def test_workers_that_are_missing_or_have_no_epicycle(
             f"1: error: the scheduler {cluster.address} has had no workers for 1 s\n"
             f"   help: 'dask worker {cluster.address}' starts some\n"
         )
-        (tmp_path / "without").mkdir()
-        (tmp_path / "without" / "sitecustomize.py").write_text("import sys\nsys.modules['epicycle'] = None\n")
         monkeypatch.setattr(cluster_module, "PATIENCE", 60.0)
-        cluster.add_worker(PYTHONPATH=os.pathsep.join([str(tmp_path / "without"), *sys.path]))
+        cluster.add_worker(**without_epicycle(tmp_path / "without"))
         expected = (
             " has no Epicycle like this one: No module named 'epicycle.runner'; 'epicycle' is not a package\n"
             "   help: install it there, in the version that is here\n"
