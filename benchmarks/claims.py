@@ -2,8 +2,8 @@
 
     python benchmarks/claims.py results/table_1 [--into docs/paper.md]
 
-Prints a table of the claims with their verdicts, or, where claims are judged for each level of something as in
-``readings``, one of verdicts by level; then the guideline.  ``--into`` puts it in the place of what stands between
+Prints a table of the claims with their verdicts, and the guideline; or, where claims are judged for each level of
+something as in ``readings``, a table of verdicts by level.  ``--into`` puts it in the place of what stands between
 ``<!-- STUDY: begin -->`` and ``<!-- STUDY: end -->`` in a file.
 """
 
@@ -124,11 +124,18 @@ def guideline(found: list[Recommendation]) -> Iterator[str]:
 
 def text(results: StudyResults) -> str:
     """All of it."""
-    judged, advice = results.claims(), results.guideline()
+    judged = results.claims()
     parts = [about(results)]
+    if judged and judged[0].where:
+        legend = (
+            "A cell says whether a claim is reproduced (yes), not reproduced (no) or undecided (open), and how many of "
+        )
+        parts.append(f"{legend}its comparisons are confirmed/undecided/reversed.")
+        parts.append("\n".join(by_level(judged)))
+        return "\n\n".join(parts)
     if judged:
-        parts.append("\n".join((by_level if judged[0].where else claims)(judged)))
-    if advice:
+        parts.append("\n".join(claims(judged)))
+    if advice := results.guideline():
         parts.append("\n".join(guideline(advice)))
     return "\n\n".join(parts)
 
