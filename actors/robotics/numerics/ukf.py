@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from .compiled import kernel
+from .compiled import inner, kernel
 from .typing import Array
 
 RELATIVE_POSITION = 0
 RANGE = 1
 
 
-@kernel
+@inner
 def _root(covariance: Array) -> Array:
     """Lower Cholesky factor; a pivot that rounding made negative counts as zero."""
     size = covariance.shape[0]
@@ -39,7 +39,8 @@ def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, A
     points = np.empty((2 * size + 1, size))
     weights = np.full(2 * size + 1, 0.5 / (size + kappa))
     weights[0] = kappa / (size + kappa)
-    points[0] = mean
+    for j in range(size):
+        points[0, j] = mean[j]
     for i in range(size):
         for j in range(size):
             points[1 + i, j] = mean[j] + scale * root[j, i]
@@ -47,15 +48,29 @@ def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, A
     return points, weights
 
 
-@kernel
-def _product(a: Array, b: Array) -> Array:
-    """a @ b summed in index order, so that no BLAS decides the last bits."""
-    result = np.zeros((a.shape[0], b.shape[1]))
-    for i in range(a.shape[0]):
-        for k in range(a.shape[1]):
-            for j in range(b.shape[1]):
-                result[i, j] += a[i, k] * b[k, j]
+@inner
+def _turned(a: Array, b: Array) -> Array:
+    """a @ b @ a.T summed in index order, so that no BLAS decides the last bits."""
+    size, inside = a.shape
+    half, result = np.zeros((size, inside)), np.zeros((size, size))
+    for i in range(size):
+        for k in range(inside):
+            for j in range(inside):
+                half[i, j] += a[i, k] * b[k, j]
+    for i in range(size):
+        for k in range(inside):
+            for j in range(size):
+                result[i, j] += half[i, k] * a[j, k]
     return result
+
+
+@inner
+def _symmetric(a: Array) -> Array:
+    """The mean of a and its transpose, in place; in loops, as array expressions take seconds to compile."""
+    for i in range(a.shape[0]):
+        for j in range(i):
+            a[i, j] = a[j, i] = 0.5 * (a[i, j] + a[j, i])
+    return a
 
 
 @kernel
@@ -75,8 +90,11 @@ def predict(mean: Array, covariance: Array, transition: Array, process_noise: Ar
     for i in range(size):
         for j in range(size):
             predicted[i] += transition[i, j] * mean[j]
-    spread = _product(_product(transition, covariance), transition.T) + process_noise
-    return predicted, 0.5 * (spread + spread.T)
+    spread = _turned(transition, covariance)
+    for i in range(size):
+        for j in range(size):
+            spread[i, j] += process_noise[i, j]
+    return predicted, _symmetric(spread)
 
 
 @kernel
@@ -166,7 +184,7 @@ def update(
     for j in range(size):
         for k in range(rows):
             updated[j] += gain[j, k] * (observed[k] - expected[k])
-    spread = _product(_product(gain, noise), gain.T)
+    spread = _turned(gain, noise)
     error = np.empty(size)
     for i in range(count):
         for j in range(size):
@@ -176,10 +194,10 @@ def update(
         for j in range(size):
             for k in range(size):
                 spread[j, k] += weights[i] * error[j] * error[k]
-    return updated, 0.5 * (spread + spread.T)
+    return updated, _symmetric(spread)
 
 
-@kernel
+@inner
 def _gain(innovation_covariance: Array, cross: Array) -> Array:
     """cross @ inverse(innovation_covariance) by its Cholesky factor; a direction without variance gains nothing."""
     root = _root(innovation_covariance)
