@@ -288,7 +288,9 @@ def _restore(task: _Task, controls: Array) -> tuple[int, float]:
     mu = dual = _RESTORE_FROM
     while True:
         last = mu <= _RESTORE_TO
-        iterations += _minimise(task, controls, _RESTORE, mu, dual, (0.01 if last else _CLOSE) * mu)
+        taken = _minimise(task, controls, _RESTORE, mu, dual, (0.01 if last else _CLOSE) * mu)
+        last = last or taken == _NEWTON_STEPS  # it goes in circles, and would at smaller parameters
+        iterations += taken
         if _excess(task, controls) < 0.0:
             return iterations, 0.0
         if last:
