@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar, cast
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -12,7 +16,8 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 def kernel(function: Function) -> Function:
     """Compile a pure function on arrays; ``error_model="numpy"`` gives inf and NaN instead of exceptions."""
-    return cast(Function, numba.njit(cache=True, error_model="numpy", fastmath=False)(function))
+    with _cache_of_these_sources():
+        return cast(Function, numba.njit(cache=True, error_model="numpy", fastmath=False)(function))
 
 
 def inner(function: Function) -> Function:
@@ -22,3 +27,28 @@ def inner(function: Function) -> Function:
     """
     compiled = numba.njit(error_model="numpy", fastmath=False, no_cpython_wrapper=True)  # type: ignore[call-overload]
     return cast(Function, compiled(function))
+
+
+@contextmanager
+def _cache_of_these_sources() -> Iterator[None]:
+    """Compiled code lies in a folder named after all sources of this package.
+
+    By itself numba looks only at the file of a kernel, and would go on with old code of what that calls from others.
+    """
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    if before:  # the user's own, NUMBA_CACHE_DIR
+        config.CACHE_DIR = str(Path(before) / _SOURCES)
+    elif os.access(_HERE, os.W_OK):
+        config.CACHE_DIR = str(_HERE / "__pycache__" / _SOURCES)
+    else:
+        home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        config.CACHE_DIR = str(Path(home) / "epicycle" / _SOURCES)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+_HERE = Path(__file__).parent
+_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_HERE.glob("*.py")))).hexdigest()[:16]
