@@ -94,7 +94,7 @@ def read_study(
     assert path is not None
     assert node is not None
     text = path.read_text(encoding="utf-8")
-    return _made(node, path, text, tuple(set), tuple(types), replications, problems)
+    return _made(node, _StudyReader(problems, path), text, tuple(set), tuple(types), replications)
 
 
 def study_of_text(
@@ -105,26 +105,28 @@ def study_of_text(
     replications: int | None = None,
     lender: tuple[str, str] | None = None,
 ) -> Study:
-    """The study that a text says, which once was read from ``path``; ``lender``: what then was that of its claims."""
+    """The study that a text says, which once was read from ``path``; the files that it names may be gone.
+
+    ``lender``: file and text of the study that its claims are from.
+    """
     problems = Problems()
     node = parse(text, str(path), problems)
     if node is None:
         problems.raise_if_any()
         raise AssertionError("a text that cannot be read is a problem")
-    return _made(node, path, text, tuple(set), tuple(types), replications, problems, lender)
+    reader = _StudyReader(problems, path, lender, asks_for_files=False)
+    return _made(node, reader, text, tuple(set), tuple(types), replications)
 
 
 def _made(
     node: Node,
-    path: Path,
+    reader: _StudyReader,
     text: str,
     changes: tuple[str, ...],
     types: tuple[Path, ...],
     replications: int | None,
-    problems: Problems,
-    lender: tuple[str, str] | None = None,
 ) -> Study:
-    reader = _StudyReader(problems, path, lender)
+    problems = reader.problems
     study = reader.study(node, text)
     problems.raise_if_any()
     assert study is not None, "what is no study is a problem"
@@ -145,9 +147,17 @@ def _made(
 class _StudyReader(NodeReader):
     """Reads one study file; whatever is misshapen is added to ``problems`` and left out."""
 
-    def __init__(self, problems: Problems, path: Path, lender: tuple[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        problems: Problems,
+        path: Path,
+        lender: tuple[str, str] | None = None,
+        *,
+        asks_for_files: bool = True,
+    ) -> None:
         super().__init__(problems)
         self.path = path
+        self.asks_for_files = asks_for_files  # whether what is named has to be there
         self.lender = lender  # file and text of the study whose claims are judged here, if they are known
 
     def study(self, node: Node, text: str) -> Study | None:
@@ -209,7 +219,8 @@ class _StudyReader(NodeReader):
 
     def factors_of(self, node: Node, path: Path, problems: Problems) -> dict[str, str]:
         """What another study varies, whose claims this one judges."""
-        found = _StudyReader(problems, path).study(without(node, "claims", "guideline"), "")
+        reader = _StudyReader(problems, path, asks_for_files=self.asks_for_files)
+        found = reader.study(without(node, "claims", "guideline"), "")
         return {} if found is None else found.factors
 
     # -- values ---------------------------------------------------------------------------------------------------
@@ -240,11 +251,11 @@ class _StudyReader(NodeReader):
         name = self.text(node, "the model") or ""
         if is_path(name):
             file = self.path.parent / name
-            if not file.is_file():
+            if self.asks_for_files and not file.is_file():
                 beside = [each.name for each in file.parent.glob("*.yaml")] if file.parent.is_dir() else []
                 self.problems.add(f"there is no file {name!r}{did_you_mean(file.name, beside)}", node.position)
             return str(file)
-        if name not in packaged_models():
+        if self.asks_for_files and name not in packaged_models():
             known = list(packaged_models())
             self.problems.add(
                 f"there is no packaged model {name!r}{did_you_mean(name, known)}",
@@ -443,7 +454,7 @@ class _StudyReader(NodeReader):
                 name = str(self.path.parent / text.text) if is_path(text.text) else text.text
                 found = Problems()
                 file = find_disturbance(name, found)
-                if file is None or not file.is_file():
+                if self.asks_for_files and (file is None or not file.is_file()):
                     known = list(packaged_disturbances())
                     self.problems.add(
                         f"there is no disturbance {text.text!r}{did_you_mean(text.text, known)}",

@@ -320,6 +320,20 @@ def test_resume_wants_the_same_model(copied: Path, capsys: pytest.CaptureFixture
     )
 
 
+def test_results_can_be_read_where_their_model_is_not(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = open_study(copied / "out").means("place")
+    home = copied / "elsewhere"
+    home.mkdir()
+    (copied / "out").rename(home / "out")
+    manifest = json.loads((home / "out" / "manifest.json").read_text())
+    (home / "out" / "manifest.json").write_text(json.dumps(manifest | {"file": "/nowhere/walks.yaml"}))
+    assert open_study(home / "out").means("place") == before
+    assert main(["status", str(home / "out")]) == 0
+    capsys.readouterr()
+    assert main(["resume", str(home / "out")]) == 2
+    assert capsys.readouterr().err == "error: there is no file /nowhere/walk.yaml: there is no folder /nowhere\n"
+
+
 def test_truncated_part(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     part = next((copied / "out" / "parts").glob("*.parquet"))
     lost = pq.read_metadata(part).num_rows
