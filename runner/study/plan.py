@@ -59,6 +59,7 @@ class Plan:
         extra: list[dict[int, Sources]],
         texts: dict[str, str],
         columns: dict[str, Column],
+        made_with: str,
         files: Iterable[str] = (),
     ) -> None:
         self.study = study
@@ -67,6 +68,7 @@ class Plan:
         self.texts = texts  # the YAML of the model and of all that belongs to it
         self.files = tuple(files)  # all that were read, by the names by which they were
         self.columns = columns
+        self.made_with = made_with  # the version of Epicycle
         self._extra = extra  # by dimension, the files that single levels read beside the others
         self._sizes = [dimension.size for dimension in study.dimensions]
         self.conditions = prod(self._sizes)
@@ -112,7 +114,7 @@ class Plan:
         study.questions.check([metric.name for metric in metrics], problems)
         problems.raise_if_any()
         columns = columns_of(study.dimensions, metrics, read.models[0])
-        return cls(study, metrics, sources, extra, read.texts, columns, read.files)
+        return cls(study, metrics, sources, extra, read.texts, columns, epicycle_version(), read.files)
 
     @classmethod
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
@@ -128,12 +130,13 @@ class Plan:
         metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
         extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
         columns = columns_of_manifest(manifest)
-        return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns)
+        return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
 
     def manifest(self) -> dict[str, Any]:
         """What ``of_manifest`` needs."""
         study = self.study
         return {
+            "epicycle": self.made_with,
             "study": study.name,
             "file": str(study.path.resolve()),
             "text": study.text,
@@ -176,7 +179,7 @@ class Plan:
         for extra, at in zip(self._extra, indices, strict=True):
             sources.update(extra.get(at, {}))
         identity = {
-            "epicycle": epicycle_version(),
+            "epicycle": self.made_with,
             "model": Path(self.study.model).name,
             "sources": sorted(sources.items()),
             "set": [[setting.path, plain(setting.node)] for setting in settings],

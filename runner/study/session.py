@@ -16,7 +16,7 @@ from ..engine import Simulation
 from ..provenance import git_revision, machine, versions
 from .executor import Executor
 from .local import LocalExecutor
-from .plan import Plan
+from .plan import Plan, epicycle_version
 from .results import StudyResults
 from .schedule import OK, Schedule
 from .store import FORMAT, Store, StoreError, collect, is_wanted, lock, prepare, read_manifest
@@ -104,9 +104,17 @@ def manifest_of(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_folder(folder: Path) -> Plan:
-    """The plan of a results folder, to go on with; raises ``StoreError`` if its model is not the same any more."""
+    """The plan of a results folder, to go on with.
+
+    Raises ``StoreError`` if its model, or Epicycle, is not the same any more.
+    """
     manifest = read_manifest(folder)
     before = Plan.of_manifest(manifest)
+    if (version := epicycle_version()) != before.made_with:
+        raise StoreError(
+            f"{folder} was made with Epicycle {before.made_with}, and this is Epicycle {version}\n"
+            f"   help: install that one, or make all runs anew: 'epicycle study {before.study.path} --out ANOTHER'"
+        )
     plan = Plan.made(before.study)
     if changed := sorted(name for name, digest in plan.sources.items() if before.sources.get(name) != digest):
         raise StoreError(

@@ -348,7 +348,7 @@ def test_every_factor_is_shown_somewhere(
         "study: s\nmodel: mm1\nvary: {day: {cases: {calm: , busy: }}, load: [0.5, 0.9], mean_service: [1.0, 2.0],"
         " both: {zip: {a: [1, 2], b: [1, 2]}}}\n"
     )
-    plan = Plan(read_study(tmp_path / "s.yaml"), [], {}, [{}, {}, {}, {}], {}, {})
+    plan = Plan(read_study(tmp_path / "s.yaml"), [], {}, [{}, {}, {}, {}], {}, {}, "0")
     found = roles(plan, fixed, over, lines, panels, has_axis=True)
     assert (found.over, found.lines, found.panels) == expected
 
@@ -368,7 +368,7 @@ def test_every_factor_is_shown_somewhere(
 def test_figures_of_a_study_that_names_none(vary: str, figures: list[str], tmp_path: Path) -> None:
     (tmp_path / "s.yaml").write_text(f"study: s\nmodel: mm1\n{vary}\n")
     study = read_study(tmp_path / "s.yaml")
-    plan = Plan(study, [StudyMetric("one", "1")], {}, [{} for _ in study.dimensions], {}, {})
+    plan = Plan(study, [StudyMetric("one", "1")], {}, [{} for _ in study.dimensions], {}, {}, "0")
     problems = Problems()
     found = figures_of_study(plan, problems)
     assert list(found) == figures

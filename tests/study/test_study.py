@@ -21,7 +21,9 @@ from epicycle.actors import EpicycleError
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
 from epicycle.runner.study import StoreError, run_study
+from epicycle.runner.study import plan as plan_module
 from epicycle.runner.study import progress as progress_module
+from epicycle.runner.study import session as session_module
 from epicycle.runner.study import store as store_module
 from epicycle.runner.study.schedule import OK, Done, Schedule
 from epicycle.runner.study.session import duration, manifest_of
@@ -332,6 +334,24 @@ def test_results_can_be_read_where_their_model_is_not(copied: Path, capsys: pyte
     capsys.readouterr()
     assert main(["resume", str(home / "out")]) == 2
     assert capsys.readouterr().err == "error: there is no file /nowhere/walk.yaml: there is no folder /nowhere\n"
+
+
+def test_results_of_another_version_are_read_and_not_gone_on_with(
+    copied: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = open_study(copied / "out").table()
+    manifest = json.loads((copied / "out" / "manifest.json").read_text())
+    (copied / "out" / "manifest.json").write_text(json.dumps(manifest | {"file": str(copied / "walks.yaml")}))
+    for module in (plan_module, session_module):
+        monkeypatch.setattr(module, "epicycle_version", lambda: "47.11")
+    assert open_study(copied / "out").table() == before
+    assert main(["resume", str(copied / "out")]) == 2
+    assert message(capsys, copied) == (
+        f"error: out was made with Epicycle {manifest['epicycle']}, and this is Epicycle 47.11\n"
+        "   help: install that one, or make all runs anew: 'epicycle study walks.yaml --out ANOTHER'\n"
+    )
+    assert study(copied) == 0
+    assert capsys.readouterr().out.startswith("walks: 2 conditions, 10 new runs, 0 there before\n")
 
 
 def test_truncated_part(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
