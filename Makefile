@@ -7,7 +7,7 @@ USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 
 .NOTPARALLEL:
-.PHONY: help run paper test check fuzz robust lint reference wheel clean
+.PHONY: help run paper test check bench fuzz robust lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
