@@ -165,6 +165,8 @@ def test_claims_and_guideline(queue: Path) -> None:
     assert found.tables["Claims"][1][:3] == ["load_hurts", " mean_wait rises over load", judgement.verdict]
     rows = [row for row in found.tables["Claims"] if row[0].startswith("mean wait (s), load: 0.9 less load: 0.5; ")]
     assert len(rows) == len(judgement.findings) == 3
+    (weakest,) = (row for row, each in zip(rows, judgement.findings, strict=True) if each == judgement.weakest)
+    assert found.tables["Claims"][1][-1] == f"{weakest[1]} ({weakest[2]}) {weakest[0]}"
     for row, finding in zip(rows, judgement.findings, strict=True):
         assert float(row[1]) == pytest.approx(finding.value, abs=0.05 * (finding.high - finding.low))
         assert row[-1] == finding.outcome

@@ -24,6 +24,7 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
     if apart:
         yield tag("div", _by_level(data.names, judgements), class_="scroll")
     head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
+    head.append("what speaks most against it, or least for it")
     yield with_class(
         table(
             head,
@@ -34,6 +35,7 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
                     [each.claim.doc, " ", tag("small", each.claim.statement)],
                     _verdict(each),
                     *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
+                    _weakest(data.names, each),
                 ]
                 for each in judgements
             ],
@@ -83,9 +85,7 @@ def _findings(names: Names, judgement: Judgement) -> Html:
         [
             _compared(names, judgement, each),
             _value(each),
-            "–"
-            if math.isnan(each.low)
-            else " to ".join(rounded(end, each.high - each.low) for end in (each.low, each.high)),
+            _interval(each),
             f"{each.count}{f' ({each.missing} missing)' if each.missing else ''}",
             *([] if is_rate else ["–" if math.isnan(each.p_holm) else f"{each.p_holm:.2g}"]),
             tag("span", each.outcome, class_={CONFIRMED: "reproduced", REVERSED: "not-reproduced"}.get(each.outcome)),
@@ -93,6 +93,19 @@ def _findings(names: Names, judgement: Judgement) -> Html:
         for each in judgement.findings
     ]
     return tag("div", table([*head, *([] if is_rate else ["p (Holm)"]), "outcome"], rows), class_="scroll")
+
+
+def _weakest(names: Names, judgement: Judgement) -> Content:
+    finding = judgement.weakest
+    if finding is None or not finding.count:
+        return "–"
+    return [f"{_value(finding)} ({_interval(finding)}) ", tag("small", _compared(names, judgement, finding))]
+
+
+def _interval(finding: Finding) -> str:
+    if math.isnan(finding.low):
+        return "–"
+    return " to ".join(rounded(end, finding.high - finding.low) for end in (finding.low, finding.high))
 
 
 def _compared(names: Names, judgement: Judgement, finding: Finding) -> str:
