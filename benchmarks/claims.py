@@ -84,14 +84,16 @@ def weakest(judgement: Judgement, finding: Finding | None) -> str:
 
 def claims(found: list[Judgement]) -> Iterator[str]:
     """One line for each claim."""
-    yield from head(["claim", "", "verdict", "confirmed", "undecided", "reversed", "what speaks least for it"])
+    counted = ["confirmed", "undecided", "reversed", "agreeing"]
+    yield from head(["claim", "", "verdict", *counted, "what speaks least for it"])
     for each in found:
         counts = (str(each.counts(outcome)) for outcome in (CONFIRMED, UNDECIDED, REVERSED))
-        yield row([each.name, each.claim.doc, f"**{each.verdict}**", *counts, weakest(each, each.weakest)])
+        about_it = [each.name, each.claim.doc, f"**{each.verdict}**", *counts, str(each.agreeing)]
+        yield row([*about_it, weakest(each, each.weakest)])
 
 
 def by_level(found: list[Judgement]) -> Iterator[str]:
-    """One line for each level of what the claims are judged for, with confirmed, undecided and reversed comparisons."""
+    """One line for each level of what the claims are judged for."""
     places = list(dict.fromkeys(levels(each.where) for each in found))
     names = list(dict.fromkeys(each.name for each in found))
     verdicts = {(levels(each.where), each.name): each for each in found}
@@ -101,7 +103,7 @@ def by_level(found: list[Judgement]) -> Iterator[str]:
         for name in names:
             each = verdicts[place, name]
             counts = "/".join(str(each.counts(outcome)) for outcome in (CONFIRMED, UNDECIDED, REVERSED))
-            cells.append(f"{SHORT[each.verdict]} {counts}")
+            cells.append(f"{SHORT[each.verdict]} {counts}, {each.agreeing}")
         yield row([place, *cells])
 
 
@@ -127,10 +129,10 @@ def text(results: StudyResults) -> str:
     judged = results.claims()
     parts = [about(results)]
     if judged and judged[0].where:
-        legend = (
-            "A cell says whether a claim is reproduced (yes), not reproduced (no) or undecided (open), and how many of "
+        parts.append(
+            "A cell says whether a claim is reproduced (yes), not reproduced (no) or undecided (open), how many of its "
+            "comparisons are\nconfirmed/undecided/reversed, and how many point where the claim says, by chance or not."
         )
-        parts.append(f"{legend}its comparisons are confirmed/undecided/reversed.")
         parts.append("\n".join(by_level(judged)))
         return "\n\n".join(parts)
     if judged:

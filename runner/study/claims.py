@@ -86,6 +86,13 @@ class Judgement:
         return sum(finding.outcome == outcome for finding in self.findings)
 
     @property
+    def agreeing(self) -> int:
+        """How many means point where the claim says, by chance or not; of conditions, how many hold in all runs."""
+        if self.claim.form == ALWAYS:
+            return sum(finding.count > 0 and finding.value == 1 for finding in self.findings)
+        return sum(_support(self.claim, finding) > 0 for finding in self.findings)
+
+    @property
     def missing(self) -> int:
         """How many runs or pairs have no number, over all comparisons."""
         return sum(finding.missing for finding in self.findings)
@@ -108,6 +115,7 @@ class Judgement:
             "confirmed": self.counts(CONFIRMED),
             "reversed": self.counts(REVERSED),
             "undecided": self.counts(UNDECIDED),
+            "agreeing": self.agreeing,
             "missing": self.missing,
             "weakest": None if weakest is None else _finite(asdict(weakest)),
             "findings": [_finite(asdict(finding)) for finding in self.findings],

@@ -94,6 +94,8 @@ def test_comparisons_are_scipys_paired_tests() -> None:
         assert (finding.p, finding.low, finding.high) == pytest.approx((test.pvalue, low, high))
         assert finding.bootstrap_low == pytest.approx(finding.low, abs=0.1)
         assert finding.count == 30
+    assert found.agreeing == sum(test.statistic < 0 for test in expected)
+    assert found.as_dict()["agreeing"] == found.agreeing
     assert [each.level for each in found.findings] == [{"servers": 2}] * 2
     assert [each.against for each in found.findings] == [{"servers": 3}, {"servers": 4}]
     assert {json.dumps(each.where) for each in found.findings} == {'{"load": 0.7}'}
@@ -126,6 +128,7 @@ def test_conditions_are_counted_with_wilsons_interval() -> None:
 
     found = one("always: wait > 0, where: {servers: 1}", numbers, runs=200)
     assert outcomes(found) == ["confirmed", "reversed", "reversed"]
+    assert found.agreeing == 1
     middle = found.findings[1]
     hits = round(middle.value * 200)
     interval = stats.binomtest(hits, 200).proportion_ci(0.95, method="wilson")
@@ -422,6 +425,6 @@ def test_claims_of_another_study_are_judged_at_each_level_of_what_it_has_not(que
     ]
     assert [[re.sub("<.*?>", "", cell) for cell in row] for row in rows] == [
         ["variant", "true_by_theory", "false_by_theory"],
-        ["usual", "reproduced", "not reproduced"],
-        ["slow", "reproduced", "not reproduced"],
+        ["usual", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
+        ["slow", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
     ]

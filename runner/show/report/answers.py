@@ -24,7 +24,7 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
     if apart:
         yield tag("div", _by_level(data.names, judgements), class_="scroll")
     head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
-    head.append("what speaks most against it, or least for it")
+    head += ["agreeing", "what speaks most against it, or least for it"]
     yield with_class(
         table(
             head,
@@ -35,6 +35,7 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
                     [each.claim.doc, " ", tag("small", each.claim.statement)],
                     _verdict(each),
                     *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
+                    str(each.agreeing),
                     _weakest(data.names, each),
                 ]
                 for each in judgements
@@ -47,7 +48,8 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
         "p",
         "A comparison is a mean of differences between runs of the same replication, with Student's 95 % interval; the "
         "p-values of one claim are corrected together (Holm). It is confirmed or reversed if the corrected p-value is "
-        "below 0.05, and no more than one run in twenty is missing; otherwise undecided.",
+        "below 0.05, and no more than one run in twenty is missing; otherwise undecided. agreeing: how many point the "
+        "claimed way, by chance or not.",
         class_="note",
     )
     for each in judgements:
@@ -67,11 +69,15 @@ def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
     return table(
         [*map(names.axis, judgements[0].where), *claims],
         [
-            [*map(shown, levels), *(_verdict(found[levels, claim]) for claim in claims)]
+            [*map(shown, levels), *(_by_chance_or_not(found[levels, claim]) for claim in claims)]
             for levels in dict.fromkeys(levels for levels, _ in found)
         ],
         names=len(judgements[0].where),
     )
+
+
+def _by_chance_or_not(judgement: Judgement) -> Content:
+    return [_verdict(judgement), tag("small", f"{judgement.agreeing} of {len(judgement.findings)} agree")]
 
 
 def _verdict(judgement: Judgement) -> Html:
