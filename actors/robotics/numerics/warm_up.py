@@ -22,7 +22,7 @@ _PATIENCE = 1.0  # s before the wait is explained; loading the cached kernels is
 @functools.cache
 def compile_kernels() -> None:
     """Call every kernel with small arrays; the first call of a process does it, later ones do nothing."""
-    message = "compiling the numeric kernels (once, about 20 s) ..."
+    message = "compiling the numeric kernels (once, about 30 s) ..."
     notice = threading.Timer(_PATIENCE, _LOGGER.info, (message,))
     notice.daemon = True
     notice.start()
