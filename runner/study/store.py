@@ -36,7 +36,7 @@ try:
 except ImportError:  # Windows: nothing tells two processes that they write to one folder
     fcntl = None  # type: ignore[assignment]
 
-FORMAT = 1
+FORMAT = 2
 ROWS_OF_A_PART = 1_000
 SECONDS_TO_THE_DISK = 1.0
 BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of one run, the better one counts
@@ -125,6 +125,13 @@ def rank(status: str) -> int:
 # -- the manifest -----------------------------------------------------------------------------------------------------
 
 
+# What a plan is made of again.
+_NEEDED = (
+    "epicycle", "study", "file", "text", "set", "types", "replications", "factors", "metrics", "model", "sources",
+    "level_sources",
+)  # fmt: skip
+
+
 def read_manifest(folder: Path) -> dict[str, Any]:
     """What a results folder says of itself; raises ``StoreError``."""
     path = folder / "manifest.json"
@@ -138,8 +145,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise StoreError(f"{path} is broken: {error}") from error
     if not isinstance(manifest, dict) or "level_sources" not in manifest:
         raise StoreError(f"{folder} holds other results, not those of a study")
-    if manifest["format"] != FORMAT:
-        raise StoreError(f"{folder} has format {manifest['format']}, this Epicycle reads format {FORMAT}")
+    if (found := manifest.get("format")) != FORMAT:
+        raise StoreError(f"{folder} has format {found}, this Epicycle reads format {FORMAT}")
+    if missing := [key for key in _NEEDED if key not in manifest]:
+        raise StoreError(f"{path} is broken: it has no {', '.join(map(repr, missing))}")
     return manifest
 
 

@@ -298,6 +298,14 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
     (copied / "mine" / "manifest.json").write_text('{"model": "mm1"}')
     assert study(copied, out="mine") == 2
     assert message(capsys, copied) == "error: mine holds other results, not those of a study\n"
+    manifest = json.loads((copied / "out" / "manifest.json").read_text())
+    for spoiled, said in (
+        (manifest | {"format": 1}, "mine has format 1, this Epicycle reads format 2"),
+        ({key: manifest[key] for key in manifest if key != "text"}, "mine/manifest.json is broken: it has no 'text'"),
+    ):
+        (copied / "mine" / "manifest.json").write_text(json.dumps(spoiled))
+        assert main(["status", str(copied / "mine")]) == 2
+        assert message(capsys, copied) == f"error: {said}\n"
     with lock(copied / "out"):
         assert study(copied) == 2
     said = message(capsys, copied)
