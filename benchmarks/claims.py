@@ -14,7 +14,6 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -54,13 +53,13 @@ def head(cells: list[str]) -> Iterator[str]:
 def about(results: StudyResults) -> str:
     """What was run, when, and with what."""
     counts = results.counts()
-    folder, seeds = results.folder, results.plan.study.seed
-    when = datetime.fromtimestamp(folder.joinpath("manifest.json").stat().st_mtime, UTC)
+    seeds = results.plan.study.seed
+    when = results.manifest["date"].partition("T")[0]
     failed = counts.total() - counts["ok"]
     version, revision = results.manifest["versions"]["epicycle"], results.manifest["git"]
     made_with = f"version {version}" if version else f"revision {revision[:10]}" if revision else "no version"
     return (
-        f"Measured on {when:%Y-%m-%d} with {made_with}: "
+        f"Measured on {when} with {made_with}: "
         f"`epicycle study {results.plan.study.name}`, {counts.total():,} runs ({failed or 'none'} failed), "
         f"{results.plan.replications} of each condition, seeds {seeds} to {seeds + results.plan.replications - 1}."
     )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 from epicycle.actors import declared_parameters, parse_unit
 
@@ -38,13 +37,6 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
     for metric in metrics:
         found[metric.name] = own.get(metric.source.strip(), Column())
     return found
-
-
-def columns_of_manifest(manifest: Mapping[str, Any]) -> dict[str, Column]:
-    """The columns of a results folder; of older ones nothing is known but their names."""
-    said = manifest.get("columns", {})
-    names = [*manifest["factors"], *manifest["metrics"]]
-    return {name: Column(**said[name]) if name in said else Column() for name in names}
 
 
 def _declared(path: str, model: Model) -> Column:

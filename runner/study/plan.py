@@ -16,7 +16,7 @@ from ..model.document import plain
 from ..model.files import Noted, noting
 from ..model.own_types import types_of_file
 from ..model.settings import Setting
-from .columns import Column, columns_of, columns_of_manifest
+from .columns import Column, columns_of
 from .declaration import RESERVED, Study, study_of_text
 from .dimensions import Factor, Level
 from .metrics import StudyMetric
@@ -129,7 +129,7 @@ class Plan:
         )
         metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
         extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
-        columns = columns_of_manifest(manifest)
+        columns = {name: Column(**said) for name, said in manifest["columns"].items()}
         return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
 
     def manifest(self) -> dict[str, Any]:

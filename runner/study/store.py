@@ -127,8 +127,8 @@ def rank(status: str) -> int:
 
 # What a plan is made of again.
 _NEEDED = (
-    "epicycle", "study", "file", "text", "set", "types", "replications", "factors", "metrics", "model", "sources",
-    "level_sources",
+    "epicycle", "study", "file", "text", "set", "types", "replications", "factors", "metrics", "columns", "model",
+    "sources", "level_sources",
 )  # fmt: skip
 
 
