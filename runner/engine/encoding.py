@@ -56,25 +56,91 @@ def plain(token: Any) -> Any:
     return _shown(token)
 
 
+Encode = Callable[[Any], bytes]
+
+
+class Encoders(dict[type, Encode]):
+    """``encoders[type(token)](token)`` is a token as bytes; what a type is, is found out when it is first met.
+
+    One token is logged many times: by who sends it, by channels that hand it on, by aspects on its way.  What became
+    of one that cannot change is therefore remembered until ``forget``.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._remembered: dict[int, tuple[Any, bytes]] = {}  # with the token, lest another one gets its id
+
+    def __missing__(self, cls: type) -> Encode:
+        encode = _ENCODERS[cls]
+        if is_frozen(cls):
+            encode = self._once(encode)
+        self[cls] = encode
+        return encode
+
+    def forget(self) -> None:
+        """Forget all tokens, which are kept until then."""
+        self._remembered.clear()
+
+    def _once(self, encode: Encode) -> Encode:
+        remembered = self._remembered
+
+        def encode_once(token: Any) -> bytes:
+            known = remembered.get(id(token))
+            if known is not None:
+                return known[1]
+            encoded = encode(token)
+            if is_immutable(token):
+                remembered[id(token)] = token, encoded
+            return encoded
+
+        return encode_once
+
+
+@cache
+def is_frozen(cls: object) -> bool:
+    """Whether it is a dataclass whose fields cannot be set."""
+    params = vars(cls).get("__dataclass_params__")
+    return params is not None and bool(params.frozen)
+
+
+def is_immutable(token: Any) -> bool:
+    """Whether a token cannot change: frozen through and through, its arrays read-only and nobody else's."""
+    kind: type = type(token)
+    if kind in _ATOMS:
+        return True
+    if kind is np.ndarray:
+        return not token.flags.writeable and token.base is None and token.dtype.kind in "biuf"
+    if kind is tuple:
+        return all(map(is_immutable, token))
+    if not is_frozen(kind):  # or not even a dataclass
+        return False
+    for name in field_names(kind):
+        value = getattr(token, name)
+        if type(value) not in _ATOMS and not is_immutable(value):
+            return False
+    return True
+
+
+_ATOMS = frozenset({float, int, bool, str, type(None)})
+
+
 def canonical(token: Any) -> bytes:
     """A token as bytes: equal tokens give equal bytes on every machine, and no two kinds are confused."""
-    kind = type(token)
-    if kind is float:  # the commonest ones at once
-        return b"f" + (_NAN if token != token else _DOUBLE(token))  # noqa: PLR0124  NaN is; asked without a call
-    if kind is int and -(2**63) <= token < 2**63:
-        return b"i" + _INTEGER(token)
-    encode = _ENCODERS.get(kind)
-    if encode is None:
-        encode = _ENCODERS[kind] = _encoder(kind)
-    return encode(token)
+    return _ENCODERS[type(token)](token)
 
 
-# By the types that have been met: what a token is, is found out once for each type.
-_ENCODERS: dict[type, Callable[[Any], bytes]] = {}
+class _OfTypes(dict[type, Encode]):
+    """What makes bytes of the tokens of a type, by the types that have been met."""
+
+    def __missing__(self, cls: type) -> Encode:
+        encode = self[cls] = _encoder(cls)
+        return encode
 
 
-def _encoder(cls: type) -> Callable[[Any], bytes]:
-    """What makes bytes of the tokens of one type."""
+_ENCODERS = _OfTypes()
+
+
+def _encoder(cls: type) -> Encode:
     if issubclass(cls, float):
         return _float
     if issubclass(cls, np.ndarray):
@@ -90,7 +156,7 @@ def _encoder(cls: type) -> Callable[[Any], bytes]:
 
 
 def _float(token: float) -> bytes:
-    return b"f" + (_NAN if math.isnan(token) else _DOUBLE(token))
+    return b"f" + (_NAN if token != token else _DOUBLE(token))  # noqa: PLR0124  NaN is; asked without a call
 
 
 def _integer(token: int) -> bytes:
@@ -120,7 +186,7 @@ def _other(token: Any) -> bytes:
     return b"r" + _text(_shown(token))
 
 
-_OF_KINDS: tuple[tuple[Any, Callable[[Any], bytes]], ...] = (
+_OF_KINDS: tuple[tuple[Any, Encode], ...] = (
     (bool, lambda token: b"t" if token else b"u"),
     (int, _integer),
     (str, lambda token: b"s" + _text(token)),
@@ -131,7 +197,7 @@ _OF_KINDS: tuple[tuple[Any, Callable[[Any], bytes]], ...] = (
 )
 
 
-def _fields_encoder(cls: type) -> Callable[[Any], bytes]:
+def _fields_encoder(cls: type) -> Encode:
     """The encoder of a dataclass: what is the same for all its instances is encoded here."""
     names = field_names(cls)
     head = b"d" + _text(cls.__qualname__) + _COUNT(len(names))
@@ -140,7 +206,8 @@ def _fields_encoder(cls: type) -> Callable[[Any], bytes]:
     def encode(token: Any) -> bytes:
         pieces = [head]
         for name, encoded in fields:
-            pieces += (encoded, canonical(getattr(token, name)))
+            value = getattr(token, name)
+            pieces += (encoded, _ENCODERS[type(value)](value))
         return b"".join(pieces)
 
     return encode
@@ -150,11 +217,11 @@ def _array(token: Any) -> bytes:
     kind = token.dtype.kind
     if kind not in "biuf":
         return b"A" + canonical(token.dtype.str) + canonical(token.tolist())
-    array = np.ascontiguousarray(token)
     # The largest number of an array with a NaN is NaN; asking so takes a quarter of the time of isnan(...).any().
-    if kind == "f" and array.size and math.isnan(array.item(array.argmax())):
-        array = np.where(np.isnan(array), array.dtype.type(np.nan), array)
-    return _array_head(array.dtype, array.shape) + array.tobytes()
+    if kind == "f" and token.size and math.isnan(token.item(token.argmax())):
+        token = np.where(np.isnan(token), token.dtype.type(np.nan), token)
+    data: bytes = token.tobytes()
+    return _array_head(token.dtype, token.shape) + data
 
 
 @cache

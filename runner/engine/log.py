@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import EpicycleError, Tag, to_seconds
 
 from ..tables import pandas_module, short
-from .encoding import canonical, plain
+from .encoding import Encoders, canonical, plain
 
 if TYPE_CHECKING:
     import pandas
@@ -22,6 +22,7 @@ COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "
 _TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 FORMATS = (".parquet", ".csv", ".jsonl")
 _PIECES = 3_000  # that are hashed together
+_LARGE = 10_000  # bytes of one value, from which on it is hashed at once: many of them would fill the memory
 
 Write = Callable[["Tag", Any], None]
 
@@ -78,6 +79,7 @@ class EventLog:
         # What the digest is made of, three pieces a record: tag, names, value.  They are hashed many at a time.
         self._hash = hashlib.sha256()
         self._pieces: list[bytes] = []
+        self._encoders = Encoders()
         self._hashed = 0  # records
         self._tag: Tag | None = None  # of the last record
         self._stamp = b""  # the same in bytes
@@ -96,13 +98,15 @@ class EventLog:
 
     def _new_writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
         head = b"".join(map(canonical, (event, actor, port, aspect, channel)))
-        pieces = self._pieces
+        pieces, encoders = self._pieces, self._encoders
 
         def write(tag: Tag, value: Any) -> None:
-            encoded = canonical(value)  # raises what cannot be logged
+            encoded = encoders[type(value)](value)  # raises what cannot be logged
             if tag is not self._tag:
                 self._turn_to(tag)
             pieces.extend((self._stamp, head, encoded))
+            if len(encoded) > _LARGE:
+                self._hash_pieces()
 
         if self._keeps is None or not self._keeps(event, actor, port, aspect):
             return write
@@ -125,6 +129,7 @@ class EventLog:
         self._hash.update(b"".join(self._pieces))
         self._hashed += len(self._pieces) // 3
         self._pieces.clear()
+        self._encoders.forget()
 
     @property
     def count(self) -> int:

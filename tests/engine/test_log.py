@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import itertools
 import json
 import math
@@ -10,6 +11,7 @@ import os
 import struct
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -29,10 +31,13 @@ from epicycle.runner.engine import (
     Simulation,
     canonical,
     check_log_path,
+    encoding,
     plain,
     scalars,
     write_log,
 )
+from epicycle.runner.engine.encoding import is_immutable
+from epicycle.runner.engine.log import EventLog
 
 sys.path.insert(0, str(Path(__file__).parent))
 from engine_parts import Plan, load, simulate
@@ -89,6 +94,79 @@ def test_equal_tokens_give_equal_bytes() -> None:
     assert canonical((1, 2)) == canonical([1, 2])
     assert canonical(np.arange(6).reshape(2, 3).T) == canonical(np.ascontiguousarray(np.arange(6).reshape(2, 3).T))
     assert canonical(np.longdouble(1)) == canonical(np.longdouble(1))
+
+
+@dataclass(frozen=True)
+class Frozen:
+    x: Any
+
+
+@dataclass(frozen=True)
+class Sealed:
+    y: Any
+
+
+def fixed(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
+
+
+SHARED = np.zeros(2)  # what read-only views look at
+
+
+@pytest.mark.parametrize(
+    ("token", "change"),
+    [
+        (np.zeros(2), lambda token: token.fill(1.0)),
+        ([0.0], lambda token: token.append(1.0)),
+        (Point(0.0, 1), lambda token: setattr(token, "x", 1.0)),
+        (Frozen(np.zeros(2)), lambda token: token.x.fill(1.0)),
+        (Frozen(fixed(SHARED[:])), lambda _: SHARED.fill(1.0)),
+        (Frozen(fixed(np.array([[0.0]], dtype=object))), lambda token: token.x.flags.__setattr__("writeable", True)),
+        (Frozen([0.0]), lambda token: token.x.append(1.0)),
+        (Frozen((0.0, [0.0])), lambda token: token.x[1].append(1.0)),
+        (Frozen(Point(0.0, 1)), lambda token: setattr(token.x, "x", 1.0)),
+        (Frozen(Frozen({})), lambda token: token.x.x.update(a=1)),
+    ],
+)
+def test_the_log_tells_what_a_token_was_when_it_was_sent(token: Any, change: Callable[[Any], Any]) -> None:
+    log = EventLog()
+    before, tag = canonical(token), Tag(0, 1)
+    log.add(tag, "send", "a", "output", None, "", token)
+    change(token)
+    log.add(tag, "send", "b", "output", None, "", token)
+    assert not is_immutable(token)
+    written = b"".join(
+        Record(tag, "send", actor, "output", None, "", None).encoded()[:-1] + value
+        for actor, value in (("a", before), ("b", canonical(token)))
+    )
+    assert log.digest == hashlib.sha256(written).hexdigest()
+
+
+def test_large_tokens_are_not_kept() -> None:
+    log, tag, size = EventLog(), Tag(0, 1), 1_000_000
+    tracemalloc.start()
+    for _ in range(20):
+        log.add(tag, "send", "a", "output", None, "", Frozen(fixed(np.zeros(size // 8))))
+    taken, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert taken < 2 * size
+    assert log.count == 20
+
+
+def test_what_cannot_change_is_encoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Any] = []
+    encode = canonical
+    log = EventLog()
+    monkeypatch.setitem(encoding._ENCODERS, Frozen, lambda token: made.append(token) or encode(token.x))
+    kept = [Frozen((1.0, "a", None, fixed(np.zeros(2)), Sealed(True))) for _ in range(3)]
+    for token in (*kept, *kept, *kept):
+        log.add(Tag(0, 1), "send", "a", "output", None, "", token)
+    assert [id(token) for token in made] == [id(token) for token in kept]
+    for number in range(10_000):  # each takes the place of the one before it in memory
+        log.add(Tag(number, 1), "send", "a", "output", None, "", Frozen(number))
+    assert [token.x for token in made[3:]] == list(range(10_000))
+    assert log.count == 10_009
 
 
 def test_plain_and_scalars() -> None:
