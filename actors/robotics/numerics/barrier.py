@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .compiled import inner, kernel
+from .compiled import borrower, inner, kernel
 from .constraints import Constraints, all_constraints, term, violations, within_reach
 from .horizon import REACH_GOAL, HorizonProblem, roll_out
 from .mutual_information import negative_information
@@ -80,14 +80,14 @@ def _new_task(problem: HorizonProblem, steps: int) -> _Task:
     )  # fmt: skip
 
 
-@inner
+@borrower
 def _drive(task: _Task, controls: Array) -> None:
     """Fill in positions and velocities."""
     problem = task.problem
     roll_out(problem.position, problem.velocity, controls, problem.period, task.positions, task.velocities)
 
 
-@inner
+@borrower
 def _excess(task: _Task, controls: Array) -> float:
     """The largest value of f3-f5: negative if all are kept strictly, inf if one is not a number."""
     _drive(task, controls)
@@ -100,7 +100,7 @@ def _excess(task: _Task, controls: Array) -> float:
     return largest
 
 
-@inner
+@borrower
 def _ball(blocks: Array, s: int, x: float, y: float, radius: float, mu: float, dual: float) -> float:
     """Add the barrier of f1 or f2, -mu log(1 - |(x, y)|^2 / radius^2), and return what the log is taken of."""
     inside = 1.0 - (x * x + y * y) / (radius * radius)
@@ -109,7 +109,7 @@ def _ball(blocks: Array, s: int, x: float, y: float, radius: float, mu: float, d
     return inside
 
 
-@inner
+@borrower
 def _objective(task: _Task, mu: float) -> float:
     """f0 of eq. (2) or the objective of eq. (5); ``mu`` = 0 is the paper's own, mu > 0 smooths f6's kink."""
     problem, positions, blocks = task.problem, task.positions, task.blocks.position
@@ -161,7 +161,7 @@ def _objective(task: _Task, mu: float) -> float:
     return value
 
 
-@inner
+@borrower
 def _evaluate(task: _Task, controls: Array, phase: float, mu: float, dual: float) -> float:
     """The function the current phase minimises, its blocks filled in; inf outside the barriers' domain.
 
@@ -209,7 +209,7 @@ def _evaluate(task: _Task, controls: Array, phase: float, mu: float, dual: float
     return value
 
 
-@inner
+@borrower
 def _minimise(task: _Task, controls: Array, phase: float, mu: float, dual: float, tolerance: float) -> int:
     """Newton's method with backtracking (0.05, 0.5) on ``controls`` in place; returns the steps taken.
 
@@ -244,7 +244,7 @@ def _minimise(task: _Task, controls: Array, phase: float, mu: float, dual: float
     return _NEWTON_STEPS
 
 
-@inner
+@borrower
 def _inside(problem: HorizonProblem, controls: Array) -> bool:
     """Whether the controls keep f1 and f2 strictly."""
     vx, vy = problem.velocity[0], problem.velocity[1]
@@ -275,7 +275,7 @@ def _braking(problem: HorizonProblem, steps: int, share: float) -> Array:
     return controls
 
 
-@inner
+@borrower
 def _restore(task: _Task, controls: Array) -> tuple[int, float]:
     """Minimise the squared violations: (Newton steps, the sum left of them), 0 left when strictly feasible.
 
@@ -303,7 +303,7 @@ def _restore(task: _Task, controls: Array) -> tuple[int, float]:
     return iterations, max(left, TOLERANCE**2)
 
 
-@inner
+@borrower
 def _optimise(task: _Task, controls: Array) -> tuple[int, float]:
     """Minimise the objective in place within each constraint's present violation: (Newton steps, objective)."""
     _excess(task, controls)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compiled import inner, kernel
+from .compiled import borrower, inner, kernel
 from .horizon import HorizonProblem, roll_out
 from .terms import Term, keep_away, keep_away_uncertain, stay_near
 from .typing import Array
@@ -91,7 +91,7 @@ def within_reach(problem: HorizonProblem, constraints: Constraints) -> Constrain
     return Constraints(constraints.margin, constraints.obstacles, row[:count], step[:count], place[:count])
 
 
-@inner
+@borrower
 def term(constraints: Constraints, i: int, x: float, y: float) -> Term:
     """The i-th constraint at (x, y): value, gradient and Hessian."""
     row, place = constraints.row[i], constraints.place

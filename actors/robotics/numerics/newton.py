@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compiled import inner
+from .compiled import borrower, inner
 from .typing import Array
 
 _CURVATURE = 1e-9  # smallest eigenvalue of a repaired block
@@ -47,7 +47,7 @@ def new_feedback(steps: int) -> Feedback:
     return Feedback(np.empty((steps, 2)), np.empty((steps, 4)), np.empty((steps, 4)))
 
 
-@inner
+@borrower
 def clear(blocks: Blocks) -> None:
     """Make it the zero function."""
     for s in range(blocks.position.shape[0]):
@@ -58,7 +58,7 @@ def clear(blocks: Blocks) -> None:
 # Blocks are indexed, never sliced: a slice of an array costs as much as a whole term.
 
 
-@inner
+@borrower
 def add(
     blocks: Array, s: int, slope: float, curvature: float, bend: float,
     gx: float, gy: float, hxx: float, hxy: float, hyy: float,
@@ -74,7 +74,7 @@ def add(
     blocks[s, 4] += curvature * hyy + bend * gy * gy
 
 
-@inner
+@borrower
 def _repair(blocks: Array, s: int) -> None:
     """Replace block ``s`` by the nearest positive semidefinite one."""
     xx, xy, yy = blocks[s, 2], blocks[s, 3], blocks[s, 4]
@@ -88,7 +88,7 @@ def _repair(blocks: Array, s: int) -> None:
     blocks[s, 2], blocks[s, 3], blocks[s, 4] = mean + half * scale, xy * scale, mean - half * scale
 
 
-@inner
+@borrower
 def newton_step(blocks: Blocks, period: float, feedback: Feedback, step: Array) -> float:
     """Write the step (N, 2) in the controls; returns gradient . step (negative), or 0 if there is no descent.
 
