@@ -10,7 +10,7 @@ from typing import Any
 from epicycle.actors import Actor, to_nanoseconds, to_seconds
 
 from ..collection import without_collection
-from ..model import Metric, Model, firing_order
+from ..model import Metric, Model
 from .director import ActorError, Director, describe
 from .local import Deliver
 from .log import EventLog
@@ -49,8 +49,7 @@ class Simulation:
         if self.seed < 0:
             raise ValueError(f"a seed is a whole number from 0 up, not {self.seed}")
         self._tracer = tracer
-        with without_collection():
-            order = firing_order(model.graph)
+        order = model.order()
         keeps = keep_log.keeps if keep_log else None
         self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
         self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)

@@ -168,8 +168,9 @@ class Wiring:
         """What ``port.send`` does."""
         everywhere = _all(self._listeners.get(port.path, []) + self._branches(port.path, (), channels))
         heard = _all(self._listeners.get(port.path, []))
-        ways = [self._way(wire.hops, channels[wire.hops]) for wire in self.graph.wires_from(port)]
-        port.width = len(ways)
+        wires = self.graph.wires_from(port)
+        ways: dict[int, Deliver] = {}  # to single channels, made when the first token takes them: few ever do
+        port.width = len(wires)
         log, director, path, name = self.log, self.director, port.actor.path, port.name
         write = log.writer("send", path, name, None, "")
 
@@ -178,12 +179,16 @@ class Wiring:
                 write(director.present or director.tag, token)
                 everywhere(token)
                 return
-            if not 0 <= channel < len(ways):
-                known = f"it has {counted(len(ways), 'channel')}, counted from 0"
-                raise PortError(f"{port.path} has no channel {channel}: {known}")
+            way = ways.get(channel)
+            if way is None:
+                if not 0 <= channel < len(wires):
+                    known = f"it has {counted(len(wires), 'channel')}, counted from 0"
+                    raise PortError(f"{port.path} has no channel {channel}: {known}")
+                hops = wires[channel].hops
+                way = ways[channel] = self._way(hops, channels[hops])
             log.add(director.tag, "send", path, name, channel, "", token)
             heard(token)
-            ways[channel](token)
+            way(token)
 
         # An aspect at an output stands before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from epicycle.actors import Tag, counted, declared_parameters
 
+from ..collection import without_collection
 from ..tables import Table, as_html, as_text, short
 from .checks import check
 from .composite_aspect import check_nesting, detours
@@ -17,6 +18,7 @@ from .graph import ModelGraph
 from .observation import Metric, Observation, checked_seed, nanoseconds
 from .problems import Position, Problem, Problems, did_you_mean
 from .reading import NAME, Text, within
+from .schedule import firing_order
 from .scope import Composite, Scope
 from .scopes import Scopes, is_within
 from .site import call_site
@@ -65,6 +67,7 @@ class Model(Scope):
         self.figures: dict[str, tuple[str, dict[str, object], Position]] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
+        self._order: dict[str, int] | None = None  # worked out since then
         self.stop = stop
 
     @property
@@ -155,6 +158,13 @@ class Model(Scope):
             self.warnings = problems.warnings
             self.is_checked = True
 
+    def order(self) -> dict[str, int]:
+        """Engine: the firing order of a model that has been checked; the same for all its runs."""
+        if self._order is None:
+            with without_collection():
+                self._order = firing_order(self.graph)
+        return self._order
+
     def scope(self, path: str) -> Composite:
         """Engine: the composite at a path."""
         self.scopes.update()
@@ -167,6 +177,7 @@ class Model(Scope):
     def changed(self) -> None:
         """Engine: what was checked before may no longer hold."""
         self.is_checked = False
+        self._order = None
 
     def forget(self, path: str) -> None:
         """Engine: take out an actor or composite, and whatever stands at it or watches it."""

@@ -18,11 +18,13 @@ from epicycle.actors import (
     Parameter,
     ParameterError,
     ReachGoal,
+    Recorder,
+    Scale,
     declared_parameters,
 )
 from epicycle.aspects import MeasurementFailure, PacketLoss
 from epicycle.runner import Model, ModelError, Results, Simulation, load_composite, load_model
-from epicycle.runner.model import packaged_models
+from epicycle.runner.model import firing_order, packaged_models
 
 
 class Noisy(Actor):
@@ -263,6 +265,23 @@ def test_a_loaded_model_changes_like_any_other(tmp_path: Path) -> None:
     model.connect("clock.output -> robot[1].trigger", delay=0.1)
     assert any(record.actor == "robot[0].second" for record in run(model).log.records)
     assert len(model.graph.incoming("robot[1].trigger")) == 1
+
+
+def test_the_firing_order_is_found_once_and_anew_after_each_change() -> None:
+    model = Model("chain", stop=2)
+    for actor in (Clock("clock", period=1), Scale("second", offset=1), Scale("first", factor=2), Recorder("sink")):
+        model.add(actor)
+    for ends in ("clock.output -> second.input", "second.output -> sink.input", "clock.output -> first.input"):
+        model.connect(ends)
+    assert run(model).log.records[-1].actor == "first"
+    before = model.order()
+    assert model.order() is before
+    model.disconnect("clock.output", "second.input")
+    model.connect("first.output -> second.input")
+    assert run(model).log.records[-1].actor == "second"
+    assert model.order() == firing_order(model.graph) != before
+    model.remove("first")
+    assert "first" not in model.order()
 
 
 MISTAKES: dict[str, tuple[Callable[[Model], Any], str]] = {
