@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter
-from .messages import Array, BodyState, Estimate, Plan, enclosing
+from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing
 from .objectives import Objective, ReachGoal
 from .solvers import Barrier, Solver
 
@@ -20,16 +19,16 @@ STEPS, SECONDS = "steps", "seconds"
 DECISION, NOW = "decision", "now"
 
 
-@dataclass(frozen=True, slots=True)
-class _Standing:
-    """The plan that the controller made last."""
+class _Standing(NamedTuple):
+    """The plan that the controller made last; made an infinite time ago, nothing is left of it."""
 
     made_at: float  # s
     controls: Array  # (N, 2) U_{t+1} .. U_{t+N}, as seen from made_at
     positions: Array  # (N, 2) at steps 1..N from made_at
 
     def age(self, now: float, period: float) -> int:
-        return max(0, round((now - self.made_at) / period))
+        """Periods that have passed since, N at most."""
+        return max(0, round(min((now - self.made_at) / period, len(self.controls))))
 
 
 class RobustController(Actor):
@@ -81,23 +80,28 @@ class RobustController(Actor):
     robot_name = Parameter(str, "", doc="name in the plan; empty: the path of what the controller stands in")
 
     def initialize(self) -> None:
-        from .numerics.reachability import tube_radius
+        from .numerics import horizon, reachability
         from .numerics.warm_up import compile_kernels
 
         self.solver.prepare()
         compile_kernels()
+        # Kept, as an import takes 1 us whenever it is met.
+        self._own_tube, self._peer_tubes = reachability.own_tube, reachability.peer_tubes
+        self._expected_target = reachability.expected_target
+        self._new_problem, self._first_guesses = horizon.HorizonProblem, horizon.first_guesses
+        self._trajectory = horizon.trajectory
         self._name = self.robot_name or enclosing(self.path)
         tau = 1.0 if self.tube_time == STEPS else self.period
         # The kernels count steps from t.  From t + period on there is one more of them, and tau is 0 at the first.
         ahead = 1 if self.horizon_from == DECISION else 0
         self._steps = self.horizon + ahead
-        self._radius = tube_radius(
+        self._radius = reachability.tube_radius(
             self.tube_initial - ahead * self.tube_growth * tau, self.tube_growth, tau, self._steps
         )
         noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
         self._process_noise = noise if self.covariance_noise else np.zeros((4, 4))
         self._applied = np.zeros(2)  # U_t
-        self._standing: _Standing | None = None
+        self._standing = self._nothing = _Standing(-math.inf, np.zeros((self._steps, 2)), np.zeros((self._steps, 2)))
         self._peers: dict[str, Plan] = {}
         self._target: Estimate | None = None
         self._target_at = 0.0
@@ -109,15 +113,16 @@ class RobustController(Actor):
             return
         if not (self.state.present and self.state.value.finite):
             self._applied = np.zeros(2)
-            self._standing = None
+            self._standing = self._nothing
             self.control.send(np.zeros(2))
             return
         own = self.state.value
         problem = self._problem(own)
-        solution = self.solver.solve(problem, first_guesses(problem, self._shifted_controls()))
+        starts = self._starts(problem)
+        solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
-        if not np.isfinite(controls).all():  # input so large that its squares are not finite
-            controls, violation = braking(problem, self._steps), math.inf
+        if not all_finite(controls):  # input so large that its squares are not finite
+            controls, violation = starts[1], math.inf  # braking
         self._send(own, problem, controls)
         self._infeasible += violation > 0.0
         self.violation.send(float(violation))
@@ -134,9 +139,7 @@ class RobustController(Actor):
             self._target, self._target_at = self.estimate.value, self.now
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
-        from .numerics.horizon import trajectory
-
-        positions = trajectory(problem.position, problem.velocity, controls, self.period, self._steps)
+        positions = self._trajectory(problem.position, problem.velocity, controls, self.period, self._steps)
         self._standing = _Standing(self.now, controls, positions)
         announced = np.empty((self.horizon + 1, 2))
         announced[0], announced[1:] = self._applied, controls[: self.horizon]
@@ -147,12 +150,13 @@ class RobustController(Actor):
     # --- the problem ------------------------------------------------------------------------------------
 
     def _problem(self, own: BodyState) -> HorizonProblem:
-        from .numerics.horizon import REACH_GOAL, HorizonProblem
-
-        target_mean, target_covariance, points, weights = self._predicted_target()
-        peer_mean, peer_distance = self._predicted_peers()
-        tube_centre, tube_radius = self._tube()
-        posed = HorizonProblem(
+        now = self.now
+        target_mean, target_covariance, points, weights = self._target_ahead(now)
+        peer_mean, peer_distance = self._peers_ahead(now)
+        # f3 binds where the standing plan reaches, and is free beyond.
+        standing = self._standing
+        tube_centre, tube_radius = self._own_tube(standing.positions, self._radius, standing.age(now, self.period))
+        posed = self._new_problem(
             period=self.period,
             position=own.position + self.period * own.velocity,
             velocity=own.velocity + self.period * self._applied,
@@ -166,90 +170,43 @@ class RobustController(Actor):
             obstacle_covariance=target_covariance,
             peer_mean=peer_mean,
             peer_distance=peer_distance,
-            objective=REACH_GOAL,
-            goal=np.zeros(2),
-            sigma_positions=np.empty((0, 2)),
-            sigma_weights=np.empty(0),
-            others_distance=np.empty((0, 0)),
-            measurement_variance=1.0,
-            range_penalty=0.0,
-            measurement_range=0.0,
         )
         return self.objective.pose(posed, points, weights, peer_mean[:, -1].copy())
 
-    def _tube(self) -> tuple[Array, Array]:
-        """f3: centres (N, 2) and radii (N,); it binds where the standing plan reaches, and is free beyond."""
-        centre, radius = np.zeros((self._steps, 2)), np.full(self._steps, np.inf)
-        if self._standing is not None:
-            age = self._standing.age(self.now, self.period)
-            reached = max(0, self._steps - age)
-            centre[:reached] = self._standing.positions[age:]
-            radius[:reached] = self._radius[:reached]
-        return centre, radius
+    def _starts(self, problem: HorizonProblem) -> Array:
+        """Where the solver starts (2, N, 2): the standing plan from the next period on, zero where it ends; braking."""
+        standing, velocity = self._standing, problem.velocity
+        age, speed = standing.age(self.now, self.period), math.hypot(velocity.item(0), velocity.item(1))
+        return self._first_guesses(standing.controls, age, velocity, speed, self.max_acceleration, self.period)
 
-    def _shifted_controls(self) -> Array:
-        """The standing plan from the next period on; zero where it ends."""
-        controls = np.zeros((self._steps, 2))
-        if self._standing is not None:
-            age = self._standing.age(self.now, self.period)
-            controls[: max(0, self._steps - age)] = self._standing.controls[age:]
-        return controls
-
-    def _predicted_target(self) -> tuple[Array, Array, Array, Array]:
+    def _target_ahead(self, now: float) -> tuple[Array, Array, Array, Array]:
         """Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N, weights; K is 0 or 1."""
-        from .numerics.reachability import propagate
-        from .numerics.ukf import constant_velocity, sigma_points
-
-        steps = self._steps
-        if self._target is None:
+        target, steps = self._target, self._steps
+        if target is None:
             return np.empty((0, steps, 2)), np.empty((0, steps, 3)), np.empty((0, 2)), np.empty(0)
-        # Copies, as tokens are read-only and the kernels are compiled for arrays that are not.
-        mean, covariance = self._target.mean.copy(), self._target.covariance.copy()
-        age = max(0, round((self.now - self._target_at) / self.period))
-        transition = constant_velocity(self.period)
-        means, covariances = propagate(mean, covariance, transition, self._process_noise, age + steps)
-        points, weights = sigma_points(mean, covariance, 0.0)
-        last = points[:, :2] + (age + steps) * self.period * points[:, 2:]
-        return means[np.newaxis, age:].copy(), covariances[np.newaxis, age:].copy(), last, weights
+        age = max(0, round((now - self._target_at) / self.period))
+        return self._expected_target(target.mean, target.covariance, self._process_noise, self.period, age, steps)
 
-    def _predicted_peers(self) -> tuple[Array, Array]:
+    def _peers_ahead(self, now: float) -> tuple[Array, Array]:
         """f5: positions (n, N, 2) and the distances to keep from them (n, N), sorted by the peers' names."""
-        from .numerics.reachability import planned_positions
-
-        steps = self._steps
-        positions, distances = np.empty((len(self._peers), steps, 2)), np.empty((len(self._peers), steps))
-        for row, name in enumerate(sorted(self._peers)):
-            plan = self._peers[name]
-            age = max(0, round((self.now - plan.time) / self.period))
-            lost = max(0, age - 1)  # one period of latency is normal
-            positions[row] = planned_positions(
-                plan.state.position.copy(),
-                plan.state.velocity.copy(),
-                plan.controls.copy(),
-                self.period,
-                age,
-                steps,
+        plans = [self._peers[name] for name in sorted(self._peers)]
+        if not plans:
+            return np.empty((0, self._steps, 2)), np.empty((0, self._steps))
+        announced = [
+            (
+                *plan.state.position.tolist(),
+                *plan.state.velocity.tolist(),
+                max(0, round((now - plan.time) / self.period)),
+                len(plan.controls),
             )
-            distances[row] = self.safe_distance + self.margin * (self._radius + self.tube_growth * lost)
-        return positions, distances
-
-
-def first_guesses(problem: HorizonProblem, shifted: Array) -> Array:
-    """Where a solver may start, (k, N, 2), the best guess first: the shifted standing plan, then braking."""
-    return np.array([shifted, braking(problem, len(shifted))])
-
-
-def braking(problem: HorizonProblem, steps: int) -> Array:
-    """Controls (steps, 2) that stop the vehicle as fast as f2 allows, with 5 % to spare."""
-    controls = np.zeros((steps, 2))
-    speed = math.hypot(problem.velocity[0], problem.velocity[1])
-    if not 1e-9 < speed < math.inf:
-        return controls
-    x, y = (problem.velocity / speed).tolist()  # floats: arithmetic on arrays of two takes ten times as long
-    rows = []
-    for _ in range(steps):
-        push = min(0.95 * problem.max_acceleration, speed / problem.period)
-        rows.append((-push * x, -push * y))
-        speed -= push * problem.period
-    controls[:] = rows
-    return controls
+            for plan in plans
+        ]
+        return self._peer_tubes(
+            np.array(announced),
+            np.concatenate([plan.controls for plan in plans]),
+            self.period,
+            self._radius,
+            self.tube_growth,
+            self.safe_distance,
+            self.margin,
+        )

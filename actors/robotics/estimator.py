@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
-from .messages import RANGE, Array, Estimate, Measurement
+from .messages import RANGE, Array, Estimate, Measurement, all_finite
 
 EXPECTED, PREDICTED = "expected", "predicted"
 
@@ -44,9 +44,13 @@ class _Estimator(Actor):
     )
 
     def initialize(self) -> None:
+        from .numerics import ukf
         from .numerics.warm_up import compile_kernels
 
         compile_kernels()
+        # Kept, as an import takes 1 us whenever it is met.
+        self._sigma_points, self._measurement_noise = ukf.sigma_points, ukf.measurement_noise
+        self._ranged, self._relative = float(ukf.RANGE), float(ukf.RELATIVE_POSITION)
         self._predicted_at: int | None = None
         self._late: dict[tuple[str, str], Measurement] = {}  # what came since the last trigger
         self._process_noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
@@ -59,9 +63,10 @@ class _Estimator(Actor):
             self._predict((self.tag.time - self._predicted_at) / 1e9)
         self._predicted_at = self.tag.time
         present = [each for each in self.measurements.tokens if each.finite]
-        known = {(each.robot, each.kind) for each in present}
-        present += [late for source, late in self._late.items() if source not in known]
-        self._late.clear()
+        if self._late:
+            known = {(each.robot, each.kind) for each in present}
+            present += [late for source, late in self._late.items() if source not in known]
+            self._late.clear()
         # Sorted, so that the order of arrival decides nothing, not even the last bit.
         usable = sorted(present, key=_order)
         fused = bool(usable) and self._update(usable)
@@ -81,22 +86,23 @@ class _Estimator(Actor):
 
     def _noises(self, measurements: list[Measurement]) -> Array:
         """The measurements' covariances (m, 3), all as seen from the prediction, whatever the order of fusion."""
-        from .numerics.ukf import measurement_noise, sigma_points
-
         mean, covariance = self._state()
-        points, weights = np.array(mean)[np.newaxis], np.ones(1)
         if self.noise_direction == EXPECTED:
-            points, weights = sigma_points(mean, covariance, 0.0)
-        observers = np.array([each.observer for each in measurements])
+            points, weights = self._sigma_points(mean, covariance, 0.0)
+        else:
+            points, weights = np.array(mean)[np.newaxis], np.ones(1)
         deviations = np.array([(each.along, each.across) for each in measurements], dtype=float)
-        return measurement_noise(points, weights, kinds_of(measurements), observers, deviations)
+        kinds, observers = self._kinds_of(measurements), _observers(measurements)
+        return self._measurement_noise(points, weights, kinds, observers, deviations)
+
+    def _kinds_of(self, measurements: list[Measurement]) -> Array:
+        """The kernels' numbers for the measurements' kinds."""
+        return np.array([self._ranged if each.kind == RANGE else self._relative for each in measurements])
 
 
-def kinds_of(measurements: list[Measurement]) -> Array:
-    """The kernels' numbers for the measurements' kinds."""
-    from .numerics import ukf
-
-    return np.array([ukf.RANGE if each.kind == RANGE else ukf.RELATIVE_POSITION for each in measurements], dtype=float)
+def _observers(measurements: list[Measurement]) -> Array:
+    """Where the measurements were made (m, 2)."""
+    return np.array([each.observer.tolist() for each in measurements])  # ten times as fast as from arrays
 
 
 def _order(measurement: Measurement) -> Any:
@@ -109,27 +115,24 @@ class UnscentedEstimator(_Estimator):
     kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; 0 gives the centre no weight")
 
     def initialize(self) -> None:
+        from .numerics.ukf import constant_velocity, predict, update
+
         super().initialize()
+        self._constant_velocity, self._move, self._fuse = constant_velocity, predict, update
         self._mean = np.array(self.prior_mean)
         self._covariance = np.diag(self.prior_variance)
 
     def _predict(self, elapsed: float) -> None:
-        from .numerics.ukf import constant_velocity, predict
-
         noise = self._process_noise * (elapsed / self.period)
-        self._mean, self._covariance = predict(self._mean, self._covariance, constant_velocity(elapsed), noise)
+        transition = self._constant_velocity(elapsed)
+        self._mean, self._covariance = self._move(self._mean, self._covariance, transition, noise)
 
     def _update(self, measurements: list[Measurement]) -> bool:
-        from .numerics.ukf import update
-
-        values = np.zeros((len(measurements), 2))
-        for row, each in zip(values, measurements, strict=True):
-            row[: len(each.value)] = each.value
-        observers = np.array([each.observer for each in measurements])
+        kinds, observers = self._kinds_of(measurements), _observers(measurements)
+        values = np.array([[*each.value.tolist(), 0.0][:2] for each in measurements])  # a range is one number
         noises = self._noises(measurements)
-        kinds = kinds_of(measurements)
-        mean, covariance = update(self._mean, self._covariance, self.kappa, kinds, observers, values, noises)
-        if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
+        mean, covariance = self._fuse(self._mean, self._covariance, self.kappa, kinds, observers, values, noises)
+        if not (all_finite(mean) and all_finite(covariance)):
             return False
         self._mean, self._covariance = mean, covariance
         return True

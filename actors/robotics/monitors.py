@@ -67,4 +67,4 @@ class SeparationMonitor(Actor):
 
 def separation(a: Array, b: Array) -> float:
     """Metres between two points."""
-    return math.hypot(a[0] - b[0], a[1] - b[1])
+    return math.hypot(a.item(0) - b.item(0), a.item(1) - b.item(1))

@@ -31,9 +31,7 @@ class ReachGoal(Objective):
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to go")
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
-        from .numerics.horizon import REACH_GOAL
-
-        return problem._replace(objective=REACH_GOAL, goal=np.array(self.goal))
+        return problem.to_reach(self.goal)
 
 
 class Inform(Objective):
@@ -45,16 +43,5 @@ class Inform(Objective):
     joint = Parameter(bool, True, doc="count what all robots measure together; false: what this one measures")
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
-        from .numerics.horizon import INFORM
-        from .numerics.mutual_information import pairwise_distance
-
         others = peers if self.joint else np.empty((0, 2))
-        return problem._replace(
-            objective=INFORM,
-            sigma_positions=points,
-            sigma_weights=weights,
-            others_distance=pairwise_distance(points, others, self.variance),
-            measurement_variance=self.variance,
-            range_penalty=self.penalty,
-            measurement_range=self.range,
-        )
+        return problem.to_inform(points, weights, others, self.variance, self.penalty, self.range)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from ..core import Configurable, Parameter
@@ -26,10 +28,14 @@ class Solver(Configurable):
 class Barrier(Solver):
     """The paper's choice: an interior-point barrier method with Newton steps, compiled."""
 
-    def solve(self, problem: HorizonProblem, starts: Array) -> Solution:
+    @cached_property
+    def _solve(self) -> Callable[[HorizonProblem, Array], Solution]:
         from .numerics.barrier import solve
 
-        return solve(problem, starts)
+        return solve
+
+    def solve(self, problem: HorizonProblem, starts: Array) -> Solution:
+        return self._solve(problem, starts)
 
 
 class Casadi(Solver):

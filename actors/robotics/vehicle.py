@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
-from .messages import Array, BodyState
+from .messages import Array, BodyState, all_finite
 
 
 class Vehicle(Actor):
@@ -42,8 +42,8 @@ class Vehicle(Actor):
             self._held = self._next
             self._moved_at = self.tag.time
             self.state.send(BodyState(self._position, self._velocity))
-        if self.acceleration.present and np.isfinite(self.acceleration.value).all():
-            self._next = shortened(np.array(self.acceleration.value, dtype=float), self.max_acceleration)
+        if self.acceleration.present and all_finite(wanted := np.array(self.acceleration.value, dtype=float)):
+            self._next = shortened(wanted, self.max_acceleration)
             if self._moved_at == self.tag.time:
                 self._held = self._next
 
@@ -54,5 +54,5 @@ class Vehicle(Actor):
 
 def shortened(vector: Array, longest: float) -> Array:
     """The vector itself, or the one of length ``longest`` in its direction if it is longer."""
-    length = math.hypot(vector[0], vector[1])
+    length = math.hypot(vector.item(0), vector.item(1))
     return vector * (longest / length) if length > longest else vector

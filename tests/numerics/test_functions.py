@@ -198,16 +198,51 @@ def test_violations_are_the_papers(random: np.random.Generator) -> None:
     assert found[:, 2:] == pytest.approx(np.array(expected)[:, 2:], abs=1e-12)
 
 
-def test_planned_positions_are_those_driven(random: np.random.Generator) -> None:
-    for elapsed in (0, 1, 3, 9, 25):
-        controls = random.normal(size=(11, 2))
-        place, speed = random.normal(size=2), random.normal(size=2)
-        found = reachability.planned_positions(place, speed, controls, 0.1, elapsed, 10)
-        driven = []
-        for k in range(elapsed + 10):
-            place, speed = place + 0.1 * speed, speed + 0.1 * (controls[k] if k < 11 else 0.0)
+def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> None:
+    ages, lengths = (0, 1, 3, 9, 25), (11, 2, 11, 1, 30)
+    states, plans = random.normal(size=(5, 4)), [random.normal(size=(length, 2)) for length in lengths]
+    announced, radius = np.column_stack([states, ages, lengths]), 0.2 + 0.4 * np.arange(1, 11)
+    positions, distances = reachability.peer_tubes(announced, np.concatenate(plans), 0.1, radius, 0.4, 2.0, 3.0)
+    for row, (age, state, controls) in enumerate(zip(ages, states, plans, strict=True)):
+        place, speed, driven = state[:2], state[2:], []
+        for k in range(age + 10):
+            place, speed = place + 0.1 * speed, speed + 0.1 * (controls[k] if k < len(controls) else 0.0)
             driven.append(place)
-        assert found == pytest.approx(np.array(driven[elapsed:]), abs=1e-12)
+        assert positions[row] == pytest.approx(np.array(driven[age:]), abs=1e-12)
+        assert distances[row] == pytest.approx(2.0 + 3.0 * (radius + 0.4 * max(0, age - 1)))
+
+
+def test_own_tube_is_free_where_the_plan_has_ended(random: np.random.Generator) -> None:
+    planned, radius = random.normal(size=(10, 2)), np.arange(1.0, 11.0)
+    for age in (0, 1, 9, 10):
+        centres, radii = reachability.own_tube(planned, radius, age)
+        assert centres[: 10 - age].tolist() == planned[age:].tolist()
+        assert radii.tolist() == [*radius[: 10 - age], *[np.inf] * age]
+
+
+def test_first_guesses_are_the_plan_shifted_and_braking(random: np.random.Generator) -> None:
+    planned = random.normal(size=(10, 2))
+    velocity = np.array([3.0, 4.0])
+    shifted, braking = horizon.first_guesses(planned, 3, velocity, 5.0, 8.0, 0.1)
+    assert shifted.tolist() == [*planned[3:].tolist(), *[[0.0, 0.0]] * 3]
+    assert np.hypot(*braking[:6].T) == pytest.approx(0.95 * 8.0)  # as hard as it may until the last period
+    assert velocity + 0.1 * braking.sum(axis=0) == pytest.approx(np.zeros(2), abs=1e-12)
+    assert not horizon.first_guesses(planned, 10, np.zeros(2), 0.0, 8.0, 0.1).any()
+
+
+@pytest.mark.parametrize("age", [0, 2])
+def test_target_is_expected_where_prediction_takes_it(random: np.random.Generator, age: int) -> None:
+    mean, covariance, noise = random.normal(size=4), spread(random, 4), np.diag([0.002, 0.002, 0.4, 0.4])
+    transition = ukf.constant_velocity(0.1)
+    means, covariances, points, weights = reachability.expected_target(mean, covariance, noise, 0.1, age, 10)
+    every = reachability.propagate(mean, covariance, transition, noise, age + 10)
+    assert means[0].tolist() == every[0][age:].tolist()
+    assert covariances[0].tolist() == every[1][age:].tolist()
+    # The sigma points move as the target does, without noise.
+    assert weights @ points == pytest.approx(means[0, -1])
+    before, _ = ukf.sigma_points(mean, covariance, 0.0)
+    moved = before @ np.linalg.matrix_power(transition, age + 10).T
+    assert points == pytest.approx(moved[:, :2])
 
 
 def test_trajectory_starts_at_step_one(random: np.random.Generator) -> None:

@@ -7,11 +7,13 @@ Row ``s - 1`` of an array over the horizon belongs to the prediction step s = 1.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from .compiled import kernel
+from .mutual_information import pairwise_distance
 from .typing import Array
 
 REACH_GOAL = 0
@@ -37,14 +39,32 @@ class HorizonProblem(NamedTuple):
     obstacle_covariance: Array  # (K, N, 3) C_{t+s} as (xx, xy, yy)
     peer_mean: Array  # (n, N, 2) Ro_{i,t+s}, f5
     peer_distance: Array  # (n, N) Dmin + alpha * sigma_5i
-    objective: int  # REACH_GOAL: eq. (2); INFORM: eq. (5)
-    goal: Array  # (2,)
-    sigma_positions: Array  # (M, 2) sigma points of the obstacle's position at t + N
-    sigma_weights: Array  # (M,) w_{t,i}
-    others_distance: Array  # (M, M) exponent that the other robots' measurements add, see mutual_information
-    measurement_variance: float  # eta_t of eq. (5), m^2
-    range_penalty: float  # gamma
-    measurement_range: float  # Dmax, f6
+    objective: int = REACH_GOAL  # eq. (2); or INFORM, eq. (5)
+    goal: Array = np.zeros(2)  # (2,)
+    sigma_positions: Array = np.empty((0, 2))  # (M, 2) sigma points of the obstacle's position at t + N
+    sigma_weights: Array = np.empty(0)  # (M,) w_{t,i}
+    others_distance: Array = np.empty((0, 0))  # (M, M) exponent that the others' measurements add, mutual_information
+    measurement_variance: float = 1.0  # eta_t of eq. (5), m^2
+    range_penalty: float = 0.0  # gamma
+    measurement_range: float = 0.0  # Dmax, f6
+
+    def to_reach(self, goal: Array) -> HorizonProblem:
+        """The same problem with the objective of eq. (2)."""
+        return self._replace(objective=REACH_GOAL, goal=np.array(goal))
+
+    def to_inform(
+        self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float
+    ) -> HorizonProblem:
+        """The same problem with the objective of eq. (5), where ``others`` (n, 2) measure as well."""
+        return self._replace(
+            objective=INFORM,
+            sigma_positions=points,
+            sigma_weights=weights,
+            others_distance=pairwise_distance(points, others, variance),
+            measurement_variance=variance,
+            range_penalty=gamma,
+            measurement_range=reach,
+        )
 
 
 @kernel
@@ -68,8 +88,32 @@ def roll_out(
             vy += period * controls[s, 1]
 
 
+@kernel
 def trajectory(position: Array, velocity: Array, controls: Array, period: float, steps: int) -> Array:
     """Positions at steps 1..``steps``, shape (steps, 2); past the last control the velocity is kept."""
     positions, velocities = np.empty((steps, 2)), np.empty((steps, 2))
-    roll_out(position, velocity, np.ascontiguousarray(controls, dtype=float), period, positions, velocities)
+    roll_out(position, velocity, controls, period, positions, velocities)
     return positions
+
+
+@kernel
+def first_guesses(
+    planned: Array, age: int, velocity: Array, speed: float, max_acceleration: float, period: float
+) -> Array:
+    """Where a solver may start, (2, N, 2), the best guess first.
+
+    The controls ``planned`` (N, 2) ``age`` periods ago, zero where they end; then braking from ``velocity``, whose
+    length is ``speed``, as fast as f2 allows, with 5 % to spare.
+    """
+    steps = planned.shape[0]
+    guesses = np.zeros((2, steps, 2))
+    for s in range(steps - age):
+        guesses[0, s, 0], guesses[0, s, 1] = planned[age + s, 0], planned[age + s, 1]
+    if not 1e-9 < speed < math.inf:
+        return guesses
+    x, y = velocity[0] / speed, velocity[1] / speed
+    for s in range(steps):
+        push = min(0.95 * max_acceleration, speed / period)
+        guesses[1, s, 0], guesses[1, s, 1] = -push * x, -push * y
+        speed -= push * period
+    return guesses

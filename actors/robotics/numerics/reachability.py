@@ -1,12 +1,14 @@
-"""Reachability sets: where a robot can be at each prediction step, from its plan, eqs. (3) and (4)."""
+"""Where robots can be at each prediction step, from their plans, eqs. (3) and (4), and where the target will be."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from .compiled import kernel
-from .horizon import roll_out
 from .typing import Array
+from .ukf import constant_velocity, sigma_points
 
 
 @kernel
@@ -22,23 +24,51 @@ def tube_radius(initial: float, growth: float, step_length: float, steps: int) -
 
 
 @kernel
-def planned_positions(
-    position: Array, velocity: Array, controls: Array, period: float, elapsed: int, steps: int
-) -> Array:
-    """Positions (steps, 2) at steps 1..N from now on of a robot that announced its plan ``elapsed`` periods ago.
+def own_tube(planned: Array, radius: Array, age: int) -> tuple[Array, Array]:
+    """f3: centres (N, 2) and radii (N,) of the tube around the positions ``planned`` (N, 2) ``age`` periods ago.
 
-    ``position`` and ``velocity`` are the announced state, ``controls`` (n, 2) the accelerations from the announcement
-    on; past the last of them the velocity is kept.
+    It binds where the plan reaches, with the ``radius`` (N,) of eq. (3), and is free beyond.
     """
-    positions, velocities = np.empty((elapsed + steps, 2)), np.empty((elapsed + steps, 2))
-    # roll_out starts at step 1, so the first control is applied here.
-    first = np.empty(2)
-    speed = np.empty(2)
-    for c in range(2):
-        first[c] = position[c] + period * velocity[c]
-        speed[c] = velocity[c] + period * controls[0, c]
-    roll_out(first, speed, controls[1:], period, positions, velocities)
-    return positions[elapsed:]
+    steps = radius.shape[0]
+    centres, radii = np.zeros((steps, 2)), np.empty(steps)
+    for s in range(steps):
+        radii[s] = math.inf
+        if s < steps - age:
+            centres[s, 0], centres[s, 1] = planned[age + s, 0], planned[age + s, 1]
+            radii[s] = radius[s]
+    return centres, radii
+
+
+@kernel
+def peer_tubes(
+    announced: Array, controls: Array, period: float, radius: Array, growth: float, safe_distance: float, margin: float
+) -> tuple[Array, Array]:
+    """f5: where n peers will be at steps 1..N from now on (n, N, 2), and the distances to keep from them (n, N).
+
+    Each row of ``announced`` (n, 6) is of one plan: x, y, vx, vy when it was made, the periods that have passed since,
+    and how many of the rows of ``controls``, which are of all plans in turn, are the accelerations from then on; past
+    the last of them the velocity is kept.  To the ``radius`` (N,) of eq. (3), eq. (4) adds ``growth`` for every period
+    but one, which is normal latency.
+    """
+    count, steps = announced.shape[0], radius.shape[0]
+    positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
+    first = 0
+    for i in range(count):
+        px, py, vx, vy = announced[i, 0], announced[i, 1], announced[i, 2], announced[i, 3]
+        age, planned = int(announced[i, 4]), int(announced[i, 5])
+        for k in range(age + steps):
+            px += period * vx
+            py += period * vy
+            if k < planned:
+                vx += period * controls[first + k, 0]
+                vy += period * controls[first + k, 1]
+            if k >= age:
+                positions[i, k - age, 0], positions[i, k - age, 1] = px, py
+        first += planned
+        lost = max(0, age - 1)
+        for s in range(steps):
+            distances[i, s] = safe_distance + margin * (radius[s] + growth * lost)
+    return positions, distances
 
 
 @kernel
@@ -70,3 +100,29 @@ def propagate(
         means[s, 0], means[s, 1] = now[0], now[1]
         covariances[s, 0], covariances[s, 1], covariances[s, 2] = spread[0, 0], spread[0, 1], spread[1, 1]
     return means, covariances
+
+
+@kernel
+def expected_target(
+    mean: Array, covariance: Array, process_noise: Array, period: float, age: int, steps: int
+) -> tuple[Array, Array, Array, Array]:
+    """What f4 and eq. (5) need of a target with constant velocity that was estimated ``age`` periods ago.
+
+    Means (1, N, 2) and covariances (1, N, 3) at steps 1..N from now on; the positions (M, 2) to which its sigma points
+    have gone at step N, and their weights (M,).
+    """
+    # Copies, as tokens are read-only, and what they are handed to would be compiled once more for that.
+    now, spread = mean.copy(), covariance.copy()
+    means, covariances = propagate(now, spread, constant_velocity(period), process_noise, age + steps)
+    points, weights = sigma_points(now, spread, 0.0)
+    places, spreads, last = np.empty((1, steps, 2)), np.empty((1, steps, 3)), np.empty((points.shape[0], 2))
+    for s in range(steps):
+        for c in range(2):
+            places[0, s, c] = means[age + s, c]
+        for c in range(3):
+            spreads[0, s, c] = covariances[age + s, c]
+    ahead = (age + steps) * period
+    for i in range(points.shape[0]):
+        for c in range(2):
+            last[i, c] = points[i, c] + ahead * points[i, 2 + c]
+    return places, spreads, last, weights

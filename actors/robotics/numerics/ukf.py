@@ -37,7 +37,9 @@ def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, A
     root = _root(covariance)
     scale = math.sqrt(size + kappa)
     points = np.empty((2 * size + 1, size))
-    weights = np.full(2 * size + 1, 0.5 / (size + kappa))
+    weights = np.empty(2 * size + 1)
+    for i in range(2 * size + 1):
+        weights[i] = 0.5 / (size + kappa)
     weights[0] = kappa / (size + kappa)
     for j in range(size):
         points[0, j] = mean[j]
@@ -76,9 +78,10 @@ def _symmetric(a: Array) -> Array:
 @kernel
 def constant_velocity(period: float) -> Array:
     """Transition of eq. (1) for the state (x, y, vx, vy)."""
-    transition = np.eye(4)
-    transition[0, 2] = period
-    transition[1, 3] = period
+    transition = np.zeros((4, 4))  # np.eye takes half a second to compile
+    for i in range(4):
+        transition[i, i] = 1.0
+    transition[0, 2] = transition[1, 3] = period
     return transition
 
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from .barrier import solve
 from .constraints import violations
-from .horizon import REACH_GOAL, HorizonProblem, trajectory
-from .mutual_information import pairwise_distance
-from .reachability import planned_positions, propagate, tube_radius
+from .horizon import HorizonProblem, first_guesses, trajectory
+from .reachability import expected_target, own_tube, peer_tubes, tube_radius
 from .ukf import constant_velocity, measurement_noise, predict, sigma_points, update
 
 _LOGGER = logging.getLogger("epicycle")
@@ -34,39 +33,33 @@ def compile_kernels() -> None:
 
 def _call_every_kernel() -> None:
     steps, period = 3, 0.1
-    transition = constant_velocity(period)
-    mean, covariance = predict(np.zeros(4), np.eye(4), transition, np.eye(4))
+    mean, covariance = predict(np.zeros(4), np.eye(4), constant_velocity(period), np.eye(4))
     one, pair = np.zeros(1), np.ones((1, 2))
     points, weights = sigma_points(mean, covariance, 0.0)
     noises = measurement_noise(points, weights, one, pair, pair)
     mean, covariance = update(mean, covariance, 0.0, one, pair, pair, noises)
-    sigma_positions = np.ascontiguousarray(points[:, :2])
-    means, covariances = propagate(mean, covariance, transition, np.zeros((4, 4)), steps)
-    radius = tube_radius(0.2, 0.4, 1.0, steps)
+    for token in (mean, covariance):
+        token.setflags(write=False)
+    means, covariances, sigma_positions, weights = expected_target(mean, covariance, np.eye(4), period, 0, steps)
     controls = np.zeros((steps, 2))
-    planned_positions(np.zeros(2), np.zeros(2), controls, period, 1, steps)
-    problem = HorizonProblem(
+    positions = trajectory(np.zeros(2), np.zeros(2), controls, period, steps)
+    centre, radius = own_tube(positions, tube_radius(0.2, 0.4, 1.0, steps), 0)
+    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), controls, period, radius, 0.4, 1.0, 1.0)
+    posed = HorizonProblem(
         period=period,
         position=np.zeros(2),
         velocity=np.zeros(2),
         max_speed=1.0,
         max_acceleration=1.0,
-        tube_centre=trajectory(np.zeros(2), np.zeros(2), controls, period, steps),
+        tube_centre=centre,
         tube_radius=radius,
         safe_distance=1.0,
         margin=1.0,
-        obstacle_mean=means[np.newaxis] + 100.0,
-        obstacle_covariance=covariances[np.newaxis].copy(),
-        peer_mean=np.full((1, steps, 2), 200.0),
-        peer_distance=np.ones((1, steps)),
-        objective=REACH_GOAL,
-        goal=np.ones(2),
-        sigma_positions=sigma_positions,
-        sigma_weights=weights,
-        others_distance=pairwise_distance(sigma_positions, pair, 1.0),
-        measurement_variance=1.0,
-        range_penalty=1.0,
-        measurement_range=1.0,
+        obstacle_mean=means + 100.0,
+        obstacle_covariance=covariances,
+        peer_mean=peer_mean + 200.0,
+        peer_distance=peer_distance,
     )
+    problem = posed.to_inform(sigma_positions, weights, pair, 1.0, 1.0, 1.0).to_reach(np.ones(2))
     violations(problem, controls)
-    solve(problem, controls[np.newaxis].copy())
+    solve(problem, first_guesses(controls, 0, np.zeros(2), 0.0, 1.0, period))
