@@ -13,12 +13,11 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PARTS = ("controllers", "events", "growth", "start")
+PARTS = ("controllers", "studies", "events", "growth", "start")
 PACKAGES = ("numpy", "numba", "casadi", "scipy", "filterpy", "simpy", "networkx")
 
 
@@ -47,12 +46,10 @@ def part(name: str) -> str:
     for row in module.rows():
         print(f"{name}: {row.work}, {row.peer}: {row.result}", file=sys.stderr, flush=True)
         rows.append(row)
-    notes = [f"- {how}: {'; '.join(row.work for row in rows if row.how == how)}." for how in _unique(rows)]
-    return "\n".join([table(rows), "", *dict.fromkeys(notes)])
-
-
-def _unique(rows: Sequence[object]) -> list[str]:
-    return list(dict.fromkeys(row.how for row in rows))  # type: ignore[attr-defined]
+    works: dict[str, dict[str, None]] = {}  # by how they were measured; each once
+    for row in rows:
+        works.setdefault(row.how, {})[row.work] = None
+    return "\n".join([table(rows), "", *(f"- {'; '.join(named)}: {how}." for how, named in works.items())])
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """How the cost of a run grows: `python benchmarks/growth.py [--rounds 3]`.
 
 - actors: a clock and a pipeline of 10 to 100,000 scales, through which as many tokens go that each model makes the same
-  number of hops;
+  number of hops; the same of SimPy's processes with Stores, whose cost grows with the working set alone, too;
 - robots: 1 to 64 observers in the collision avoidance scenario;
 - memory: what a recorded number takes, once a million of them are recorded.
 """
@@ -12,10 +12,12 @@ import argparse
 import gc
 import tempfile
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from statistics import median
+from typing import Any
 
+import simpy
 from measure import Row, cpu_seconds, table, take_turns
 
 from epicycle.runner import Simulation, load_model
@@ -42,6 +44,8 @@ actors: {{clock: {{type: Clock, period: 1 ms, values: [0.1, 0.2, 0.3]}}}}
 run: {{stop: {stop} ms, record: [clock.output]}}
 """
 
+Events = Generator[simpy.Event, Any, None]
+
 
 def model(text: str, **values: object) -> Model:
     """The model that a text describes."""
@@ -57,18 +61,50 @@ def seconds_of(model: Model, until: float | None = None) -> float:
     return cpu_seconds(lambda: simulation.run(until=until))
 
 
+def seconds_of_processes(size: int) -> float:
+    """The CPU time of a pipeline of SimPy's processes, with a Store before each."""
+    environment = simpy.Environment()
+    stores = [simpy.Store(environment) for _ in range(size)]
+
+    def clock() -> Events:
+        for _ in range(HOPS // size):
+            yield stores[0].put(1.0)
+            yield environment.timeout(1.0)
+
+    def scale(source: simpy.Store, to: simpy.Store | None) -> Events:
+        while True:
+            token = yield source.get()
+            if to is not None:
+                yield to.put(token + 1.0)
+
+    environment.process(clock())
+    for source, to in zip(stores, [*stores[1:], None], strict=True):
+        environment.process(scale(source, to))
+    environment.run(0.5)  # who waits has begun to
+    return cpu_seconds(environment.run)
+
+
 def actors(rounds: int) -> Iterator[Row]:
-    """Pipelines."""
+    """Pipelines, and what their working set costs where there is nothing of ours."""
     models = {size: model(PIPELINE, actors=size, stop=HOPS // size - 1) for size in ACTORS}
-    took = take_turns({str(size): lambda each=each: seconds_of(each) for size, each in models.items()}, rounds)
-    costs = {size: 1e6 * median(took[str(size)]) / HOPS for size in ACTORS}
+    ours = take_turns({str(size): lambda each=each: seconds_of(each) for size, each in models.items()}, rounds)
     how = f"{rounds} rounds of {HOPS:,} hops each, taking turns; CPU time of the run alone"
-    for size, cost in costs.items():
-        if size == ACTORS[0]:
-            continue
-        ratio = median([mine / small for mine, small in zip(took[str(size)], took[str(ACTORS[0])], strict=True)])
-        result = f"{ratio:.2f}x ({cost:.3g} us a hop)"
-        yield Row(f"a hop in a pipeline of {size:,}", f"of {ACTORS[0]}", result, "<= 1.2x", ratio <= 1.2, how)
+    yield from _grown("a hop in a pipeline", ours, 1.2, how)
+    del models
+    gc.collect()
+    simpys = take_turns({str(size): lambda each=size: seconds_of_processes(each) for size in ACTORS}, rounds)
+    yield from _grown("for comparison: a hop of SimPy's with Stores", simpys, None, how)
+
+
+def _grown(work: str, took: dict[str, list[float]], limit: float | None, how: str) -> Iterator[Row]:
+    """What a hop takes in pipelines of all sizes, against the smallest."""
+    first = took[str(ACTORS[0])]
+    for size in ACTORS[1:]:
+        mine = took[str(size)]
+        ratio = median([each / small for each, small in zip(mine, first, strict=True)])
+        result = f"{ratio:.2f}x ({1e6 * median(mine) / HOPS:.3g} us against {1e6 * median(first) / HOPS:.3g})"
+        goal, is_met = ("", None) if limit is None else (f"<= {limit:g}x", ratio <= limit)
+        yield Row(f"{work}, {size:,} actors", f"{ACTORS[0]} actors", result, goal, is_met, how)
 
 
 def robots(rounds: int) -> Iterator[Row]:

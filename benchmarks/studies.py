@@ -1,0 +1,55 @@
+"""The paper's study: `python benchmarks/studies.py [--replications 20]`.
+
+Runs of all 60 conditions of table_1 are made by `epicycle study`, in two processes and in one; wall-clock time, as a
+person waits it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from measure import Row, table
+
+CONDITIONS, ALL = 60, 6_000
+REPLICATIONS, ALONE = 20, 5  # of each condition, in two processes and in one
+GOAL = 5.0  # min
+
+
+def rate(replications: int, jobs: int) -> float:
+    """Runs a second."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "epicycle.runner.cli", "study", "table_1", "--yes", "--out", "results"]
+        before = time.perf_counter()
+        subprocess.run(
+            [*command, "--replications", str(replications), "--jobs", str(jobs)],
+            cwd=folder,
+            check=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        took = time.perf_counter() - before
+        assert (Path(folder) / "results" / "table.parquet").is_file()
+    return CONDITIONS * replications / took
+
+
+def rows(replications: int = REPLICATIONS) -> Iterator[Row]:
+    """The table's lines."""
+    two, one = rate(replications, 2), rate(ALONE, 1)
+    minutes = ALL / two / 60
+    how = f"{replications} replications of each of the 60 conditions, wall-clock time from the command to its end"
+    result = f"{minutes:.1f} min at the rate of {CONDITIONS * replications:,} of them ({two:.1f} runs a second)"
+    yield Row(f"table_1, {ALL:,} runs, 2 processes", "", result, f"<= {GOAL:g} min", minutes <= GOAL, how)
+    how = f"the same against {ALONE} replications in one process"
+    yield Row("two processes", "one process", f"{two / one:.2g}x ({one:.1f} runs a second)", "", None, how)
+
+
+if __name__ == "__main__":
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--replications", type=int, default=REPLICATIONS)
+    print(table(rows(options.parse_args().replications)))
