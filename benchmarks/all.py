@@ -49,7 +49,10 @@ def part(name: str) -> str:
     works: dict[str, dict[str, None]] = {}  # by how they were measured; each once
     for row in rows:
         works.setdefault(row.how, {})[row.work] = None
-    return "\n".join([table(rows), "", *(f"- {'; '.join(named)}: {how}." for how, named in works.items())])
+    notes = [f"- {'; '.join(named)}: {how}." for how, named in works.items()]
+    reasons = dict.fromkeys(row.reason for row in rows if row.is_met is False and row.reason)
+    notes += [f"- Not met: {reason}." for reason in reasons]
+    return "\n".join([table(rows), "", *notes])
 
 
 def main() -> None:

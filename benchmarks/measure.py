@@ -14,7 +14,10 @@ from statistics import median
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of the table; ``how`` says in one line how the figure was made, ``is_met`` is None without a goal."""
+    """One line of the table; ``how`` says in one line how the figure was made, ``is_met`` is None without a goal.
+
+    ``reason`` says why the goal is out of reach, by figures of the same table; it is told where the goal is not met.
+    """
 
     work: str
     peer: str
@@ -22,6 +25,7 @@ class Row:
     goal: str
     is_met: bool | None
     how: str
+    reason: str = ""
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
@@ -63,6 +67,7 @@ def compare(
     ours: str,
     *,
     how: str,
+    reason: str = "",
     goal: float | None = None,
     unit: tuple[float, str] = (1.0, "s"),
 ) -> Row:
@@ -78,6 +83,7 @@ def compare(
         "" if goal is None else f">= {goal:g}x",
         None if goal is None else ratio >= goal,
         how,
+        reason,
     )
 
 
