@@ -143,8 +143,10 @@ _ENCODERS = _OfTypes()
 def _encoder(cls: type) -> Encode:
     if issubclass(cls, float):
         return _float
-    if issubclass(cls, np.ndarray):
+    if cls is np.ndarray:
         return _array
+    if issubclass(cls, np.ndarray):
+        return lambda token: _array(np.asarray(token))
     if dataclasses.is_dataclass(cls) and not issubclass(cls, type):
         return _fields_encoder(cls)
     if cls is type(None):
@@ -214,12 +216,18 @@ def _fields_encoder(cls: type) -> Encode:
 
 
 def _array(token: Any) -> bytes:
+    if token.dtype is _FLOAT64 and token.size <= _FEW and token.ndim == 1:  # most of them, in a third of the time
+        total = sum(token.tolist())
+        if total == total:  # noqa: PLR0124  so no number is NaN
+            few: bytes = _FEW_HEADS[token.size] + token.tobytes()
+            return few
     kind = token.dtype.kind
     if kind not in "biuf":
         return b"A" + canonical(token.dtype.str) + canonical(token.tolist())
     # The largest number of an array with a NaN is NaN; asking so takes a quarter of the time of isnan(...).any().
     if kind == "f" and token.size and math.isnan(token.item(token.argmax())):
-        token = np.where(np.isnan(token), token.dtype.type(np.nan), token)
+        token = token.copy()
+        token[np.isnan(token)] = np.nan
     data: bytes = token.tobytes()
     return _array_head(token.dtype, token.shape) + data
 
@@ -227,6 +235,11 @@ def _array(token: Any) -> bytes:
 @cache
 def _array_head(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
     return b"a" + dtype.str.encode() + _COUNT(len(shape)) + b"".join(map(_COUNT, shape))
+
+
+_FLOAT64 = np.dtype(np.float64)
+_FEW = 4  # numbers that are looked at in Python
+_FEW_HEADS: list[bytes] = [_array_head(_FLOAT64, (size,)) for size in range(_FEW + 1)]
 
 
 def _shown(token: Any) -> str:

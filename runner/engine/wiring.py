@@ -24,7 +24,7 @@ from ..model import Clock, Hop, Model, WovenAspect
 from .director import ActorError, Director, LoopError, describe
 from .execution import Execution
 from .local import Deliver, LocalDirector, Passage
-from .log import EventLog
+from .log import EventLog, Write
 from .parameters import VaryingParameter
 from .requests import Requests
 from .signal import Signal
@@ -166,10 +166,11 @@ class Wiring:
 
     def _emit(self, port: OutputPort[Any], channels: dict[tuple[Hop, ...], int]) -> Emit:
         """What ``port.send`` does."""
-        everywhere = _all(self._listeners.get(port.path, []) + self._branches(port.path, (), channels))
-        heard = _all(self._listeners.get(port.path, []))
+        listeners = self._listeners.get(port.path, [])
+        everywhere = _all(listeners + self._branches(port.path, (), channels))
         wires = self.graph.wires_from(port)
-        ways: dict[int, Deliver] = {}  # to single channels, made when the first token takes them: few ever do
+        # To single channels, made when the first token takes them: few ever do.
+        ways: dict[int, tuple[Write, Deliver]] = {}
         port.width = len(wires)
         log, director, path, name = self.log, self.director, port.actor.path, port.name
         write = log.writer("send", path, name, None, "")
@@ -185,10 +186,11 @@ class Wiring:
                     known = f"it has {counted(len(wires), 'channel')}, counted from 0"
                     raise PortError(f"{port.path} has no channel {channel}: {known}")
                 hops = wires[channel].hops
-                way = ways[channel] = self._way(hops, channels[hops])
-            log.add(director.tag, "send", path, name, channel, "", token)
-            heard(token)
-            way(token)
+                onward = _all([*listeners, self._way(hops, channels[hops])])
+                way = ways[channel] = log.writer("send", path, name, channel, ""), onward
+            write_one, onward = way
+            write_one(director.present or director.tag, token)
+            onward(token)
 
         # An aspect at an output stands before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:

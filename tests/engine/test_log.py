@@ -96,6 +96,25 @@ def test_equal_tokens_give_equal_bytes() -> None:
     assert canonical(np.longdouble(1)) == canonical(np.longdouble(1))
 
 
+@pytest.mark.parametrize("size", [0, 1, 2, 4, 5, 40])
+@pytest.mark.parametrize("kind", ["<f8", ">f8", "<f4", "<i8"])
+def test_bytes_of_arrays(size: int, kind: str) -> None:
+    numbers = np.arange(size).astype(kind)
+    arrays = [numbers, np.repeat(numbers, 2)[::2], numbers.reshape(1, -1), np.ma.masked_array(numbers, mask=True)]
+    if numbers.dtype.kind == "f":
+        for position in range(size):
+            for odd in ([math.nan], [-math.nan], [math.inf], [math.inf, -math.inf]):
+                changed = numbers.copy()
+                changed[position : position + len(odd)] = odd[: size - position]
+                arrays.append(changed)
+    for array in arrays:
+        plainly = np.array(array, subok=False, order="C")
+        if plainly.dtype.kind == "f":
+            plainly[np.isnan(plainly)] = np.nan
+        head = b"a" + array.dtype.str.encode() + struct.pack(f"<{array.ndim + 1}I", array.ndim, *array.shape)
+        assert canonical(array) == head + plainly.tobytes()
+
+
 @dataclass(frozen=True)
 class Frozen:
     x: Any
