@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter
-from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing
+from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing, read_only
 from .objectives import Objective, ReachGoal
 from .solvers import Barrier, Solver
 
@@ -29,6 +29,14 @@ class _Standing(NamedTuple):
     def age(self, now: float, period: float) -> int:
         """Periods that have passed since, N at most."""
         return max(0, round(min((now - self.made_at) / period, len(self.controls))))
+
+
+class _Peer(NamedTuple):
+    """The latest plan of another robot, as the kernels take it."""
+
+    made_at: float  # s
+    announced: tuple[float, ...]  # x, y, vx, vy, made_at, and the number of controls
+    controls: Array  # (n, 2)
 
 
 class RobustController(Actor):
@@ -102,7 +110,7 @@ class RobustController(Actor):
         self._process_noise = noise if self.covariance_noise else np.zeros((4, 4))
         self._applied = np.zeros(2)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros((self._steps, 2)), np.zeros((self._steps, 2)))
-        self._peers: dict[str, Plan] = {}
+        self._peers: dict[str, _Peer] = {}
         self._target: Estimate | None = None
         self._target_at = 0.0
         self._infeasible = 0
@@ -117,8 +125,7 @@ class RobustController(Actor):
             self.control.send(np.zeros(2))
             return
         own = self.state.value
-        problem = self._problem(own)
-        starts = self._starts(problem)
+        problem, starts = self._problem(own, self.now)
         solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
         if not all_finite(controls):  # input so large that its squares are not finite
@@ -133,33 +140,38 @@ class RobustController(Actor):
         """Remember the latest estimate and plans, also those that come between triggers."""
         for plan in self.peer_plans.tokens:
             known = self._peers.get(plan.robot)
-            if plan.robot != self._name and plan.finite and (known is None or plan.time >= known.time):
-                self._peers[plan.robot] = plan
+            if plan.robot != self._name and plan.finite and (known is None or plan.time >= known.made_at):
+                state, controls = plan.state, plan.controls
+                announced = (*state.position.tolist(), *state.velocity.tolist(), plan.time, len(controls))
+                self._peers[plan.robot] = _Peer(plan.time, announced, controls)
         if self.estimate.present and self.estimate.value.finite:
             self._target, self._target_at = self.estimate.value, self.now
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         positions = self._trajectory(problem.position, problem.velocity, controls, self.period, self._steps)
-        self._standing = _Standing(self.now, controls, positions)
+        now = self.now
+        self._standing = _Standing(now, controls, positions)
         announced = np.empty((self.horizon + 1, 2))
         announced[0], announced[1:] = self._applied, controls[: self.horizon]
-        self.plan.send(Plan(self._name, self.now, own, announced))
-        self._applied = controls[0].copy()
-        self.control.send(controls[0].copy())
+        self.plan.send(Plan(self._name, now, own, announced))
+        self._applied = read_only(controls[0])
+        self.control.send(self._applied)
 
     # --- the problem ------------------------------------------------------------------------------------
 
-    def _problem(self, own: BodyState) -> HorizonProblem:
-        now = self.now
+    def _problem(self, own: BodyState, now: float) -> tuple[HorizonProblem, Array]:
+        """The problem, and where its solver may start (2, N, 2): the standing plan from the next period on; braking."""
         target_mean, target_covariance, points, weights = self._target_ahead(now)
         peer_mean, peer_distance = self._peers_ahead(now)
+        _, planned_controls, planned_positions = self._standing
+        age = self._standing.age(now, self.period)
         # f3 binds where the standing plan reaches, and is free beyond.
-        standing = self._standing
-        tube_centre, tube_radius = self._own_tube(standing.positions, self._radius, standing.age(now, self.period))
+        tube_centre, tube_radius = self._own_tube(planned_positions, self._radius, age)
+        velocity = own.velocity + self.period * self._applied
         posed = self._new_problem(
             period=self.period,
             position=own.position + self.period * own.velocity,
-            velocity=own.velocity + self.period * self._applied,
+            velocity=velocity,
             max_speed=self.max_speed,
             max_acceleration=self.max_acceleration,
             tube_centre=tube_centre,
@@ -171,13 +183,9 @@ class RobustController(Actor):
             peer_mean=peer_mean,
             peer_distance=peer_distance,
         )
-        return self.objective.pose(posed, points, weights, peer_mean[:, -1].copy())
-
-    def _starts(self, problem: HorizonProblem) -> Array:
-        """Where the solver starts (2, N, 2): the standing plan from the next period on, zero where it ends; braking."""
-        standing, velocity = self._standing, problem.velocity
-        age, speed = standing.age(self.now, self.period), math.hypot(velocity.item(0), velocity.item(1))
-        return self._first_guesses(standing.controls, age, velocity, speed, self.max_acceleration, self.period)
+        speed = math.hypot(*velocity.tolist())
+        starts = self._first_guesses(planned_controls, age, velocity, speed, self.max_acceleration, self.period)
+        return self.objective.pose(posed, points, weights, peer_mean[:, -1].copy()), starts
 
     def _target_ahead(self, now: float) -> tuple[Array, Array, Array, Array]:
         """Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N, weights; K is 0 or 1."""
@@ -189,21 +197,13 @@ class RobustController(Actor):
 
     def _peers_ahead(self, now: float) -> tuple[Array, Array]:
         """f5: positions (n, N, 2) and the distances to keep from them (n, N), sorted by the peers' names."""
-        plans = [self._peers[name] for name in sorted(self._peers)]
-        if not plans:
+        if not self._peers:
             return np.empty((0, self._steps, 2)), np.empty((0, self._steps))
-        announced = [
-            (
-                *plan.state.position.tolist(),
-                *plan.state.velocity.tolist(),
-                max(0, round((now - plan.time) / self.period)),
-                len(plan.controls),
-            )
-            for plan in plans
-        ]
+        peers = [self._peers[name] for name in sorted(self._peers)]
         return self._peer_tubes(
-            np.array(announced),
-            np.concatenate([plan.controls for plan in plans]),
+            np.array([peer.announced for peer in peers]),
+            np.concatenate([peer.controls for peer in peers]),
+            now,
             self.period,
             self._radius,
             self.tube_growth,

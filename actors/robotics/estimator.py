@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,15 @@ from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from .messages import RANGE, Array, Estimate, Measurement, all_finite
 
 EXPECTED, PREDICTED = "expected", "predicted"
+
+
+class _Columns(NamedTuple):
+    """Some measurements as the kernels take them."""
+
+    kinds: Array  # (m,) the kernels' numbers
+    observers: Array  # (m, 2)
+    values: Array  # (m, 2); of a range the first counts
+    deviations: Array  # (m, 2) along and across the line of sight
 
 
 class _Estimator(Actor):
@@ -59,9 +69,10 @@ class _Estimator(Actor):
         if not self.trigger.present:
             self._late.update({(each.robot, each.kind): each for each in self.measurements.tokens if each.finite})
             return
-        if self._predicted_at is not None and self.tag.time > self._predicted_at:
-            self._predict((self.tag.time - self._predicted_at) / 1e9)
-        self._predicted_at = self.tag.time
+        now = self.tag.time
+        if self._predicted_at is not None and now > self._predicted_at:
+            self._predict((now - self._predicted_at) / 1e9)
+        self._predicted_at = now
         present = [each for each in self.measurements.tokens if each.finite]
         if self._late:
             known = {(each.robot, each.kind) for each in present}
@@ -84,25 +95,24 @@ class _Estimator(Actor):
         """Mean and covariance."""
         raise NotImplementedError
 
-    def _noises(self, measurements: list[Measurement]) -> Array:
+    def _columns(self, measurements: list[Measurement]) -> _Columns:
+        """The measurements as the kernels take them."""
+        # From lists, as np.array takes ten times as long to make one array of several.
+        return _Columns(
+            np.array([self._ranged if each.kind == RANGE else self._relative for each in measurements]),
+            np.array([each.observer.tolist() for each in measurements]),
+            np.array([[*each.value.tolist(), 0.0][:2] for each in measurements]),
+            np.array([(each.along, each.across) for each in measurements], dtype=float),
+        )
+
+    def _noises(self, columns: _Columns) -> Array:
         """The measurements' covariances (m, 3), all as seen from the prediction, whatever the order of fusion."""
         mean, covariance = self._state()
         if self.noise_direction == EXPECTED:
             points, weights = self._sigma_points(mean, covariance, 0.0)
         else:
             points, weights = np.array(mean)[np.newaxis], np.ones(1)
-        deviations = np.array([(each.along, each.across) for each in measurements], dtype=float)
-        kinds, observers = self._kinds_of(measurements), _observers(measurements)
-        return self._measurement_noise(points, weights, kinds, observers, deviations)
-
-    def _kinds_of(self, measurements: list[Measurement]) -> Array:
-        """The kernels' numbers for the measurements' kinds."""
-        return np.array([self._ranged if each.kind == RANGE else self._relative for each in measurements])
-
-
-def _observers(measurements: list[Measurement]) -> Array:
-    """Where the measurements were made (m, 2)."""
-    return np.array([each.observer.tolist() for each in measurements])  # ten times as fast as from arrays
+        return self._measurement_noise(points, weights, columns.kinds, columns.observers, columns.deviations)
 
 
 def _order(measurement: Measurement) -> Any:
@@ -118,19 +128,19 @@ class UnscentedEstimator(_Estimator):
         from .numerics.ukf import constant_velocity, predict, update
 
         super().initialize()
-        self._constant_velocity, self._move, self._fuse = constant_velocity, predict, update
+        self._transition = lru_cache(8)(constant_velocity)  # it is nearly always the same
+        self._move, self._fuse = predict, update
         self._mean = np.array(self.prior_mean)
         self._covariance = np.diag(self.prior_variance)
 
     def _predict(self, elapsed: float) -> None:
         noise = self._process_noise * (elapsed / self.period)
-        transition = self._constant_velocity(elapsed)
-        self._mean, self._covariance = self._move(self._mean, self._covariance, transition, noise)
+        self._mean, self._covariance = self._move(self._mean, self._covariance, self._transition(elapsed), noise)
 
     def _update(self, measurements: list[Measurement]) -> bool:
-        kinds, observers = self._kinds_of(measurements), _observers(measurements)
-        values = np.array([[*each.value.tolist(), 0.0][:2] for each in measurements])  # a range is one number
-        noises = self._noises(measurements)
+        columns = self._columns(measurements)
+        kinds, observers, values, _ = columns
+        noises = self._noises(columns)
         mean, covariance = self._fuse(self._mean, self._covariance, self.kappa, kinds, observers, values, noises)
         if not (all_finite(mean) and all_finite(covariance)):
             return False

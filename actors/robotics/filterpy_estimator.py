@@ -48,7 +48,7 @@ class FilterPyEstimator(_Estimator):
             self._filter.predict()
 
     def _update(self, measurements: list[Measurement]) -> bool:
-        noises = self._noises(measurements)
+        noises = self._noises(self._columns(measurements))
         before = np.array(self._filter.x), np.array(self._filter.P)
         for each, (xx, xy, yy) in zip(measurements, noises, strict=True):
             ranged = each.kind == RANGE

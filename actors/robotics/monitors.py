@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import combinations
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
-from .messages import Array, BodyState
+from .messages import BodyState
 
 
 class GoalMonitor(Actor):
@@ -22,16 +23,16 @@ class GoalMonitor(Actor):
     tolerance = Parameter(float, 0.5, unit="m", min=0, doc="how near counts as arrived")
 
     def initialize(self) -> None:
-        self._last: Array | None = None
+        self._last: list[float] | None = None
         self._length = 0.0
         self._has_arrived = False
 
     def fire(self) -> None:
-        position = self.state.value.position
+        position: list[float] = self.state.value.position.tolist()
         if self._last is not None:
             self._length += separation(position, self._last)
         self._last = position
-        distance = separation(position, self.goal)
+        distance = separation(position, self.goal.tolist())
         self.path_length.send(self._length)
         self.distance.send(distance)
         if distance <= self.tolerance and not self._has_arrived:
@@ -49,7 +50,7 @@ class DistanceMonitor(Actor):
 
     def fire(self) -> None:
         if self.a.present and self.b.present:
-            self.distance.send(separation(self.a.value.position, self.b.value.position))
+            self.distance.send(separation(self.a.value.position.tolist(), self.b.value.position.tolist()))
 
 
 class SeparationMonitor(Actor):
@@ -60,11 +61,11 @@ class SeparationMonitor(Actor):
 
     def fire(self) -> None:
         # One state of each body: a state that was duplicated on its way is not two bodies at one place.
-        positions = [states[-1].position for states in self.bodies.by_channel() if states]
+        positions = [states[-1].position.tolist() for states in self.bodies.by_channel() if states]
         if len(positions) >= 2:
             self.distance.send(min(separation(a, b) for a, b in combinations(positions, 2)))
 
 
-def separation(a: Array, b: Array) -> float:
+def separation(a: Sequence[float], b: Sequence[float]) -> float:
     """Metres between two points."""
-    return math.hypot(a.item(0) - b.item(0), a.item(1) - b.item(1))
+    return math.hypot(a[0] - b[0], a[1] - b[1])

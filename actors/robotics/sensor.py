@@ -43,7 +43,8 @@ class Sensor(Actor):
         position = self.robot.value.position
         believed = self.location.value.position if self.location.present else position
         # Floats: arithmetic on arrays of two takes ten times as long.
-        dx, dy = (self.target.value.position - position).tolist()
+        (tx, ty), (x, y) = self.target.value.position.tolist(), position.tolist()
+        dx, dy = tx - x, ty - y
         distance = math.hypot(dx, dy)
         if self.max_range is not None and distance > self.max_range:
             return

@@ -36,15 +36,16 @@ class Vehicle(Actor):
         self._moved_at: int | None = None
 
     def fire(self) -> None:
+        now = self.tag.time
         if self.trigger.present:
             if self._moved_at is not None:
-                self._move((self.tag.time - self._moved_at) / 1e9)
+                self._move((now - self._moved_at) / 1e9)
             self._held = self._next
-            self._moved_at = self.tag.time
+            self._moved_at = now
             self.state.send(BodyState(self._position, self._velocity))
         if self.acceleration.present and all_finite(wanted := np.array(self.acceleration.value, dtype=float)):
             self._next = shortened(wanted, self.max_acceleration)
-            if self._moved_at == self.tag.time:
+            if self._moved_at == now:
                 self._held = self._next
 
     def _move(self, elapsed: float) -> None:

@@ -201,12 +201,13 @@ def test_violations_are_the_papers(random: np.random.Generator) -> None:
 def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> None:
     ages, lengths = (0, 1, 3, 9, 25), (11, 2, 11, 1, 30)
     states, plans = random.normal(size=(5, 4)), [random.normal(size=(length, 2)) for length in lengths]
-    announced, radius = np.column_stack([states, ages, lengths]), 0.2 + 0.4 * np.arange(1, 11)
-    positions, distances = reachability.peer_tubes(announced, np.concatenate(plans), 0.1, radius, 0.4, 2.0, 3.0)
-    for row, (age, state, controls) in enumerate(zip(ages, states, plans, strict=True)):
+    made_at, radius = 7.0 - 0.1 * np.array(ages), 0.2 + 0.4 * np.arange(1, 11)
+    announced, controls = np.column_stack([states, made_at, lengths]), np.concatenate(plans)
+    positions, distances = reachability.peer_tubes(announced, controls, 7.0, 0.1, radius, 0.4, 2.0, 3.0)
+    for row, (age, state, plan) in enumerate(zip(ages, states, plans, strict=True)):
         place, speed, driven = state[:2], state[2:], []
         for k in range(age + 10):
-            place, speed = place + 0.1 * speed, speed + 0.1 * (controls[k] if k < len(controls) else 0.0)
+            place, speed = place + 0.1 * speed, speed + 0.1 * (plan[k] if k < len(plan) else 0.0)
             driven.append(place)
         assert positions[row] == pytest.approx(np.array(driven[age:]), abs=1e-12)
         assert distances[row] == pytest.approx(2.0 + 3.0 * (radius + 0.4 * max(0, age - 1)))

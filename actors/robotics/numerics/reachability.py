@@ -41,21 +41,28 @@ def own_tube(planned: Array, radius: Array, age: int) -> tuple[Array, Array]:
 
 @kernel
 def peer_tubes(
-    announced: Array, controls: Array, period: float, radius: Array, growth: float, safe_distance: float, margin: float
+    announced: Array,
+    controls: Array,
+    now: float,
+    period: float,
+    radius: Array,
+    growth: float,
+    safe_distance: float,
+    margin: float,
 ) -> tuple[Array, Array]:
     """f5: where n peers will be at steps 1..N from now on (n, N, 2), and the distances to keep from them (n, N).
 
-    Each row of ``announced`` (n, 6) is of one plan: x, y, vx, vy when it was made, the periods that have passed since,
-    and how many of the rows of ``controls``, which are of all plans in turn, are the accelerations from then on; past
-    the last of them the velocity is kept.  To the ``radius`` (N,) of eq. (3), eq. (4) adds ``growth`` for every period
-    but one, which is normal latency.
+    Each row of ``announced`` (n, 6) is of one plan: x, y, vx, vy when it was made, the time (s) of that, and how many
+    of the rows of ``controls``, which are of all plans in turn, are the accelerations from then on; past the last of
+    them the velocity is kept.  To the ``radius`` (N,) of eq. (3), eq. (4) adds ``growth`` for every period that has
+    passed since but one, which is normal latency.
     """
     count, steps = announced.shape[0], radius.shape[0]
     positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
     first = 0
     for i in range(count):
         px, py, vx, vy = announced[i, 0], announced[i, 1], announced[i, 2], announced[i, 3]
-        age, planned = int(announced[i, 4]), int(announced[i, 5])
+        age, planned = max(0, round((now - announced[i, 4]) / period)), int(announced[i, 5])
         for k in range(age + steps):
             px += period * vx
             py += period * vy
@@ -82,21 +89,23 @@ def propagate(
     size = mean.shape[0]
     means, covariances = np.empty((steps, 2)), np.empty((steps, 3))
     now, spread = mean.copy(), covariance.copy()
+    moved, half = np.empty(size), np.empty((size, size))
     for s in range(steps):
-        moved = np.zeros(size)
-        half = np.zeros((size, size))
-        full = process_noise.copy()
         for i in range(size):
+            moved[i] = 0.0
+            for j in range(size):
+                half[i, j] = 0.0
             for k in range(size):
                 if transition[i, k] != 0.0:
                     moved[i] += transition[i, k] * now[k]
                     for j in range(size):
                         half[i, j] += transition[i, k] * spread[k, j]
         for i in range(size):
+            now[i] = moved[i]
             for j in range(size):
+                spread[i, j] = process_noise[i, j]
                 for k in range(size):
-                    full[i, j] += half[i, k] * transition[j, k]
-        now, spread = moved, full
+                    spread[i, j] += half[i, k] * transition[j, k]
         means[s, 0], means[s, 1] = now[0], now[1]
         covariances[s, 0], covariances[s, 1], covariances[s, 2] = spread[0, 0], spread[0, 1], spread[1, 1]
     return means, covariances

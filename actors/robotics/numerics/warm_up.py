@@ -44,7 +44,7 @@ def _call_every_kernel() -> None:
     controls = np.zeros((steps, 2))
     positions = trajectory(np.zeros(2), np.zeros(2), controls, period, steps)
     centre, radius = own_tube(positions, tube_radius(0.2, 0.4, 1.0, steps), 0)
-    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), controls, period, radius, 0.4, 1.0, 1.0)
+    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), controls, 0.0, period, radius, 0.4, 1.0, 1.0)
     posed = HorizonProblem(
         period=period,
         position=np.zeros(2),
