@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
+
+from epicycle.actors import Parameter, ParameterError
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import Position, Problems, did_you_mean, nearest
@@ -30,7 +33,7 @@ class NodeReader:
     def entries(self, node: Node, what: str, valid: tuple[str, ...]) -> dict[str, Entry] | None:
         """The entries of a mapping, unknown keys reported and left out; None if it is no mapping."""
         if not isinstance(node, Mapping):
-            if isinstance(node, Scalar) and node.value is None:
+            if is_empty(node):
                 return {}
             self.problems.add(f"{what} is not a mapping", node.position, f"valid keys: {', '.join(valid)}")
             return None
@@ -50,12 +53,23 @@ class NodeReader:
                     known.setdefault(meant, entry)
         return known
 
+    def number(self, entries: dict[str, Entry], key: str, kind: Any, default: Any, low: Any, high: Any) -> Any:
+        """A number within bounds."""
+        if key not in entries:
+            return default
+        node = entries[key].value
+        try:
+            return Parameter(kind, min=low, max=high).convert(node.value if isinstance(node, Scalar) else "a list")
+        except ParameterError as error:
+            self.problems.add(f"{key}: {error}", node.position)
+            return default
+
     def named(self, entries: dict[str, Entry], key: str) -> list[tuple[str, Entry]]:
         """The entries of a mapping from names to things."""
         if key not in entries:
             return []
         node = entries[key].value
-        if isinstance(node, Scalar) and node.value is None:
+        if is_empty(node):
             return []
         if not isinstance(node, Mapping):
             self.problems.add(f"{key} is not a mapping from names", node.position)
@@ -73,7 +87,7 @@ class NodeReader:
     def items(self, node: Node, what: str) -> tuple[Node, ...] | None:
         if isinstance(node, Sequence):
             return node.items
-        if isinstance(node, Scalar) and node.value is None:
+        if is_empty(node):
             return ()
         self.problems.add(f"{what} is not a list", node.position, "begin each entry with '- '")
         return None
@@ -83,7 +97,7 @@ class NodeReader:
         nodes = node.items if isinstance(node, Sequence) else (node,)
         found = []
         for item in nodes:
-            if isinstance(item, Scalar) and item.value is None:
+            if is_empty(item):
                 continue
             if (text := self.text(item, what)) is not None:
                 found.append(Text(text, item.position))
@@ -112,6 +126,11 @@ def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
     if not at.source.startswith(text, start):
         return at
     return Position(at.file, at.line, start + offset + 1, len(part), at.source)
+
+
+def is_empty(node: Node) -> bool:
+    """Whether nothing is written there."""
+    return isinstance(node, Scalar) and node.value is None
 
 
 def within(text: Text, part: str) -> Position:
