@@ -116,27 +116,28 @@ class RobustController(Actor):
         self._infeasible = 0
 
     def fire(self) -> None:
-        self._listen()
+        now = self.now
+        self._listen(now)
         if not self.trigger.present:
             return
-        if not (self.state.present and self.state.value.finite):
+        own = self.state.value if self.state.present else None
+        if own is None or not own.finite:
             self._applied = np.zeros(2)
             self._standing = self._nothing
             self.control.send(np.zeros(2))
             return
-        own = self.state.value
-        problem, starts = self._problem(own, self.now)
+        problem, starts = self._problem(own, now)
         solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
-        if not all_finite(controls):  # input so large that its squares are not finite
+        if not all_finite(controls.ravel().tolist()):  # input so large that its squares are not finite
             controls, violation = starts[1], math.inf  # braking
-        self._send(own, problem, controls)
+        self._send(own, problem, controls, now)
         self._infeasible += violation > 0.0
         self.violation.send(float(violation))
         self.infeasible.send(self._infeasible)
         self.iterations.send(int(solution.iterations))
 
-    def _listen(self) -> None:
+    def _listen(self, now: float) -> None:
         """Remember the latest estimate and plans, also those that come between triggers."""
         for plan in self.peer_plans.tokens:
             known = self._peers.get(plan.robot)
@@ -144,12 +145,11 @@ class RobustController(Actor):
                 state, controls = plan.state, plan.controls
                 announced = (*state.position.tolist(), *state.velocity.tolist(), plan.time, len(controls))
                 self._peers[plan.robot] = _Peer(plan.time, announced, controls)
-        if self.estimate.present and self.estimate.value.finite:
-            self._target, self._target_at = self.estimate.value, self.now
+        if self.estimate.present and (estimate := self.estimate.value).finite:
+            self._target, self._target_at = estimate, now
 
-    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
+    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array, now: float) -> None:
         positions = self._trajectory(problem.position, problem.velocity, controls, self.period, self._steps)
-        now = self.now
         self._standing = _Standing(now, controls, positions)
         announced = np.empty((self.horizon + 1, 2))
         announced[0], announced[1:] = self._applied, controls[: self.horizon]

@@ -142,7 +142,7 @@ class UnscentedEstimator(_Estimator):
         kinds, observers, values, _ = columns
         noises = self._noises(columns)
         mean, covariance = self._fuse(self._mean, self._covariance, self.kappa, kinds, observers, values, noises)
-        if not (all_finite(mean) and all_finite(covariance)):
+        if not all_finite(mean.tolist() + covariance.ravel().tolist()):
             return False
         self._mean, self._covariance = mean, covariance
         return True

