@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from epicycle.actors import Actor, EpicycleError, declared_parameters, declared_ports, did_you_mean, has_own_ports
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_ATTRIBUTE = "_decorations"
+_OF_CLASS, _OF_INSTANCE = "_decorations", "_own_decorations"  # attributes that keep them
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class Decoration:
                 raise EpicycleError(
                     f"{target.path} is part of a model: weave it there, with model.weave({self.name!r}, ..., at=...)"
                 )
-            known, where = decorations(target), target.path
+            known, where, attribute = decorations(target), target.path, _OF_INSTANCE
             directions = {n: p.direction for n, p in {**target.inputs, **target.outputs}.items()}
             self._check_ports(where, directions, declared_parameters(type(target)))
         elif isinstance(target, type) and issubclass(target, Actor):
-            known, where = class_decorations(target), target.__name__
+            known, where, attribute = class_decorations(target), target.__name__, _OF_CLASS
             if not has_own_ports(target):
                 directions = {name: port.direction for name, port in declared_ports(target).items()}
                 self._check_ports(where, directions, declared_parameters(target))
@@ -55,8 +55,8 @@ class Decoration:
             raise EpicycleError(
                 f"{where} has an aspect {self.name!r} already: give this one another name with name=..."
             )
-        own: tuple[Decoration, ...] = vars(target).get(_ATTRIBUTE, ())
-        setattr(target, _ATTRIBUTE, (*own, self))
+        own: tuple[Decoration, ...] = vars(target).get(attribute, ())
+        setattr(target, attribute, (*own, self))
         return target
 
     def _check_ports(self, where: str, directions: dict[str, str], parameters: Iterable[str]) -> None:
@@ -95,10 +95,10 @@ def decoration(aspect: Aspect, ports: tuple[str, ...], name: str) -> Decoration:
 
 def class_decorations(cls: type) -> tuple[Decoration, ...]:
     """The aspects that come with an actor class, those of its bases first, in the order in which they were given."""
-    return tuple(each for base in reversed(cls.__mro__) for each in vars(base).get(_ATTRIBUTE, ()))
+    return tuple(each for base in reversed(cls.__mro__) for each in vars(base).get(_OF_CLASS, ()))
 
 
 def decorations(actor: Actor) -> tuple[Decoration, ...]:
     """The aspects that come with an actor, those of its class first."""
-    own: tuple[Any, ...] = vars(actor).get(_ATTRIBUTE, ())
+    own: tuple[Decoration, ...] = getattr(actor, _OF_INSTANCE, ())
     return (*class_decorations(type(actor)), *own)

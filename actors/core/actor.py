@@ -120,7 +120,7 @@ class Actor(Configurable):
         for name, port in declared_ports(type(self)).items():
             bound = port.bind(self)
             if not isinstance(bound, ParameterPort):  # the name reads as the parameter's value
-                self.__dict__[name] = bound
+                setattr(self, name, bound)
             if isinstance(bound, InputPort):
                 self.inputs[name] = bound
             else:

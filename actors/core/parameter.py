@@ -109,6 +109,10 @@ class Parameter(Generic[T]):
             return value
         raise AttributeError(f"{owner.__name__}.{self.name} is read before it was set")
 
+    def store(self, instance: object, value: T | None) -> None:
+        """Give an instance its value."""
+        setattr(instance, self.name, value)
+
     @property
     def required(self) -> bool:
         """Whether a value must be given."""
@@ -286,13 +290,14 @@ class Configurable:
         for name, parameter in declared.items():
             if name in values:
                 try:
-                    self.__dict__[name] = parameter.convert(values[name])
+                    value = parameter.convert(values[name])
                 except ParameterError as error:
                     raise _within(type(self), name, error) from None
             elif parameter.required:
                 raise ParameterError(f"{type(self).__name__} needs a value for {name!r}")
             else:
-                self.__dict__[name] = parameter.default_value
+                value = parameter.default_value
+            parameter.store(self, value)
 
     def __init_subclass__(cls, **keywords: object) -> None:
         super().__init_subclass__(**keywords)

@@ -89,6 +89,9 @@ class PortParameter(Parameter[T]):
         initial: T = instance.__dict__[self.name]
         return port.current(initial) if port.has_received else initial
 
+    def store(self, instance: object, value: T | None) -> None:
+        instance.__dict__[self.name] = value  # past __set__
+
     def __set__(self, instance: Any, value: T) -> None:
         # That it exists makes Python ask __get__ before the instance's __dict__, where the value given first lies.
         raise AttributeError(f"{instance.path}.{self.name} changes by a token at its port alone")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import types
 import typing
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Generic, Protocol, TypeVar, overload
 
 import numpy as np
@@ -48,7 +49,10 @@ class _Port(Generic[T]):
     def bind(self, actor: Any) -> Any:
         """The port of one instance."""
         bound = object.__new__(type(self))
-        bound.__dict__.update(self.__dict__)  # copy() goes a long way round to the same end
+        # One by one: an instance whose __dict__ was never asked for keeps its attributes in itself, where they take a
+        # third of the space and are found sooner.
+        for name, value in vars(self).items():
+            setattr(bound, name, value)
         bound.actor = actor
         bound.path = f"{actor.path}.{self.name}"
         return bound
@@ -207,11 +211,12 @@ class OutputPort(_Port[T]):
 
     def connect(self, emit: Emit) -> None:
         """Engine: what ``send`` does from now on."""
-        self.__dict__["send"] = emit  # in place of the method: a call less for each token
+        self.send = emit  # type: ignore[method-assign]  # a call less for each token
 
     def disconnect(self) -> None:
         """Engine: from now on nothing can be sent."""
-        self.__dict__.pop("send", None)
+        with suppress(AttributeError):
+            del self.send
 
 
 def shaped(type: Any, shape: tuple[int | None, ...]) -> Any:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 BENCH = Path(__file__).parents[2] / "benchmarks" / "aspects.py"
+sys.path.insert(0, str(BENCH.parent))  # what it shares with the others
 
 
 @pytest.fixture(scope="module")
