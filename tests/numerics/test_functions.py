@@ -19,7 +19,8 @@ HorizonProblem = horizon.HorizonProblem
 constraints = importlib.import_module(PREFIX + "constraints")
 newton = importlib.import_module(PREFIX + "newton")
 # Called by kernels only; numba looks them up as globals.
-Blocks, new_feedback, newton_step = newton.Blocks, newton.new_feedback, newton.newton_step
+new_stages, newton_step = newton.new_stages, newton.newton_step
+POSITION, VELOCITY, CONTROL, STEP = newton.POSITION, newton.VELOCITY, newton.CONTROL, newton.STEP
 all_constraints, within_reach = constraints.all_constraints, constraints.within_reach
 
 Six = tuple[float, float, float, float, float, float]
@@ -271,9 +272,11 @@ def test_propagate_is_repeated_prediction(random: np.random.Generator, noise: fl
 
 @numba.njit
 def riccati(position: np.ndarray, velocity: np.ndarray, control: np.ndarray, period: float) -> tuple[float, np.ndarray]:
-    step = np.empty((len(control), 2))
-    blocks = Blocks(position, velocity, control)
-    return newton_step(blocks, period, new_feedback(len(control)), step), step
+    stages = new_stages(len(control))
+    stages[:, POSITION : POSITION + 5] = position
+    stages[:, VELOCITY : VELOCITY + 5] = velocity
+    stages[:, CONTROL : CONTROL + 5] = control
+    return newton_step(stages, period), stages[:, STEP : STEP + 2].copy()
 
 
 @pytest.mark.parametrize("steps", [3, 10, 40])
@@ -307,10 +310,10 @@ def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, st
 @numba.njit
 def kept_and_all(*fields: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     problem = HorizonProblem(*fields)
-    every = all_constraints(problem)
-    row, step = every.row.copy(), every.step.copy()
-    kept = within_reach(problem, every)
-    return row, step, kept.row, kept.step
+    table = all_constraints(problem)
+    every = table[:, :2].astype(np.int64)
+    kept = table[: within_reach(problem, table), :2].astype(np.int64)
+    return every[:, 0], every[:, 1], kept[:, 0], kept[:, 1]
 
 
 def crowded_problem(random: np.random.Generator) -> "horizon.HorizonProblem":

@@ -26,11 +26,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .compiled import borrower, inner, kernel
-from .constraints import Constraints, all_constraints, term, violations, within_reach
-from .horizon import REACH_GOAL, HorizonProblem, roll_out
-from .mutual_information import negative_information
-from .newton import Blocks, Feedback, add, clear, new_blocks, new_feedback, newton_step
-from .terms import stay_near
+from .constraints import (
+    BOUND,
+    MARGIN,
+    NEED,
+    PLACE,
+    ROW,
+    VALUE,
+    WHEN,
+    all_constraints,
+    certainly_kept,
+    term,
+    violations,
+    within_reach,
+)
+from .horizon import REACH_GOAL, HorizonProblem
+from .mutual_information import informed, new_points
+from .newton import CONTROL, STEP, VELOCITY, add, clear, new_stages, newton_step
+from .terms import Term, stay_near
 from .typing import Array
 
 # Violations below this (metres) count as none; it is also the slack an infeasible problem's bounds get.
@@ -39,10 +52,14 @@ _SLACK = 1e-4
 _CENTRING = 0.1  # how far a start is moved towards braking before anything else
 _RESTORE, _OPTIMISE = 0.0, 1.0  # phases; numba would compile everything once for each of two integers
 _RESTORE_FROM, _RESTORE_TO = 0.1, 1e-7  # barrier parameters of restoration
+_RESTORE_ON = (
+    1e-10  # where it goes on to if that leaves so little that only the barriers of f1 and f2 may be in the way
+)
 _OPTIMISE_FROM = 0.03  # relative gap, constraints times barrier parameter, at which optimisation begins
 _GAP = 1e-5  # relative (and absolute below 1e-2) gap at which it stops
 _REDUCTION = 0.03  # of the barrier parameter from one minimisation to the next
 _CLOSE = 0.5  # decrease, in barrier parameters, that a minimisation but the last of them may leave
+_SHARE = 0.8  # of the way to the nearest limit that a step goes at most
 _NEWTON_STEPS = 40  # per barrier parameter
 
 
@@ -55,142 +72,196 @@ class Solution(NamedTuple):
     iterations: int  # Newton steps
 
 
-class _Task(NamedTuple):
-    """A problem with the constraints to be watched, and room for a method that would else allocate at every step."""
+# Columns of the table of a plan, a row for each prediction step; each is x and y.
+_POSITION = 0
+_VELOCITY = 2
+_TRIED = 4  # the controls that position and velocity follow from
+_TAKEN = 6  # the best controls so far
+_MOVED = 8  # of the position, by a whole step
+_OBSTACLE = 10  # whom f6 is about
+_COLUMNS = 12
 
-    problem: HorizonProblem
-    constraints: Constraints
-    bounds: Array  # (m,) what each constraint may be at most; 0 where the problem is feasible
-    values: Array  # (m,) of the constraints
-    positions: Array  # (N, 2)
-    velocities: Array  # (N, 2)
-    blocks: Blocks
-    feedback: Feedback
-    step: Array  # (N, 2)
-    trial: Array  # (N, 2)
+
+class _Task(NamedTuple):
+    """A problem as it is evaluated again and again: some numbers, and four tables that everything happens in."""
+
+    period: float
+    x: float  # position and velocity at step 1
+    y: float
+    vx: float
+    vy: float
+    max_speed: float
+    max_acceleration: float
+    seeks: bool  # the objective is eq. (2)
+    goal_x: float
+    goal_y: float
+    informs: bool  # it is eq. (5), and there is an obstacle
+    variance: float
+    penalty: float
+    reach: float
+    plan: Array  # (N, 12)
+    stages: Array  # of ``newton``
+    constraints: Array  # those within reach
+    points: Array  # sigma points, of ``mutual_information``
 
 
 @inner
 def _new_task(problem: HorizonProblem, steps: int) -> _Task:
-    constraints = within_reach(problem, all_constraints(problem))
-    count = constraints.row.shape[0]
+    constraints = all_constraints(problem)
+    plan = np.zeros((steps, _COLUMNS))
+    informs = problem.objective != REACH_GOAL and problem.obstacle_mean.shape[0] > 0
+    if informs:
+        points = new_points(problem.sigma_positions, problem.sigma_weights, problem.others_distance)
+        for s in range(steps):
+            plan[s, _OBSTACLE] = problem.obstacle_mean[0, s, 0]
+            plan[s, _OBSTACLE + 1] = problem.obstacle_mean[0, s, 1]
+    else:
+        points = plan[:0]
     return _Task(
-        problem, constraints, np.zeros(count), np.empty(count), np.empty((steps, 2)), np.empty((steps, 2)),
-        new_blocks(steps), new_feedback(steps), np.empty((steps, 2)), np.empty((steps, 2)),
+        problem.period, problem.position[0], problem.position[1], problem.velocity[0], problem.velocity[1],
+        problem.max_speed, problem.max_acceleration, problem.objective == REACH_GOAL, problem.goal[0], problem.goal[1],
+        informs,
+        problem.measurement_variance, problem.range_penalty, problem.measurement_range,
+        plan, new_stages(steps), constraints[: within_reach(problem, constraints)], points,
     )  # fmt: skip
 
 
 @borrower
-def _drive(task: _Task, controls: Array) -> None:
-    """Fill in positions and velocities."""
-    problem = task.problem
-    roll_out(problem.position, problem.velocity, controls, problem.period, task.positions, task.velocities)
+def _drive(task: _Task) -> None:
+    """Fill in the positions and velocities that follow from the controls tried."""
+    plan = task.plan
+    px, py, vx, vy = task.x, task.y, task.vx, task.vy
+    for s in range(plan.shape[0]):
+        plan[s, _POSITION], plan[s, _POSITION + 1] = px, py
+        plan[s, _VELOCITY], plan[s, _VELOCITY + 1] = vx, vy
+        px += task.period * vx
+        py += task.period * vy
+        vx += task.period * plan[s, _TRIED]
+        vy += task.period * plan[s, _TRIED + 1]
 
 
 @borrower
-def _excess(task: _Task, controls: Array) -> float:
-    """The largest value of f3-f5: negative if all are kept strictly, inf if one is not a number."""
-    _drive(task, controls)
+def _try(task: _Task, length: float) -> None:
+    """Go so much of the step from the controls taken."""
+    plan, stages = task.plan, task.stages
+    for s in range(plan.shape[0]):
+        for c in range(2):
+            plan[s, _TRIED + c] = plan[s, _TAKEN + c] + length * stages[s, STEP + c]
+    _drive(task)
+
+
+@borrower
+def _keep(task: _Task) -> None:
+    """Take the controls tried."""
+    plan = task.plan
+    for s in range(plan.shape[0]):
+        plan[s, _TAKEN], plan[s, _TAKEN + 1] = plan[s, _TRIED], plan[s, _TRIED + 1]
+
+
+@borrower
+def _excess(task: _Task) -> float:
+    """The largest value of f3-f5 with the controls taken: negative if all are kept strictly, inf if one is none."""
+    plan, constraints = task.plan, task.constraints
+    for s in range(plan.shape[0]):
+        plan[s, _TRIED], plan[s, _TRIED + 1] = plan[s, _TAKEN], plan[s, _TAKEN + 1]
+    _drive(task)
     largest = -math.inf
-    for i in range(task.values.shape[0]):
-        s = task.constraints.step[i]
-        task.values[i] = term(task.constraints, i, task.positions[s, 0], task.positions[s, 1])[0]
-        if not task.values[i] <= largest:
-            largest = task.values[i] if task.values[i] < math.inf else math.inf
+    for i in range(constraints.shape[0]):
+        s = int(constraints[i, WHEN])
+        value = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])[0]
+        constraints[i, VALUE] = value
+        if not value <= largest:
+            largest = value if value < math.inf else math.inf
     return largest
 
 
 @borrower
-def _ball(blocks: Array, s: int, x: float, y: float, radius: float, mu: float, dual: float) -> float:
-    """Add the barrier of f1 or f2, -mu log(1 - |(x, y)|^2 / radius^2), and return what the log is taken of."""
-    inside = 1.0 - (x * x + y * y) / (radius * radius)
-    slope = 2.0 / (radius * radius * inside)
-    add(blocks, s, mu * slope, dual * slope, dual * slope * slope, x, y, 1.0, 0.0, 1.0)
-    return inside
+def _ball(x: float, y: float, radius: float, mu: float, dual: float) -> Term:
+    """The barrier of f1 or f2, -mu log(1 - |(x, y)|^2 / radius^2): what the log is taken of, gradient and Hessian."""
+    inverse = 1.0 / (radius * radius)
+    inside = 1.0 - inverse * (x * x + y * y)
+    slope = 2.0 * inverse / inside
+    first, second = mu * slope, dual * slope
+    bend = second * slope
+    return inside, first * x, first * y, second + bend * x * x, bend * x * y, second + bend * y * y
 
 
 @borrower
 def _objective(task: _Task, mu: float) -> float:
     """f0 of eq. (2) or the objective of eq. (5); ``mu`` = 0 is the paper's own, mu > 0 smooths f6's kink."""
-    problem, positions, blocks = task.problem, task.positions, task.blocks.position
-    steps = positions.shape[0]
+    plan, stages = task.plan, task.stages
+    steps = plan.shape[0]
     value = 0.0
-    if problem.objective == REACH_GOAL:
+    if task.seeks:
         for s in range(steps):
-            dx, dy = positions[s, 0] - problem.goal[0], positions[s, 1] - problem.goal[1]
+            dx, dy = plan[s, _POSITION] - task.goal_x, plan[s, _POSITION + 1] - task.goal_y
             value += dx * dx + dy * dy
-            add(blocks, s, 2.0, 2.0, 0.0, dx, dy, 1.0, 0.0, 1.0)
+            add(stages, s, 2.0, 2.0, 0.0, dx, dy, 1.0, 0.0, 1.0)
+    if not task.informs:
         return value
-    if problem.obstacle_mean.shape[0] == 0:
-        return value
-    information, gx, gy, hxx, hxy, hyy = negative_information(
-        positions[steps - 1, 0],
-        positions[steps - 1, 1],
-        problem.sigma_positions,
-        problem.sigma_weights,
-        problem.others_distance,
-        problem.measurement_variance,
+    last = steps - 1
+    value, gx, gy, hxx, hxy, hyy = informed(
+        task.points, plan[last, _POSITION], plan[last, _POSITION + 1], task.variance
     )
-    value += information
-    add(blocks, steps - 1, 1.0, 1.0, 0.0, gx, gy, hxx, hxy, hyy)
-    gamma = problem.range_penalty
+    add(stages, last, 1.0, 1.0, 0.0, gx, gy, hxx, hxy, hyy)
+    gamma, product = task.penalty, 1.0
     for s in range(steps):
         g, gx, gy, hxx, hxy, hyy = stay_near(
-            positions[s, 0],
-            positions[s, 1],
-            problem.obstacle_mean[0, s, 0],
-            problem.obstacle_mean[0, s, 1],
-            problem.measurement_range,
+            plan[s, _POSITION], plan[s, _POSITION + 1], plan[s, _OBSTACLE], plan[s, _OBSTACLE + 1], task.reach
         )
         if mu == 0.0 or gamma == 0.0:
             value += gamma * max(0.0, g)
-            if g > 0.0:
-                add(blocks, s, gamma, gamma, 0.0, gx, gy, hxx, hxy, hyy)
+            continue
+        root = math.sqrt(gamma * g * gamma * g + 4.0 * mu * mu)
+        # t and t - g of the eliminated bound, written so that neither cancels.
+        if g > 0.0:
+            t = (gamma * g + 2.0 * mu + root) / (2.0 * gamma)
+            over = mu * t / (gamma * t - mu)
         else:
-            root = math.sqrt(gamma * g * gamma * g + 4.0 * mu * mu)
-            # t and t - g of the eliminated bound, written so that neither cancels.
-            if g > 0.0:
-                t = (gamma * g + 2.0 * mu + root) / (2.0 * gamma)
-                over = mu * t / (gamma * t - mu)
-            else:
-                over = (2.0 * mu - gamma * g + root) / (2.0 * gamma)
-                t = mu * over / (gamma * over - mu)
-            value += gamma * t - mu * math.log(t * over)
-            slope = mu / over
-            add(blocks, s, slope, slope, mu / (over * over + t * t), gx, gy, hxx, hxy, hyy)
-    return value
+            over = (2.0 * mu - gamma * g + root) / (2.0 * gamma)
+            t = mu * over / (gamma * over - mu)
+        value += gamma * t
+        product *= t * over
+        if not 1e-100 < product < 1e100:
+            value -= mu * math.log(product)
+            product = 1.0
+        slope = mu / over
+        add(stages, s, slope, slope, mu / (over * over + t * t), gx, gy, hxx, hxy, hyy)
+    return value - mu * math.log(product)
 
 
 @borrower
-def _evaluate(task: _Task, controls: Array, phase: float, mu: float, dual: float) -> float:
-    """The function the current phase minimises, its blocks filled in; inf outside the barriers' domain.
+def _evaluate(task: _Task, phase: float, mu: float, dual: float) -> float:
+    """The function the current phase minimises at the controls tried, with derivatives; inf outside its domain.
 
     The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``_minimise``.
     """
-    problem, blocks, constraints = task.problem, task.blocks, task.constraints
-    _drive(task, controls)
-    clear(blocks)
-    positions, velocities = task.positions, task.velocities
+    plan, stages, constraints = task.plan, task.stages, task.constraints
+    clear(stages)
     value, product = 0.0, 1.0  # of all arguments of logs: one log of a product for many of its factors
-    for s in range(controls.shape[0]):
-        inside = _ball(blocks.control, s, controls[s, 0], controls[s, 1], problem.max_acceleration, mu, dual)
+    for s in range(plan.shape[0]):
+        inside, gx, gy, hxx, hxy, hyy = _ball(plan[s, _TRIED], plan[s, _TRIED + 1], task.max_acceleration, mu, dual)
         if not inside > 0.0:
             return math.inf
         product *= inside
+        stages[s, CONTROL], stages[s, CONTROL + 1] = gx, gy
+        stages[s, CONTROL + 2], stages[s, CONTROL + 3], stages[s, CONTROL + 4] = hxx, hxy, hyy
         if s > 0:  # the speed at step 1 is decided already
-            inside = _ball(blocks.velocity, s, velocities[s, 0], velocities[s, 1], problem.max_speed, mu, dual)
+            inside, gx, gy, hxx, hxy, hyy = _ball(plan[s, _VELOCITY], plan[s, _VELOCITY + 1], task.max_speed, mu, dual)
             if not inside > 0.0:
                 return math.inf
             product *= inside
+            stages[s, VELOCITY], stages[s, VELOCITY + 1] = gx, gy
+            stages[s, VELOCITY + 2], stages[s, VELOCITY + 3], stages[s, VELOCITY + 4] = hxx, hxy, hyy
         if product < 1e-100:
             value -= mu * math.log(product)
             product = 1.0
-    for i in range(constraints.row.shape[0]):
-        s = constraints.step[i]
-        if phase == _RESTORE and term(constraints, i, positions[s, 0], positions[s, 1])[0] <= task.bounds[i]:
-            continue  # most are kept, and their derivatives are not even computed
-        h, gx, gy, hxx, hxy, hyy = term(constraints, i, positions[s, 0], positions[s, 1])
-        slack = task.bounds[i] - h
+    for i in range(constraints.shape[0]):
+        s = int(constraints[i, WHEN])
+        if phase == _RESTORE and certainly_kept(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1]):
+            continue  # most are
+        h, gx, gy, hxx, hxy, hyy = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])
+        slack = constraints[i, BOUND] - h
         if phase == _OPTIMISE:
             if not slack > 0.0:
                 return math.inf
@@ -199,10 +270,10 @@ def _evaluate(task: _Task, controls: Array, phase: float, mu: float, dual: float
                 value -= mu * math.log(product)
                 product = 1.0
             slope = 1.0 / slack
-            add(blocks.position, s, mu * slope, dual * slope, dual * slope * slope, gx, gy, hxx, hxy, hyy)
-        else:
+            add(stages, s, mu * slope, dual * slope, dual * slope * slope, gx, gy, hxx, hxy, hyy)
+        elif not slack >= 0.0:
             value += 0.5 * slack * slack
-            add(blocks.position, s, -slack, -slack, 1.0, gx, gy, hxx, hxy, hyy)
+            add(stages, s, -slack, -slack, 1.0, gx, gy, hxx, hxy, hyy)
     value -= mu * math.log(product)
     if phase == _OPTIMISE:
         value += _objective(task, mu)
@@ -210,118 +281,203 @@ def _evaluate(task: _Task, controls: Array, phase: float, mu: float, dual: float
 
 
 @borrower
-def _minimise(task: _Task, controls: Array, phase: float, mu: float, dual: float, tolerance: float) -> int:
-    """Newton's method with backtracking (0.05, 0.5) on ``controls`` in place; returns the steps taken.
+def _share(x: float, y: float, dx: float, dy: float, radius: float) -> float:
+    """How much of (dx, dy) it takes from (x, y) to the circle, where the whole crosses it."""
+    a, b, c = dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
+    root = math.sqrt(max(b * b - a * c, 0.0))
+    if c > 0.0:  # from outside, the nearer crossing
+        return c / (root - b)
+    return -c / (root + b) if b > 0.0 else (root - b) / a
+
+
+@borrower
+def _longest(task: _Task, phase: float) -> float:
+    """How much of the step can be taken at most: all of it, or ``_SHARE`` of the way to the nearest limit.
+
+    All limits are circles but the obstacle's, whose margin changes with the direction; it is left to the backtracking,
+    as a step along it is far longer than one to the circle that has its present margin.
+    """
+    plan, stages, constraints, h = task.plan, task.stages, task.constraints, task.period
+    share = 1.0
+    px = py = vx = vy = 0.0
+    for s in range(plan.shape[0]):
+        plan[s, _MOVED], plan[s, _MOVED + 1] = px, py
+        x, y = plan[s, _VELOCITY], plan[s, _VELOCITY + 1]
+        if (x + vx) ** 2 + (y + vy) ** 2 >= task.max_speed**2 and s > 0:
+            share = min(share, _share(x, y, vx, vy, task.max_speed))
+        px += h * vx
+        py += h * vy
+        x, y, dx, dy = plan[s, _TAKEN], plan[s, _TAKEN + 1], stages[s, STEP], stages[s, STEP + 1]
+        if (x + dx) ** 2 + (y + dy) ** 2 >= task.max_acceleration**2:
+            share = min(share, _share(x, y, dx, dy, task.max_acceleration))
+        vx += h * dx
+        vy += h * dy
+    if phase == _OPTIMISE:
+        for i in range(constraints.shape[0]):
+            if constraints[i, MARGIN] != 0.0:
+                continue
+            s = int(constraints[i, WHEN])
+            x, y = plan[s, _POSITION] - constraints[i, PLACE], plan[s, _POSITION + 1] - constraints[i, PLACE + 1]
+            dx, dy = plan[s, _MOVED], plan[s, _MOVED + 1]
+            then, near = (x + dx) ** 2 + (y + dy) ** 2, constraints[i, ROW] == 0.0
+            radius = constraints[i, NEED] + (constraints[i, BOUND] if near else -constraints[i, BOUND])
+            if then >= radius * radius if near else then <= radius * radius and radius > 0.0:
+                share = min(share, _share(x, y, dx, dy, radius))
+    return 1.0 if share == 1.0 else _SHARE * share
+
+
+@borrower
+def _minimise(task: _Task, phase: float, mu: float, dual: float, tolerance: float) -> int:
+    """Newton's method with backtracking (0.05, 0.5) from the controls taken; returns the steps it took.
 
     Where the previous barrier parameter ``dual`` was larger, its curvature is kept for the first step.  At the
     minimum of that one, a constraint's multiplier is dual / slack; with it in the Hessian the step is the tangent of
     the central path, which lowers the slacks of active constraints to mu / dual of themselves and no further.  With
     the curvature of ``mu`` the step leaves the domain, and every reduction costs several more.
     """
-    steps = controls.shape[0]
-    step, trial = task.step, task.trial
-    value = _evaluate(task, controls, phase, mu, dual)
+    value = _evaluate(task, phase, mu, dual)
     if not value < math.inf:  # numbers too large to be squared, or none
         return 0
     for iteration in range(_NEWTON_STEPS):
-        descent = newton_step(task.blocks, task.problem.period, task.feedback, step)
+        descent = newton_step(task.stages, task.period)
         if not -0.5 * descent > tolerance:
             return iteration
-        length = 1.0
+        length = _longest(task, phase)
         while True:
-            for j in range(steps):
-                trial[j, 0] = controls[j, 0] + length * step[j, 0]
-                trial[j, 1] = controls[j, 1] + length * step[j, 1]
-            reached = _evaluate(task, trial, phase, mu, mu)
+            _try(task, length)
+            reached = _evaluate(task, phase, mu, mu)
             if reached <= value + 0.05 * length * descent:
                 break
             length *= 0.5
             if length < 1e-10:  # rounding hides any further descent
                 return iteration
-        for j in range(steps):
-            controls[j, 0], controls[j, 1] = trial[j, 0], trial[j, 1]
+        _keep(task)
         value = reached
     return _NEWTON_STEPS
 
 
 @borrower
-def _inside(problem: HorizonProblem, controls: Array) -> bool:
-    """Whether the controls keep f1 and f2 strictly."""
-    vx, vy = problem.velocity[0], problem.velocity[1]
-    for j in range(controls.shape[0]):
-        ux, uy = controls[j, 0], controls[j, 1]
-        if not ux * ux + uy * uy < problem.max_acceleration**2:
+def _inside(task: _Task) -> bool:
+    """Whether the controls taken keep f1 and f2 strictly."""
+    plan = task.plan
+    vx, vy = task.vx, task.vy
+    for s in range(plan.shape[0]):
+        ux, uy = plan[s, _TAKEN], plan[s, _TAKEN + 1]
+        if not ux * ux + uy * uy < task.max_acceleration**2:
             return False
-        vx += problem.period * ux
-        vy += problem.period * uy
-        if j < controls.shape[0] - 1 and not vx * vx + vy * vy < problem.max_speed**2:
+        vx += task.period * ux
+        vy += task.period * uy
+        if s < plan.shape[0] - 1 and not vx * vx + vy * vy < task.max_speed**2:
             return False
     return True
 
 
-@inner
-def _braking(problem: HorizonProblem, steps: int, share: float) -> Array:
-    """Controls that brake with at most ``share`` of f2's limit, and per step at most that share of the speed left."""
-    controls = np.zeros((steps, 2))
-    speed = math.hypot(problem.velocity[0], problem.velocity[1])
-    if not 1e-9 < speed < math.inf:
-        return controls
+@borrower
+def _brake(task: _Task, share: float) -> None:
+    """Take controls that brake with at most ``share`` of f2's limit, and in a step with that of the speed left."""
+    plan = task.plan
+    speed = math.hypot(task.vx, task.vy)
+    moving = 1e-9 < speed < math.inf
     left = speed
-    for j in range(steps):
-        push = share * min(problem.max_acceleration, left / problem.period)
-        controls[j, 0] = -push * problem.velocity[0] / speed
-        controls[j, 1] = -push * problem.velocity[1] / speed
-        left -= push * problem.period
-    return controls
+    for s in range(plan.shape[0]):
+        push = share * min(task.max_acceleration, left / task.period) if moving else 0.0
+        plan[s, _TAKEN] = -push * task.vx / speed if moving else 0.0
+        plan[s, _TAKEN + 1] = -push * task.vy / speed if moving else 0.0
+        left -= push * task.period
 
 
 @borrower
-def _restore(task: _Task, controls: Array) -> tuple[int, float]:
+def _restore(task: _Task) -> tuple[int, float]:
     """Minimise the squared violations: (Newton steps, the sum left of them), 0 left when strictly feasible.
 
     The barrier parameter has to become small: near the limits of f1 and f2 a larger one costs decimetres of
     violation that full braking would have avoided.
     """
-    for i in range(task.bounds.shape[0]):
-        task.bounds[i] = -_SLACK
-    iterations = 0
+    constraints = task.constraints
+    for i in range(constraints.shape[0]):
+        constraints[i, BOUND] = -_SLACK
+    iterations, least = 0, _RESTORE_TO
     mu = dual = _RESTORE_FROM
     while True:
-        last = mu <= _RESTORE_TO
-        taken = _minimise(task, controls, _RESTORE, mu, dual, (0.01 if last else _CLOSE) * mu)
-        last = last or taken == _NEWTON_STEPS  # it goes in circles, and would at smaller parameters
+        last = mu <= least
+        taken = _minimise(task, _RESTORE, mu, dual, (0.01 if last else _CLOSE) * mu)
         iterations += taken
-        if _excess(task, controls) < 0.0:
+        excess = _excess(task)
+        if excess < 0.0:
             return iterations, 0.0
-        if last:
+        if last and excess <= _SLACK:
+            last, least = least == _RESTORE_ON, _RESTORE_ON
+        if last or taken == _NEWTON_STEPS:  # in circles, as it would at smaller parameters
             break
-        dual, mu = mu, max(_REDUCTION * mu, _RESTORE_TO)
+        dual, mu = mu, max(_REDUCTION * mu, least)
     left = 0.0
-    for i in range(task.values.shape[0]):
-        left += max(0.0, task.values[i]) ** 2
+    for i in range(constraints.shape[0]):
+        left += max(0.0, constraints[i, VALUE]) ** 2
     # A plan that touches a bound without breaking it still ranks behind a strictly feasible one.
     return iterations, max(left, TOLERANCE**2)
 
 
 @borrower
-def _optimise(task: _Task, controls: Array) -> tuple[int, float]:
-    """Minimise the objective in place within each constraint's present violation: (Newton steps, objective)."""
-    _excess(task, controls)
-    for i in range(task.values.shape[0]):
-        task.bounds[i] = task.values[i] + _SLACK if task.values[i] >= 0.0 else 0.0
-    count = 2 * controls.shape[0] + task.values.shape[0]
+def _optimise(task: _Task) -> tuple[int, float]:
+    """Minimise the objective within each constraint's present violation: (Newton steps, objective)."""
+    constraints = task.constraints
+    _excess(task)
+    for i in range(constraints.shape[0]):
+        value = constraints[i, VALUE]
+        constraints[i, BOUND] = value + _SLACK if value >= 0.0 else 0.0
+    count = 2 * task.plan.shape[0] + constraints.shape[0]
     objective = _objective(task, 0.0)
     iterations = 0
     mu = dual = max(1e-3, _OPTIMISE_FROM * abs(objective) / count)
     while True:
         least = _GAP * max(1e-2, abs(objective)) / count
         last = not mu > 1.1 * least  # also if it is not a number
-        iterations += _minimise(task, controls, _OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * mu)
-        _drive(task, controls)
+        iterations += _minimise(task, _OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * mu)
+        _excess(task)
         objective = _objective(task, 0.0)
         if last:
             return iterations, objective
         dual, mu = mu, max(_REDUCTION * mu, least)
+
+
+@borrower
+def _search(task: _Task, starts: Array, best: Array) -> tuple[float, float, int]:
+    """Write the best plan: (largest violation, objective, Newton steps); -inf is violated if no start can be used."""
+    plan = task.plan
+    least, iterations = math.inf, 0
+    for index in range(starts.shape[0]):
+        _brake(task, 0.5)
+        for s in range(plan.shape[0]):
+            for c in range(2):
+                plan[s, _TAKEN + c] = (1.0 - _CENTRING) * starts[index, s, c] + _CENTRING * plan[s, _TAKEN + c]
+        if not _inside(task):
+            continue
+        left = 0.0
+        if not _excess(task) < 0.0:
+            taken, left = _restore(task)
+            iterations += taken
+        if left < least:
+            least = left
+            _read(plan, best)
+        if least == 0.0:
+            break
+    if least == math.inf:
+        _brake(task, 0.999)
+        _read(plan, best)
+        return -math.inf, math.inf, iterations
+    for s in range(plan.shape[0]):
+        plan[s, _TAKEN], plan[s, _TAKEN + 1] = best[s, 0], best[s, 1]
+    taken, objective = _optimise(task)
+    _read(plan, best)
+    largest = _excess(task)
+    return largest if largest > TOLERANCE else 0.0, objective, iterations + taken
+
+
+@borrower
+def _read(plan: Array, controls: Array) -> None:
+    """Write the controls taken."""
+    for s in range(plan.shape[0]):
+        controls[s, 0], controls[s, 1] = plan[s, _TAKEN], plan[s, _TAKEN + 1]
 
 
 def solve(problem: HorizonProblem, starts: Array) -> Solution:
@@ -339,30 +495,9 @@ def solve(problem: HorizonProblem, starts: Array) -> Solution:
 def _solve(*fields: Any) -> tuple[Array, float, float, int]:
     """The fields of the problem, then the starts."""
     problem, starts = HorizonProblem(*fields[:-1]), fields[-1]
-    steps = starts.shape[1]
-    task = _new_task(problem, steps)
-    brake = _braking(problem, steps, 0.5)
-    controls, best = np.empty((steps, 2)), np.empty((steps, 2))
-    least, iterations = math.inf, 0
-    for index in range(starts.shape[0]):
-        for j in range(steps):
-            for c in range(2):
-                controls[j, c] = (1.0 - _CENTRING) * starts[index, j, c] + _CENTRING * brake[j, c]
-        if not _inside(problem, controls):
-            continue
-        left = 0.0
-        if not _excess(task, controls) < 0.0:
-            taken, left = _restore(task, controls)
-            iterations += taken
-        if left < least:
-            least = left
-            controls, best = best, controls
-        if least == 0.0:
-            break
-    if least == math.inf:
-        best = _braking(problem, steps, 0.999)
+    best = np.empty((starts.shape[1], 2))
+    violation, objective, iterations = _search(_new_task(problem, starts.shape[1]), starts, best)
+    if violation < 0.0:  # what is out of reach is so within f1 and f2 only
         largest = violations(problem, best).max()
-        return best, max(0.0, largest) if largest < math.inf else math.inf, math.inf, iterations
-    taken, objective = _optimise(task, best)
-    largest = _excess(task, best)
-    return best, largest if largest > TOLERANCE else 0.0, objective, iterations + taken
+        violation = max(0.0, largest) if largest < math.inf else math.inf
+    return best, violation, objective, iterations

@@ -42,6 +42,11 @@ def borrower(function: Function) -> Function:
     return _compiled(function, no_cpython_wrapper=True, _nrt=False)
 
 
+def inlined(function: Function) -> Function:
+    """A ``borrower`` that becomes a part of its callers, where it is called for each of many things."""
+    return _compiled(function, no_cpython_wrapper=True, _nrt=False, forceinline=True)
+
+
 @contextmanager
 def _cache_of_these_sources() -> Iterator[None]:
     """Compiled code lies in a folder named after all sources of this package.

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from .compiled import kernel
+from .compiled import borrower, inner, kernel
 from .typing import Array
 
 
@@ -38,57 +38,98 @@ def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) ->
 def negative_information(
     x: float, y: float, sigma_positions: Array, weights: Array, others_distance: Array, variance: float
 ) -> tuple[float, float, float, float, float, float]:
-    """-I at own position (x, y) with its gradient and Hessian: (value, d/dx, d/dy, xx, xy, yy).
+    """-I at own position (x, y) with its gradient and Hessian: (value, d/dx, d/dy, xx, xy, yy)."""
+    return informed(new_points(sigma_positions, weights, others_distance), x, y, variance)
+
+
+# Columns of a table of sigma points, one a row.
+_PLACE = 0  # x, y
+_WEIGHT = 2
+_RANGE = 3  # r,
+_DIRECTION = 4  # its gradient u,
+_BEND = 6  # and its Hessian (1 - u u^T) / r as (xx, xy, yy)
+_SUM = 9  # sum over j of w_j exp(-E_ij), later its inverse
+_MEAN = 10  # sum over j of q_ij grad E_ij
+_PAIRS = 12  # others_distance_ij for all j < i, each followed by exp(-E_ij)
+
+
+@inner
+def new_points(sigma_positions: Array, weights: Array, others_distance: Array) -> Array:
+    """The sigma points that have a weight, with room for ``informed``."""
+    points = np.empty((weights.shape[0], _PAIRS + 2 * weights.shape[0]))
+    count = 0
+    for i in range(weights.shape[0]):
+        if weights[i] == 0.0:
+            continue
+        points[count, _PLACE], points[count, _PLACE + 1] = sigma_positions[i, 0], sigma_positions[i, 1]
+        points[count, _WEIGHT] = weights[i]
+        column = _PAIRS
+        for j in range(i):
+            if weights[j] != 0.0:
+                points[count, column] = others_distance[i, j]
+                column += 2
+        count += 1
+    return points[:count]
+
+
+@borrower
+def informed(points: Array, x: float, y: float, variance: float) -> tuple[float, float, float, float, float, float]:
+    """``negative_information`` of points in a table.
 
     The density's constant factor (2 pi eta)^(-n/2) is left out: it moves I by a constant and no optimum.
     Derivation: with E_ij = (r_i - r_j)^2 / (2 eta) + others_distance_ij and q_ij = w_j exp(-E_ij) normalised over j,
     grad(-I) = -sum_i w_i sum_j q_ij grad E_ij; the Hessian follows by the usual log-sum-exp rule.
+    E is symmetric and zero on the diagonal, so each pair is visited once, and no exponential overflows.
     """
-    count = sigma_positions.shape[0]
-    # Of each point: its range, the direction u to it, and the range's Hessian (1 - u u^T) / range.
-    r = np.empty((count, 6))
-    for i in range(count):
-        dx, dy = x - sigma_positions[i, 0], y - sigma_positions[i, 1]
-        distance = max(math.sqrt(dx * dx + dy * dy), 1e-9)
-        ux, uy = dx / distance, dy / distance
-        r[i, 0], r[i, 1], r[i, 2] = distance, ux, uy
-        r[i, 3], r[i, 4], r[i, 5] = (1.0 - ux * ux) / distance, -ux * uy / distance, (1.0 - uy * uy) / distance
-    # Of each i, sums over j of q_ij, q_ij grad E_ij, and q_ij times the Hessian of E_ij less its outer gradient
-    # product.  E is symmetric and zero on the diagonal, so each pair is visited once, and no exponential overflows.
-    sums = np.zeros((count, 6))
-    for i in range(count):
-        sums[i, 0] = weights[i]
+    count = points.shape[0]
     precision = 1.0 / variance
     for i in range(count):
-        if weights[i] == 0.0:
-            continue
+        dx, dy = x - points[i, _PLACE], y - points[i, _PLACE + 1]
+        r = max(math.sqrt(dx * dx + dy * dy), 1e-9)
+        bend, weight = 1.0 / r, points[i, _WEIGHT]
+        ux, uy = bend * dx, bend * dy
+        points[i, _RANGE], points[i, _DIRECTION], points[i, _DIRECTION + 1] = r, ux, uy
+        points[i, _BEND] = bend * (1.0 - ux * ux)
+        points[i, _BEND + 1] = -bend * ux * uy
+        points[i, _BEND + 2] = bend * (1.0 - uy * uy)
+        points[i, _MEAN] = points[i, _MEAN + 1] = 0.0
+        total = weight
         for j in range(i):
-            if weights[j] == 0.0:
-                continue
-            difference, dx, dy = r[i, 0] - r[j, 0], r[i, 1] - r[j, 1], r[i, 2] - r[j, 2]
-            likeness = math.exp(-0.5 * precision * difference * difference - others_distance[i, j])
-            ex, ey = precision * difference * dx, precision * difference * dy
-            exx = precision * (dx * dx + difference * (r[i, 3] - r[j, 3])) - ex * ex
-            exy = precision * (dx * dy + difference * (r[i, 4] - r[j, 4])) - ex * ey
-            eyy = precision * (dy * dy + difference * (r[i, 5] - r[j, 5])) - ey * ey
-            for a, b in ((i, j), (j, i)):
-                q = weights[b] * likeness
-                sums[a, 0] += q
-                sums[a, 1] += q * ex
-                sums[a, 2] += q * ey
-                sums[a, 3] += q * exx
-                sums[a, 4] += q * exy
-                sums[a, 5] += q * eyy
+            difference = r - points[j, _RANGE]
+            likeness = math.exp(-0.5 * precision * difference * difference - points[i, _PAIRS + 2 * j])
+            points[i, _PAIRS + 2 * j + 1] = likeness
+            total += points[j, _WEIGHT] * likeness
+            points[j, _SUM] += weight * likeness
+        points[i, _SUM] = total
     value = gx = gy = hxx = hxy = hyy = 0.0
     for i in range(count):
-        if weights[i] == 0.0:
-            continue
-        w, share = weights[i], 1.0 / sums[i, 0]
-        mx, my = share * sums[i, 1], share * sums[i, 2]
-        value += w * math.log(sums[i, 0])
-        gx -= w * mx
-        gy -= w * my
-        hxx -= w * (share * sums[i, 3] + mx * mx)
-        hxy -= w * (share * sums[i, 4] + mx * my)
-        hyy -= w * (share * sums[i, 5] + my * my)
+        weight, r, share = points[i, _WEIGHT], points[i, _RANGE], 1.0 / points[i, _SUM]
+        ux, uy = points[i, _DIRECTION], points[i, _DIRECTION + 1]
+        bxx, bxy, byy = points[i, _BEND], points[i, _BEND + 1], points[i, _BEND + 2]
+        value += weight * math.log(points[i, _SUM])
+        points[i, _SUM] = share
+        mx = my = 0.0
+        for j in range(i):
+            dx, dy = ux - points[j, _DIRECTION], uy - points[j, _DIRECTION + 1]
+            slope, other = precision * (r - points[j, _RANGE]), points[j, _WEIGHT]
+            ex, ey = slope * dx, slope * dy
+            likeness = points[i, _PAIRS + 2 * j + 1]
+            here, there = other * likeness * share, weight * likeness * points[j, _SUM]  # q_ij and q_ji
+            mx += here * ex
+            my += here * ey
+            points[j, _MEAN] += there * ex
+            points[j, _MEAN + 1] += there * ey
+            both, bend = weight * here + other * there, precision - slope * slope
+            hxx -= both * (bend * dx * dx + slope * (bxx - points[j, _BEND]))
+            hxy -= both * (bend * dx * dy + slope * (bxy - points[j, _BEND + 1]))
+            hyy -= both * (bend * dy * dy + slope * (byy - points[j, _BEND + 2]))
+        points[i, _MEAN] += mx
+        points[i, _MEAN + 1] += my
+    for i in range(count):
+        weight, mx, my = points[i, _WEIGHT], points[i, _MEAN], points[i, _MEAN + 1]
+        gx -= weight * mx
+        gy -= weight * my
+        hxx -= weight * mx * mx
+        hxy -= weight * mx * my
+        hyy -= weight * my * my
     return value, gx, gy, hxx, hxy, hyy

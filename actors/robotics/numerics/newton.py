@@ -9,7 +9,6 @@ time of writing out the dense Hessian in the controls and factorising it.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,65 +18,52 @@ from .typing import Array
 _CURVATURE = 1e-9  # smallest eigenvalue of a repaired block
 
 
-class Blocks(NamedTuple):
-    """Gradient and Hessian of a function, in blocks per prediction step: (x, y, xx, xy, yy)."""
-
-    position: Array  # (N, 5)
-    velocity: Array  # (N, 5)
-    control: Array  # (N, 5)
-
-
-class Feedback(NamedTuple):
-    """What the recursion leaves for the way forward: dU = -(own + position dP + velocity dV)."""
-
-    own: Array  # (N, 2)
-    position: Array  # (N, 4) 2x2 matrices by rows
-    velocity: Array  # (N, 4)
+# Columns of the table that holds all of a step, a row for each prediction step: one array is a fifth of the words, and
+# of the code, that seven are at every call.  It is indexed, never sliced: a slice costs as much as a whole term.
+POSITION = 0  # gradient and Hessian (x, y, xx, xy, yy) of the function in the position of the step,
+VELOCITY = 5  # in its velocity,
+CONTROL = 10  # and in its control
+_OWN = 15  # dU = -(own + position dP + velocity dV), what the recursion leaves for the way forward: own is (2,),
+_BY_POSITION = 17  # these are 2x2 matrices by rows
+_BY_VELOCITY = 21
+STEP = 25  # (2,) the Newton step in the control
+_COLUMNS = 27
 
 
 @inner
-def new_blocks(steps: int) -> Blocks:
-    """Blocks for a horizon, not yet cleared."""
-    return Blocks(np.empty((steps, 5)), np.empty((steps, 5)), np.empty((steps, 5)))
-
-
-@inner
-def new_feedback(steps: int) -> Feedback:
-    """Room for the recursion."""
-    return Feedback(np.empty((steps, 2)), np.empty((steps, 4)), np.empty((steps, 4)))
+def new_stages(steps: int) -> Array:
+    """The zero function over a horizon."""
+    return np.zeros((steps, _COLUMNS))
 
 
 @borrower
-def clear(blocks: Blocks) -> None:
-    """Make it the zero function."""
-    for s in range(blocks.position.shape[0]):
+def clear(stages: Array) -> None:
+    """Make it zero in the positions."""
+    for s in range(stages.shape[0]):
         for c in range(5):
-            blocks.position[s, c] = blocks.velocity[s, c] = blocks.control[s, c] = 0.0
-
-
-# Blocks are indexed, never sliced: a slice of an array costs as much as a whole term.
+            stages[s, POSITION + c] = 0.0
 
 
 @borrower
 def add(
-    blocks: Array, s: int, slope: float, curvature: float, bend: float,
+    stages: Array, s: int, slope: float, curvature: float, bend: float,
     gx: float, gy: float, hxx: float, hxy: float, hyy: float,
 ) -> None:  # fmt: skip
-    """Add p(h(.)) to block ``s``: h has the given gradient and Hessian.
+    """Add p(h(.)) in the position of step ``s``: h has the given gradient and Hessian.
 
     p has the first derivative ``slope``, which ``curvature`` replaces in the Hessian, and the second ``bend``.
     """
-    blocks[s, 0] += slope * gx
-    blocks[s, 1] += slope * gy
-    blocks[s, 2] += curvature * hxx + bend * gx * gx
-    blocks[s, 3] += curvature * hxy + bend * gx * gy
-    blocks[s, 4] += curvature * hyy + bend * gy * gy
+    stages[s, POSITION] += slope * gx
+    stages[s, POSITION + 1] += slope * gy
+    stages[s, POSITION + 2] += curvature * hxx + bend * gx * gx
+    stages[s, POSITION + 3] += curvature * hxy + bend * gx * gy
+    stages[s, POSITION + 4] += curvature * hyy + bend * gy * gy
 
 
 @borrower
-def _repair(blocks: Array, s: int) -> None:
-    """Replace block ``s`` by the nearest positive semidefinite one."""
-    xx, xy, yy = blocks[s, 2], blocks[s, 3], blocks[s, 4]
+def _repair(stages: Array, s: int) -> None:
+    """Replace the position's Hessian at step ``s`` by the nearest positive semidefinite one."""
+    xx, xy, yy = stages[s, POSITION + 2], stages[s, POSITION + 3], stages[s, POSITION + 4]
     if xx + yy >= 2.0 * _CURVATURE and (xx - _CURVATURE) * (yy - _CURVATURE) >= xy * xy:
         return
     mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
@@ -85,12 +71,13 @@ def _repair(blocks: Array, s: int) -> None:
     low, high = max(mean - radius, _CURVATURE), max(mean + radius, _CURVATURE)
     mean, spread = 0.5 * (low + high), 0.5 * (high - low)
     scale = spread / radius if radius > 0.0 else 0.0
-    blocks[s, 2], blocks[s, 3], blocks[s, 4] = mean + half * scale, xy * scale, mean - half * scale
+    stages[s, POSITION + 2], stages[s, POSITION + 4] = mean + half * scale, mean - half * scale
+    stages[s, POSITION + 3] = xy * scale
 
 
 @borrower
-def newton_step(blocks: Blocks, period: float, feedback: Feedback, step: Array) -> float:
-    """Write the step (N, 2) in the controls; returns gradient . step (negative), or 0 if there is no descent.
+def newton_step(stages: Array, period: float) -> float:
+    """Write the step in the controls; returns gradient . step (negative), or 0 if there is no descent.
 
     Backwards, the cost to go from step s is kept as a quadratic function of (dP, dV): gradient (a, c), Hessian
     [[A, B], [B', C]].  The control of step s enters dV of the next one, so it is minimised out there; then
@@ -101,14 +88,14 @@ def newton_step(blocks: Blocks, period: float, feedback: Feedback, step: Array) 
     descent = 0.0
     ax = ay = cx = cy = 0.0
     axx = axy = ayy = bxx = bxy = byx = byy = cxx = cxy = cyy = 0.0
-    for s in range(blocks.position.shape[0] - 1, -1, -1):
+    for s in range(stages.shape[0] - 1, -1, -1):
         # What U_s costs: its own block, and the velocity of the next step.
-        qx, qy = blocks.control[s, 0] + h * cx, blocks.control[s, 1] + h * cy
+        qx, qy = stages[s, CONTROL] + h * cx, stages[s, CONTROL + 1] + h * cy
         hcxx, hcxy, hcyy = h * cxx, h * cxy, h * cyy
         qxx, qxy, qyy = (
-            blocks.control[s, 2] + h * hcxx,
-            blocks.control[s, 3] + h * hcxy,
-            blocks.control[s, 4] + h * hcyy,
+            stages[s, CONTROL + 2] + h * hcxx,
+            stages[s, CONTROL + 3] + h * hcxy,
+            stages[s, CONTROL + 4] + h * hcyy,
         )
         determinant = qxx * qyy - qxy * qxy
         if not (determinant > 0.0 and qxx > 0.0):
@@ -123,11 +110,11 @@ def newton_step(blocks: Blocks, period: float, feedback: Feedback, step: Array) 
         pyx, pyy = ixy * hbxx + iyy * hbxy, ixy * hbyx + iyy * hbyy
         vxx, vxy = ixx * hcxx + ixy * hcxy, ixx * hcxy + ixy * hcyy
         vyx, vyy = ixy * hcxx + iyy * hcxy, ixy * hcxy + iyy * hcyy
-        feedback.own[s, 0], feedback.own[s, 1] = ux, uy
-        feedback.position[s, 0], feedback.position[s, 1] = pxx, pxy
-        feedback.position[s, 2], feedback.position[s, 3] = pyx, pyy
-        feedback.velocity[s, 0], feedback.velocity[s, 1] = vxx + h * pxx, vxy + h * pxy
-        feedback.velocity[s, 2], feedback.velocity[s, 3] = vyx + h * pyx, vyy + h * pyy
+        stages[s, _OWN], stages[s, _OWN + 1] = ux, uy
+        stages[s, _BY_POSITION], stages[s, _BY_POSITION + 1] = pxx, pxy
+        stages[s, _BY_POSITION + 2], stages[s, _BY_POSITION + 3] = pyx, pyy
+        stages[s, _BY_VELOCITY], stages[s, _BY_VELOCITY + 1] = vxx + h * pxx, vxy + h * pxy
+        stages[s, _BY_VELOCITY + 2], stages[s, _BY_VELOCITY + 3] = vyx + h * pyx, vyy + h * pyy
         # The cost without U_s, still in dP of the next step and dV of this one.
         ax -= hbxx * ux + hbxy * uy
         ay -= hbyx * ux + hbyy * uy
@@ -144,27 +131,38 @@ def newton_step(blocks: Blocks, period: float, feedback: Feedback, step: Array) 
         cxy -= hcxx * vxy + hcxy * vyy
         cyy -= hcxy * vxy + hcyy * vyy
         # dP of the next step is dP + h dV; then what step s itself costs.
-        _repair(blocks.position, s)
-        cx += h * ax + blocks.velocity[s, 0]
-        cy += h * ay + blocks.velocity[s, 1]
-        cxx += h * (h * axx + 2.0 * bxx) + blocks.velocity[s, 2]
-        cxy += h * (h * axy + bxy + byx) + blocks.velocity[s, 3]
-        cyy += h * (h * ayy + 2.0 * byy) + blocks.velocity[s, 4]
+        _repair(stages, s)
+        cx += h * ax + stages[s, VELOCITY]
+        cy += h * ay + stages[s, VELOCITY + 1]
+        cxx += h * (h * axx + 2.0 * bxx) + stages[s, VELOCITY + 2]
+        cxy += h * (h * axy + bxy + byx) + stages[s, VELOCITY + 3]
+        cyy += h * (h * ayy + 2.0 * byy) + stages[s, VELOCITY + 4]
         bxx += h * axx
         bxy += h * axy
         byx += h * axy
         byy += h * ayy
-        ax += blocks.position[s, 0]
-        ay += blocks.position[s, 1]
-        axx += blocks.position[s, 2]
-        axy += blocks.position[s, 3]
-        ayy += blocks.position[s, 4]
+        ax += stages[s, POSITION]
+        ay += stages[s, POSITION + 1]
+        axx += stages[s, POSITION + 2]
+        axy += stages[s, POSITION + 3]
+        ayy += stages[s, POSITION + 4]
     px = py = vx = vy = 0.0
-    for s in range(step.shape[0]):
-        p, v = feedback.position, feedback.velocity
-        ux = -(feedback.own[s, 0] + p[s, 0] * px + p[s, 1] * py + v[s, 0] * vx + v[s, 1] * vy)
-        uy = -(feedback.own[s, 1] + p[s, 2] * px + p[s, 3] * py + v[s, 2] * vx + v[s, 3] * vy)
-        step[s, 0], step[s, 1] = ux, uy
+    for s in range(stages.shape[0]):
+        ux = -(
+            stages[s, _OWN]
+            + stages[s, _BY_POSITION] * px
+            + stages[s, _BY_POSITION + 1] * py
+            + stages[s, _BY_VELOCITY] * vx
+            + stages[s, _BY_VELOCITY + 1] * vy
+        )
+        uy = -(
+            stages[s, _OWN + 1]
+            + stages[s, _BY_POSITION + 2] * px
+            + stages[s, _BY_POSITION + 3] * py
+            + stages[s, _BY_VELOCITY + 2] * vx
+            + stages[s, _BY_VELOCITY + 3] * vy
+        )
+        stages[s, STEP], stages[s, STEP + 1] = ux, uy
         px += h * vx
         py += h * vy
         vx += h * ux

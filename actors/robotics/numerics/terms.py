@@ -18,8 +18,9 @@ def stay_near(x: float, y: float, cx: float, cy: float, radius: float) -> Term:
     """f3, and f6's inside: distance to (cx, cy) less ``radius``."""
     dx, dy = x - cx, y - cy
     d = max(math.sqrt(dx * dx + dy * dy), _TINY)
-    nx, ny = dx / d, dy / d
-    return d - radius, nx, ny, ny * ny / d, -nx * ny / d, nx * nx / d
+    bend = 1.0 / d
+    nx, ny = bend * dx, bend * dy
+    return d - radius, nx, ny, bend * ny * ny, -bend * nx * ny, bend * nx * nx
 
 
 @kernel
@@ -48,7 +49,8 @@ def keep_away_uncertain(
     """
     dx, dy = x - cx, y - cy
     r = max(math.sqrt(dx * dx + dy * dy), _TINY)
-    nx, ny = dx / r, dy / r
+    inverse = 1.0 / r
+    nx, ny = inverse * dx, inverse * dy
     if dx == 0.0 and dy == 0.0:
         nx, ny = 1.0, 0.0
     tx, ty = -ny, nx
@@ -56,11 +58,12 @@ def keep_away_uncertain(
     across = tx * (cxx * tx + cxy * ty) + ty * (cxy * tx + cyy * ty)
     mixed = tx * (cxx * nx + cxy * ny) + ty * (cxy * nx + cyy * ny)
     sigma = math.sqrt(max(along, 1e-18))
-    slope = mixed / sigma  # d sigma / d a
-    bend = (across - along) / sigma - slope * slope / sigma  # d2 sigma / d a2
-    radial, tangential = -1.0, margin * slope / r
-    h_rt = -margin * slope / (r * r)
-    h_tt = margin * bend / (r * r) - 1.0 / r
+    steep = 1.0 / sigma
+    slope = steep * mixed  # d sigma / d a
+    bend = steep * (across - along - slope * slope)  # d2 sigma / d a2
+    radial, tangential = -1.0, margin * slope * inverse
+    h_rt = -inverse * tangential
+    h_tt = inverse * (margin * bend * inverse - 1.0)
     return (
         distance - r + margin * sigma,
         radial * nx + tangential * tx,
