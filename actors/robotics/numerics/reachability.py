@@ -11,16 +11,12 @@ from .typing import Array
 from .ukf import constant_velocity, sigma_points
 
 
-@kernel
 def tube_radius(initial: float, growth: float, step_length: float, steps: int) -> Array:
     """sigma_r of eq. (3) at steps 1..N: ``initial + growth * step_length * s``.
 
     ``step_length`` is 1 where tau counts steps (the default reading) and the period where it counts seconds.
     """
-    radius = np.empty(steps)
-    for s in range(steps):
-        radius[s] = initial + growth * step_length * (s + 1)
-    return radius
+    return np.array([initial + growth * step_length * s for s in range(1, steps + 1)])
 
 
 @kernel
