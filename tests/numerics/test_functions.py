@@ -21,7 +21,7 @@ newton = importlib.import_module(PREFIX + "newton")
 # Called by kernels only; numba looks them up as globals.
 new_stages, newton_step = newton.new_stages, newton.newton_step
 POSITION, VELOCITY, CONTROL, STEP = newton.POSITION, newton.VELOCITY, newton.CONTROL, newton.STEP
-all_constraints, within_reach = constraints.all_constraints, constraints.within_reach
+constraints_of = constraints.constraints_of
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -310,9 +310,7 @@ def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, st
 @numba.njit
 def kept_and_all(*fields: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     problem = HorizonProblem(*fields)
-    table = all_constraints(problem)
-    every = table[:, :2].astype(np.int64)
-    kept = table[: within_reach(problem, table), :2].astype(np.int64)
+    every, kept = constraints_of(problem, True)[:, :2].astype(np.int64), constraints_of(problem, False).astype(np.int64)
     return every[:, 0], every[:, 1], kept[:, 0], kept[:, 1]
 
 

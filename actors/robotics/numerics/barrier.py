@@ -34,11 +34,10 @@ from .constraints import (
     ROW,
     VALUE,
     WHEN,
-    all_constraints,
     certainly_kept,
+    constraints_of,
     term,
     violations,
-    within_reach,
 )
 from .horizon import REACH_GOAL, HorizonProblem
 from .mutual_information import informed, new_points
@@ -107,7 +106,6 @@ class _Task(NamedTuple):
 
 @inner
 def _new_task(problem: HorizonProblem, steps: int) -> _Task:
-    constraints = all_constraints(problem)
     plan = np.zeros((steps, _COLUMNS))
     informs = problem.objective != REACH_GOAL and problem.obstacle_mean.shape[0] > 0
     if informs:
@@ -122,7 +120,7 @@ def _new_task(problem: HorizonProblem, steps: int) -> _Task:
         problem.max_speed, problem.max_acceleration, problem.objective == REACH_GOAL, problem.goal[0], problem.goal[1],
         informs,
         problem.measurement_variance, problem.range_penalty, problem.measurement_range,
-        plan, new_stages(steps), constraints[: within_reach(problem, constraints)], points,
+        plan, new_stages(steps), constraints_of(problem, False), points,
     )  # fmt: skip
 
 

@@ -27,16 +27,16 @@ _COLUMNS = 11
 
 
 @inner
-def all_constraints(problem: HorizonProblem) -> Array:
-    """Those that bind.  Steps 1 and 2 are decided before U_{t+1} acts, so nothing binds there."""
+def constraints_of(problem: HorizonProblem, every: bool) -> Array:
+    """All that bind, or those of them within reach.  Steps 1 and 2 are decided before U_{t+1} acts: none bind there."""
     steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
     table = np.empty(((1 + obstacles + peers) * steps, _COLUMNS))
-    return table[: _fill(problem, table)]
+    return table[: _fill(problem, table, every)]
 
 
 @borrower
-def _fill(problem: HorizonProblem, table: Array) -> int:
-    """Write all constraints that bind; returns how many."""
+def _fill(problem: HorizonProblem, table: Array, every: bool) -> int:
+    """Write the constraints; returns how many they are."""
     steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
     count = 0
     for r in range(1 + obstacles + peers):
@@ -47,13 +47,9 @@ def _fill(problem: HorizonProblem, table: Array) -> int:
                 if not need < math.inf:
                     continue
             elif r <= obstacles:
-                x, y, need = (
-                    problem.obstacle_mean[r - 1, s, 0],
-                    problem.obstacle_mean[r - 1, s, 1],
-                    problem.safe_distance,
-                )
-                margin, xx = problem.margin, problem.obstacle_covariance[r - 1, s, 0]
-                xy, yy = problem.obstacle_covariance[r - 1, s, 1], problem.obstacle_covariance[r - 1, s, 2]
+                mean, covariance = problem.obstacle_mean, problem.obstacle_covariance
+                x, y, need, margin = mean[r - 1, s, 0], mean[r - 1, s, 1], problem.safe_distance, problem.margin
+                xx, xy, yy = covariance[r - 1, s, 0], covariance[r - 1, s, 1], covariance[r - 1, s, 2]
             else:
                 i = r - 1 - obstacles
                 x, y, need = problem.peer_mean[i, s, 0], problem.peer_mean[i, s, 1], problem.peer_distance[i, s]
@@ -62,13 +58,14 @@ def _fill(problem: HorizonProblem, table: Array) -> int:
             table[count, MARGIN], table[count, _COVARIANCE] = margin, xx
             table[count, _COVARIANCE + 1], table[count, _COVARIANCE + 2] = xy, yy
             table[count, BOUND] = table[count, VALUE] = 0.0
-            count += 1
+            if every or _within_reach(problem, table, count):
+                count += 1
     return count
 
 
 @borrower
-def within_reach(problem: HorizonProblem, table: Array) -> int:
-    """Move those that a plan within f1 and f2 can break to the front of a table; returns how many they are.
+def _within_reach(problem: HorizonProblem, table: Array, i: int) -> bool:
+    """Whether a plan within f1 and f2 can break the i-th constraint.
 
     Leaving out a constraint that every such plan keeps changes no optimum.  Step s (counted from 0) lies at
     ``P + s h V + h^2 sum_{j < s - 1} (s - 1 - j) U_j``.  As |U_j| <= Amax, this is at most
@@ -76,28 +73,21 @@ def within_reach(problem: HorizonProblem, table: Array) -> int:
     most ``(s - 1) h Vmax`` from ``P + h V``.  A distance to a point changes by no more than that, and the deviation
     along any direction is at most the root of the covariance's largest eigenvalue.
     """
-    h, count = problem.period, 0
+    h = problem.period
     px, py = problem.position[0], problem.position[1]
     vx, vy = problem.velocity[0], problem.velocity[1]
-    for i in range(table.shape[0]):
-        s, x, y, need = table[i, WHEN], table[i, PLACE], table[i, PLACE + 1], table[i, NEED]
-        if table[i, MARGIN] != 0.0:
-            xx, mixed, yy = table[i, _COVARIANCE], table[i, _COVARIANCE + 1], table[i, _COVARIANCE + 2]
-            mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
-            need += table[i, MARGIN] * math.sqrt(max(mean + math.sqrt(half * half + mixed * mixed), 0.0))
-        driven = math.sqrt((px + s * h * vx - x) ** 2 + (py + s * h * vy - y) ** 2)
-        pushed = 0.5 * problem.max_acceleration * h * h * s * (s - 1.0)
-        begun = math.sqrt((px + h * vx - x) ** 2 + (py + h * vy - y) ** 2)
-        raced = (s - 1.0) * h * problem.max_speed
-        if table[i, ROW] == 0.0:
-            kept = min(driven + pushed, begun + raced) < need - _ROUNDING
-        else:
-            kept = max(driven - pushed, begun - raced) > need + _ROUNDING
-        if not kept:
-            for c in range(_COLUMNS):
-                table[count, c] = table[i, c]
-            count += 1
-    return count
+    s, x, y, need = table[i, WHEN], table[i, PLACE], table[i, PLACE + 1], table[i, NEED]
+    if table[i, MARGIN] != 0.0:
+        xx, mixed, yy = table[i, _COVARIANCE], table[i, _COVARIANCE + 1], table[i, _COVARIANCE + 2]
+        mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
+        need += table[i, MARGIN] * math.sqrt(max(mean + math.sqrt(half * half + mixed * mixed), 0.0))
+    driven = math.sqrt((px + s * h * vx - x) ** 2 + (py + s * h * vy - y) ** 2)
+    pushed = 0.5 * problem.max_acceleration * h * h * s * (s - 1.0)
+    begun = math.sqrt((px + h * vx - x) ** 2 + (py + h * vy - y) ** 2)
+    raced = (s - 1.0) * h * problem.max_speed
+    if table[i, ROW] == 0.0:
+        return not min(driven + pushed, begun + raced) < need - _ROUNDING
+    return not max(driven - pushed, begun - raced) > need + _ROUNDING
 
 
 @inlined
@@ -131,7 +121,7 @@ def violations(problem: HorizonProblem, controls: Array) -> Array:
     steps = controls.shape[0]
     positions, velocities = np.empty((steps, 2)), np.empty((steps, 2))
     roll_out(problem.position, problem.velocity, controls, problem.period, positions, velocities)
-    constraints = all_constraints(problem)
+    constraints = constraints_of(problem, True)
     found = np.full((1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0], steps), -math.inf)
     for i in range(constraints.shape[0]):
         s = int(constraints[i, WHEN])
