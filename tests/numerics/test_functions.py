@@ -214,6 +214,14 @@ def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> N
         assert distances[row] == pytest.approx(2.0 + 3.0 * (radius + 0.4 * max(0, age - 1)))
 
 
+@pytest.mark.parametrize("made_at", [-1e5, -1e12, -1.7e308])
+def test_plans_from_time_immemorial_are_lost_in_the_distance_to_keep(made_at: float) -> None:
+    announced, radius = np.array([[1.0, 2.0, 0.0, 0.0, made_at, 2.0]]), np.ones(10)
+    positions, distances = reachability.peer_tubes(announced, np.zeros((2, 2)), 0.0, 0.1, radius, 0.4, 2.0, 3.0)
+    assert positions == pytest.approx(np.tile([1.0, 2.0], (1, 10, 1)))
+    assert distances == pytest.approx(2.0 + 3.0 * (1.0 + 0.4 * (reachability.OLDEST - 1)))
+
+
 def test_own_tube_is_free_where_the_plan_has_ended(random: np.random.Generator) -> None:
     planned, radius = random.normal(size=(10, 2)), np.arange(1.0, 11.0)
     for age in (0, 1, 9, 10):

@@ -10,6 +10,8 @@ from .compiled import kernel
 from .typing import Array
 from .ukf import constant_velocity, sigma_points
 
+OLDEST = 100_000.0  # periods
+
 
 def tube_radius(initial: float, growth: float, step_length: float, steps: int) -> Array:
     """sigma_r of eq. (3) at steps 1..N: ``initial + growth * step_length * s``.
@@ -51,14 +53,16 @@ def peer_tubes(
     Each row of ``announced`` (n, 6) is of one plan: x, y, vx, vy when it was made, the time (s) of that, and how many
     of the rows of ``controls``, which are of all plans in turn, are the accelerations from then on; past the last of
     them the velocity is kept.  To the ``radius`` (N,) of eq. (3), eq. (4) adds ``growth`` for every period that has
-    passed since but one, which is normal latency.
+    passed since but one, which is normal latency.  Plans older than ``OLDEST`` count as that old: what they say is lost
+    in the distance to keep.
     """
     count, steps = announced.shape[0], radius.shape[0]
     positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
     first = 0
     for i in range(count):
         px, py, vx, vy = announced[i, 0], announced[i, 1], announced[i, 2], announced[i, 3]
-        age, planned = max(0, round((now - announced[i, 4]) / period)), int(announced[i, 5])
+        age = round(min(max((now - announced[i, 4]) / period, 0.0), OLDEST))
+        planned = int(announced[i, 5])
         for k in range(age + steps):
             px += period * vx
             py += period * vy
