@@ -237,7 +237,7 @@ PEERS: dict[str, Solve] = {
 # --- what a plan is worth ------------------------------------------------------------------------------
 
 
-def bounds_of(problem: HorizonProblem, controls: Array, slack: float = 2e-4) -> Array:
+def bounds_of(problem: HorizonProblem, controls: Array, slack: float = 1e-5) -> Array:
     """What a peer may violate f3-f5 by: nothing where they can be kept, else what a plan with least violation does."""
     found = violations(problem, controls)
     return np.where(found > 1e-6, found + slack, 0.0)
