@@ -237,8 +237,11 @@ PEERS: dict[str, Solve] = {
 # --- what a plan is worth ------------------------------------------------------------------------------
 
 
-def bounds_of(problem: HorizonProblem, controls: Array, slack: float = 1e-5) -> Array:
-    """What a peer may violate f3-f5 by: nothing where they can be kept, else what a plan with least violation does."""
+def bounds_of(problem: HorizonProblem, controls: Array, slack: float = 1e-4) -> Array:
+    """What a peer may violate f3-f5 by: nothing where they can be kept, else what a plan with least violation does.
+
+    ``slack`` is what ours allows itself beyond that; with much less fatrop goes in circles for ever.
+    """
     found = violations(problem, controls)
     return np.where(found > 1e-6, found + slack, 0.0)
 
