@@ -10,6 +10,7 @@ steps and the times.
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import time
 from collections import Counter
@@ -131,7 +132,8 @@ def run(count: int, seed: int) -> Iterator[tuple[str, str, int, float]]:
         kind, problem, starts = pose(random)
         before = time.process_time()
         solution = barrier.solve(problem, starts)
-        yield kind, wrong(problem, solution), solution.iterations, time.process_time() - before
+        took = time.process_time() - before
+        yield kind, wrong(problem, solution), solution.iterations, took
 
 
 def main() -> None:
@@ -140,6 +142,7 @@ def main() -> None:
     options.add_argument("--seed", type=int, default=1)
     given = options.parse_args()
     list(run(1, 0))  # compiles
+    gc.disable()  # or the worst would be the one during which Python collects
     found = list(run(given.count, given.seed))
     for kind in KINDS:
         steps, times = (np.array([each[i] for each in found if each[0] == kind]) for i in (2, 3))
