@@ -71,7 +71,7 @@ class Encoders(dict[type, Encode]):
         self._remembered: dict[int, tuple[Any, bytes]] = {}  # with the token, lest another one gets its id
 
     def __missing__(self, cls: type) -> Encode:
-        encode = _ENCODERS[cls]
+        encode = encoder(cls)
         if is_frozen(cls):
             encode = self._once(encode)
         self[cls] = encode
@@ -126,21 +126,11 @@ _ATOMS = frozenset({float, int, bool, str, type(None)})
 
 def canonical(token: Any) -> bytes:
     """A token as bytes: equal tokens give equal bytes on every machine, and no two kinds are confused."""
-    return _ENCODERS[type(token)](token)
-
-
-class _OfTypes(dict[type, Encode]):
-    """What makes bytes of the tokens of a type, by the types that have been met."""
-
-    def __missing__(self, cls: type) -> Encode:
-        encode = self[cls] = _encoder(cls)
-        return encode
-
-
-_ENCODERS = _OfTypes()
+    return encoder(type(token))(token)
 
 
 def _encoder(cls: type) -> Encode:
+    """What makes bytes of the tokens of one type."""
     if issubclass(cls, float):
         return _float
     if cls is np.ndarray:
@@ -155,6 +145,9 @@ def _encoder(cls: type) -> Encode:
         if issubclass(cls, kinds):
             return encode
     return _other
+
+
+encoder: Callable[[type], Encode] = cache(_encoder)  # what a type is, is found out once
 
 
 def _float(token: float) -> bytes:
@@ -208,8 +201,7 @@ def _fields_encoder(cls: type) -> Encode:
     def encode(token: Any) -> bytes:
         pieces = [head]
         for name, encoded in fields:
-            value = getattr(token, name)
-            pieces += (encoded, _ENCODERS[type(value)](value))
+            pieces += (encoded, canonical(getattr(token, name)))
         return b"".join(pieces)
 
     return encode

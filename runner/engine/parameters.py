@@ -28,8 +28,8 @@ class VaryingParameter:
             raise ParameterError(
                 f"{self.parameter.name} of {self.actor.path}: {error}; a Saturate behind keeps it within bounds"
             ) from None
-        vars(self.actor)[self.parameter.name] = converted
+        self.parameter.store(self.actor, converted)
 
     def restore(self) -> None:
         """Give it back the value that the model says."""
-        vars(self.actor)[self.parameter.name] = self.nominal
+        self.parameter.store(self.actor, self.nominal)

@@ -186,8 +186,8 @@ class Wiring:
                     known = f"it has {counted(len(wires), 'channel')}, counted from 0"
                     raise PortError(f"{port.path} has no channel {channel}: {known}")
                 hops = wires[channel].hops
-                onward = _all([*listeners, self._way(hops, channels[hops])])
-                way = ways[channel] = log.writer("send", path, name, channel, ""), onward
+                along = _all([*listeners, self._way(hops, channels[hops])])
+                way = ways[channel] = log.writer("send", path, name, channel, ""), along
             write_one, onward = way
             write_one(director.present or director.tag, token)
             onward(token)

@@ -45,15 +45,12 @@ from .newton import CONTROL, STEP, VELOCITY, add, clear, new_stages, newton_step
 from .terms import Term, stay_near
 from .typing import Array
 
-# Violations below this (metres) count as none; it is also the slack an infeasible problem's bounds get.
-TOLERANCE = 1e-6
-_SLACK = 1e-4
+TOLERANCE = 1e-6  # m; violations below this count as none
+_SLACK = 1e-4  # m that an infeasible problem's bounds get, and that restoration goes beyond keeping a constraint
 _CENTRING = 0.1  # how far a start is moved towards braking before anything else
 _RESTORE, _OPTIMISE = 0.0, 1.0  # phases; numba would compile everything once for each of two integers
 _RESTORE_FROM, _RESTORE_TO = 0.1, 1e-7  # barrier parameters of restoration
-_RESTORE_ON = (
-    1e-10  # where it goes on to if that leaves so little that only the barriers of f1 and f2 may be in the way
-)
+_RESTORE_ON = 1e-10  # where it goes on to if so little is left that the barriers of f1 and f2 may be all in the way
 _OPTIMISE_FROM = 0.03  # relative gap, constraints times barrier parameter, at which optimisation begins
 _GAP = 1e-5  # relative (and absolute below 1e-2) gap at which it stops
 _REDUCTION = 0.03  # of the barrier parameter from one minimisation to the next
