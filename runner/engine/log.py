@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import EpicycleError, Tag, to_seconds
 
 from ..tables import pandas_module, short
-from .encoding import Encoders, canonical, plain
+from .encoding import canonical, plain
+from .waiting import LARGE, WaitingTokens
 
 if TYPE_CHECKING:
     import pandas
@@ -22,7 +23,6 @@ COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "
 _TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 FORMATS = (".parquet", ".csv", ".jsonl")
 _PIECES = 3_000  # that are hashed together
-_LARGE = 10_000  # bytes of one value, from which on it is hashed at once: many of them would fill the memory
 
 Write = Callable[["Tag", Any], None]
 
@@ -76,10 +76,11 @@ class EventLog:
         self.records: list[Record] = []
         self._keeps = keeps
         self._writers: dict[tuple[str, str, str, str, int | None], Write] = {}
-        # What the digest is made of, three pieces a record: tag, names, value.  They are hashed many at a time.
+        # What the digest is made of, three pieces a record: tag, names, what was kept of the value.  Many are hashed at
+        # a time.
         self._hash = hashlib.sha256()
-        self._pieces: list[bytes] = []
-        self._encoders = Encoders()
+        self._pieces: list[Any] = []
+        self._tokens = WaitingTokens()
         self._hashed = 0  # records
         self._tag: Tag | None = None  # of the last record
         self._stamp = b""  # the same in bytes
@@ -98,14 +99,14 @@ class EventLog:
 
     def _new_writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
         head = b"".join(map(canonical, (event, actor, port, aspect, channel)))
-        pieces, encoders = self._pieces, self._encoders
+        pieces, keep = self._pieces, self._tokens.keep
 
         def write(tag: Tag, value: Any) -> None:
-            encoded = encoders[type(value)](value)  # raises what cannot be logged
+            kept = value if type(value) is float else keep(value)  # raises what cannot be logged
             if tag is not self._tag:
                 self._turn_to(tag)
-            pieces.extend((self._stamp, head, encoded))
-            if len(encoded) > _LARGE:
+            pieces.extend((self._stamp, head, kept))
+            if type(kept) is bytes and len(kept) > LARGE:
                 self._hash_pieces()
 
         if self._keeps is None or not self._keeps(event, actor, port, aspect):
@@ -126,10 +127,11 @@ class EventLog:
             self._hash_pieces()
 
     def _hash_pieces(self) -> None:
-        self._hash.update(b"".join(self._pieces))
-        self._hashed += len(self._pieces) // 3
-        self._pieces.clear()
-        self._encoders.forget()
+        pieces = self._pieces
+        pieces[2::3] = self._tokens.encode(pieces[2::3])
+        self._hash.update(b"".join(pieces))
+        self._hashed += len(pieces) // 3
+        pieces.clear()
 
     @property
     def count(self) -> int:

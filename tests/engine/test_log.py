@@ -36,8 +36,9 @@ from epicycle.runner.engine import (
     scalars,
     write_log,
 )
-from epicycle.runner.engine.encoding import is_immutable
+from epicycle.runner.engine.encoding import TokenError
 from epicycle.runner.engine.log import EventLog
+from epicycle.runner.engine.waiting import LARGE, WaitingTokens, weight
 
 sys.path.insert(0, str(Path(__file__).parent))
 from engine_parts import Plan, load, simulate
@@ -154,7 +155,7 @@ def test_the_log_tells_what_a_token_was_when_it_was_sent(token: Any, change: Cal
     log.add(tag, "send", "a", "output", None, "", token)
     change(token)
     log.add(tag, "send", "b", "output", None, "", token)
-    assert not is_immutable(token)
+    assert weight(token) > LARGE
     written = b"".join(
         Record(tag, "send", actor, "output", None, "", None).encoded()[:-1] + value
         for actor, value in (("a", before), ("b", canonical(token)))
@@ -175,18 +176,44 @@ def test_large_tokens_are_not_kept() -> None:
 
 def test_what_cannot_change_is_encoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Any] = []
-    found = encoding.encoder
-    counted = {Frozen: lambda token: made.append(token) or canonical(token.x)}
-    monkeypatch.setattr(encoding, "encoder", lambda cls: counted.get(cls) or found(cls))
+    monkeypatch.setitem(encoding.encoders, Frozen, lambda token: made.append(token) or canonical(token.x))
     log = EventLog()
     kept = [Frozen((1.0, "a", None, fixed(np.zeros(2)), Sealed(True))) for _ in range(3)]
     for token in (*kept, *kept, *kept):
         log.add(Tag(0, 1), "send", "a", "output", None, "", token)
+    before = log.digest
     assert [id(token) for token in made] == [id(token) for token in kept]
     for number in range(10_000):  # each takes the place of the one before it in memory
         log.add(Tag(number, 1), "send", "a", "output", None, "", Frozen(number))
+    assert log.digest != before
     assert [token.x for token in made[3:]] == list(range(10_000))
     assert log.count == 10_009
+
+
+@pytest.mark.parametrize(
+    ("token", "waits"),
+    [
+        (Frozen("x" * LARGE), True),
+        (Frozen("x" * LARGE + "x"), False),
+        (Frozen((1.0,) * (LARGE // 8)), True),
+        (Frozen((1.0,) * LARGE), False),
+        (Frozen((fixed(np.zeros(LARGE // 16)),) * 3), False),
+        (Frozen(2**63), False),  # long ones cannot be encoded, which is to be known when they are sent
+    ],
+)
+def test_only_small_tokens_wait(token: Any, waits: bool) -> None:
+    assert (WaitingTokens().keep(token) is token) == waits
+    log, tag = EventLog(), Tag(0, 1)
+    log.add(tag, "send", "a", "output", None, "", token)
+    assert log.digest == hashlib.sha256(Record(tag, "send", "a", "output", None, "", token).encoded()).hexdigest()
+
+
+def test_what_cannot_be_encoded_is_told_at_once() -> None:
+    log = EventLog()
+    for token in (10**5_000, Frozen(10**5_000), Frozen((object(),))):
+        with pytest.raises((ValueError, TokenError)):
+            log.add(Tag(0, 1), "send", "a", "output", None, "", token)
+    assert log.count == 0
 
 
 def test_plain_and_scalars() -> None:

@@ -1,0 +1,75 @@
+"""Tokens that wait until the event log turns them into bytes, many at a time.
+
+A token is sent in the midst of something else, where nothing that makes bytes of it lies in the processor's caches: it
+takes three times as long there as among a thousand others.  One that cannot change therefore waits.  It is often logged
+again and again, by who sends it, by channels that hand it on, by aspects on its way: its bytes are made once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from .encoding import canonical, encoders, field_values
+
+LARGE = 10_000  # bytes of a token, more or less: those above do not wait, lest a thousand of them fill the memory
+_BEYOND = LARGE + 1
+
+
+class WaitingTokens:
+    """What is ``kept`` of a token, and later the bytes of all that were kept."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, Any] = {}  # tokens that wait, by their id: while they do, no other one has it
+
+    def keep(self, token: Any) -> Any:
+        """The token itself, if it cannot change until it is encoded, or else its bytes.
+
+        Raises what makes it impossible to encode.
+        """
+        if id(token) in self._known:
+            return token
+        if weight(token) > LARGE:
+            return canonical(token)
+        self._known[id(token)] = token
+        return token
+
+    def encode(self, kept: list[Any]) -> list[bytes]:
+        """The bytes of tokens, from what was kept of them.  Now none of them waits any more."""
+        self._known.clear()
+        made = dict(zip(map(id, kept), kept, strict=True))
+        for number, token in made.items():
+            if type(token) is not bytes:
+                made[number] = encoders[type(token)](token)
+        return list(map(made.__getitem__, map(id, kept)))
+
+
+def weight(token: Any) -> int:
+    """About how many bytes a token takes that can wait; one that can change, or may not be encodable, is huge."""
+    kind: type = type(token)
+    if kind in _SMALL:
+        return 8
+    if kind is str:
+        return len(token)
+    if kind is np.ndarray:
+        is_fixed = not token.flags.writeable and token.base is None and token.dtype.kind in "biuf"
+        return int(token.nbytes) if is_fixed else _BEYOND
+    if kind is tuple:
+        return sum(map(weight, token))
+    if kind is int:
+        return 8 if -(2**63) <= token < 2**63 else _BEYOND
+    values_of = _of_frozen(kind)
+    return _BEYOND if values_of is None else sum(map(weight, values_of(token)))
+
+
+@cache
+def _of_frozen(cls: type) -> Callable[[Any], tuple[Any, ...]] | None:
+    """What gives the values of a dataclass, if its fields cannot be set."""
+    params = vars(cls).get("__dataclass_params__")
+    return field_values(cls) if params is not None and params.frozen else None
+
+
+_SMALL = frozenset({float, bool, type(None), np.float64})
