@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
+from .collection import seldom_collecting
 from .commands import COMMANDS
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED, complain
 
@@ -18,7 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from epicycle.actors import EpicycleError
 
     try:
-        return command(options, given)
+        with seldom_collecting():
+            return command(options, given)
     except EpicycleError as error:
         from .engine import ActorError, LoopError  # here, for many commands do without the engine
 

@@ -7,7 +7,7 @@ again and again, by who sends it, by channels that hand it on, by aspects on its
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any
 
@@ -50,24 +50,29 @@ class WaitingTokens:
 def weight(token: Any) -> int:
     """About how many bytes a token takes that can wait; one that can change, or may not be encodable, is huge."""
     kind: type = type(token)
+    if kind is np.ndarray:
+        is_fixed = not token.flags.writeable and token.base is None and token.dtype.kind in "biuf"
+        return int(token.nbytes) if is_fixed else _BEYOND
     if kind in _SMALL:
         return 8
     if kind is str:
         return len(token)
-    if kind is np.ndarray:
-        is_fixed = not token.flags.writeable and token.base is None and token.dtype.kind in "biuf"
-        return int(token.nbytes) if is_fixed else _BEYOND
-    if kind is tuple:
-        return sum(map(weight, token))
     if kind is int:
         return 8 if -(2**63) <= token < 2**63 else _BEYOND
-    values_of = _of_frozen(kind)
-    return _BEYOND if values_of is None else sum(map(weight, values_of(token)))
+    values_of = _values_of_fixed(kind)
+    if values_of is None:
+        return _BEYOND
+    total = 0
+    for value in values_of(token):
+        total += 8 if type(value) in _SMALL else weight(value)
+    return total
 
 
 @cache
-def _of_frozen(cls: type) -> Callable[[Any], tuple[Any, ...]] | None:
-    """What gives the values of a dataclass, if its fields cannot be set."""
+def _values_of_fixed(cls: type) -> Callable[[Any], Iterable[Any]] | None:
+    """What gives the values in a tuple, or in a dataclass whose fields cannot be set; None for all other types."""
+    if cls is tuple:
+        return iter
     params = vars(cls).get("__dataclass_params__")
     return field_values(cls) if params is not None and params.frozen else None
 

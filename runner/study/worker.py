@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from ..collection import seldom_collecting
 from .one_run import Runner
 from .plan import Plan
 from .schedule import Done
@@ -30,12 +31,13 @@ def work(folder: str, connection: Connection, lifeline: Connection) -> None:
     decides = None if plan.study.until is None else plan.study.until.metric
     connection.send((READY, None))
     try:
-        while (task := connection.recv()) is not None:
-            runner.prepare(task)
-            connection.send((BEGUN, None))
-            row = runner.row(task)
-            writer.add(row)
-            connection.send((OVER, Done(row["status"], row[decides] if decides else None)))
+        with seldom_collecting():
+            while (task := connection.recv()) is not None:
+                runner.prepare(task)
+                connection.send((BEGUN, None))
+                row = runner.row(task)
+                writer.add(row)
+                connection.send((OVER, Done(row["status"], row[decides] if decides else None)))
         writer.flush()
     except EOFError:
         return
