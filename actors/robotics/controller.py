@@ -17,26 +17,50 @@ if TYPE_CHECKING:
 
 STEPS, SECONDS = "steps", "seconds"
 DECISION, NOW = "decision", "now"
+_MADE_AT, _CONTROLS = 4, 6  # columns of a table of plans, see ``peer_tubes``
 
 
 class _Standing(NamedTuple):
     """The plan that the controller made last; made an infinite time ago, nothing is left of it."""
 
     made_at: float  # s
+    position: Array  # (2,) and velocity at step 1 from made_at
+    velocity: Array
     controls: Array  # (N, 2) U_{t+1} .. U_{t+N}, as seen from made_at
-    positions: Array  # (N, 2) at steps 1..N from made_at
 
     def age(self, now: float, period: float) -> int:
         """Periods that have passed since, N at most."""
         return max(0, round(min((now - self.made_at) / period, len(self.controls))))
 
 
-class _Peer(NamedTuple):
-    """The latest plan of another robot, as the kernels take it."""
+class _Peers:
+    """The latest plans of the other robots, as the kernels take them."""
 
-    made_at: float  # s
-    announced: tuple[float, ...]  # x, y, vx, vy, made_at, and the number of controls
-    controls: Array  # (n, 2)
+    def __init__(self) -> None:
+        self._rows: dict[str, int] = {}
+        self._controls = 0  # room for so many of each robot
+        self.plans = np.empty((0, _CONTROLS))  # a row for each robot, sorted by name
+
+    def hear(self, plan: Plan) -> None:
+        """Remember a plan, unless a later one of that robot is known."""
+        count = len(plan.controls)
+        if plan.robot not in self._rows or count > self._controls:
+            self._make_room(plan.robot, count)
+        row = self.plans[self._rows[plan.robot]]
+        if plan.time >= row[_MADE_AT]:
+            (x, y), (vx, vy) = plan.state.position.tolist(), plan.state.velocity.tolist()
+            row[:_CONTROLS] = x, y, vx, vy, plan.time, count
+            row[_CONTROLS : _CONTROLS + 2 * count] = plan.controls.ravel()
+
+    def _make_room(self, robot: str, controls: int) -> None:
+        known, names = self.plans, sorted({*self._rows, robot})
+        self._controls = max(self._controls, controls)
+        self.plans = np.zeros((len(names), _CONTROLS + 2 * self._controls))
+        self.plans[:, _MADE_AT] = -math.inf
+        for row, name in enumerate(names):
+            if name in self._rows:
+                self.plans[row, : known.shape[1]] = known[self._rows[name]]
+        self._rows = {name: row for row, name in enumerate(names)}
 
 
 class RobustController(Actor):
@@ -94,10 +118,8 @@ class RobustController(Actor):
         self.solver.prepare()
         compile_kernels()
         # Kept, as an import takes 1 us whenever it is met.
-        self._own_tube, self._peer_tubes = reachability.own_tube, reachability.peer_tubes
-        self._expected_target = reachability.expected_target
-        self._new_problem, self._first_guesses = horizon.HorizonProblem, horizon.first_guesses
-        self._trajectory = horizon.trajectory
+        self._new_problem, self._standing_plan = horizon.HorizonProblem, reachability.standing_plan
+        self._expected_target, self._peer_tubes = reachability.expected_target, reachability.peer_tubes
         self._name = self.robot_name or enclosing(self.path)
         tau = 1.0 if self.tube_time == STEPS else self.period
         # The kernels count steps from t.  From t + period on there is one more of them, and tau is 0 at the first.
@@ -109,8 +131,8 @@ class RobustController(Actor):
         noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
         self._process_noise = noise if self.covariance_noise else np.zeros((4, 4))
         self._applied = np.zeros(2)  # U_t
-        self._standing = self._nothing = _Standing(-math.inf, np.zeros((self._steps, 2)), np.zeros((self._steps, 2)))
-        self._peers: dict[str, _Peer] = {}
+        self._standing = self._nothing = _Standing(-math.inf, np.zeros(2), np.zeros(2), np.zeros((self._steps, 2)))
+        self._peers = _Peers()
         self._target: Estimate | None = None
         self._target_at = 0.0
         self._infeasible = 0
@@ -140,17 +162,13 @@ class RobustController(Actor):
     def _listen(self, now: float) -> None:
         """Remember the latest estimate and plans, also those that come between triggers."""
         for plan in self.peer_plans.tokens:
-            known = self._peers.get(plan.robot)
-            if plan.robot != self._name and plan.finite and (known is None or plan.time >= known.made_at):
-                state, controls = plan.state, plan.controls
-                announced = (*state.position.tolist(), *state.velocity.tolist(), plan.time, len(controls))
-                self._peers[plan.robot] = _Peer(plan.time, announced, controls)
+            if plan.robot != self._name and plan.finite:
+                self._peers.hear(plan)
         if self.estimate.present and (estimate := self.estimate.value).finite:
             self._target, self._target_at = estimate, now
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array, now: float) -> None:
-        positions = self._trajectory(problem.position, problem.velocity, controls, self.period, self._steps)
-        self._standing = _Standing(now, controls, positions)
+        self._standing = _Standing(now, problem.position, problem.velocity, controls)
         announced = np.empty((self.horizon + 1, 2))
         announced[0], announced[1:] = self._applied, controls[: self.horizon]
         self.plan.send(Plan(self._name, now, own, announced))
@@ -161,16 +179,28 @@ class RobustController(Actor):
 
     def _problem(self, own: BodyState, now: float) -> tuple[HorizonProblem, Array]:
         """The problem, and where its solver may start (2, N, 2): the standing plan from the next period on; braking."""
+        # Floats: arithmetic on arrays of two takes ten times as long.
+        (x, y), (vx, vy), (ux, uy) = own.position.tolist(), own.velocity.tolist(), self._applied.tolist()
+        period = self.period
+        position = np.array([x + period * vx, y + period * vy])
+        vx, vy = vx + period * ux, vy + period * uy
+        velocity, speed = np.array([vx, vy]), math.hypot(vx, vy)
+        tube_centre, tube_radius, starts = self._standing_plan(
+            *self._standing[1:],
+            self._standing.age(now, period),
+            self._radius,
+            velocity,
+            speed,
+            self.max_acceleration,
+            period,
+        )
         target_mean, target_covariance, points, weights = self._target_ahead(now)
-        peer_mean, peer_distance = self._peers_ahead(now)
-        _, planned_controls, planned_positions = self._standing
-        age = self._standing.age(now, self.period)
-        # f3 binds where the standing plan reaches, and is free beyond.
-        tube_centre, tube_radius = self._own_tube(planned_positions, self._radius, age)
-        velocity = own.velocity + self.period * self._applied
+        peer_mean, peer_distance = self._peer_tubes(
+            self._peers.plans, now, period, self._radius, self.tube_growth, self.safe_distance, self.margin
+        )
         posed = self._new_problem(
-            period=self.period,
-            position=own.position + self.period * own.velocity,
+            period=period,
+            position=position,
             velocity=velocity,
             max_speed=self.max_speed,
             max_acceleration=self.max_acceleration,
@@ -183,9 +213,7 @@ class RobustController(Actor):
             peer_mean=peer_mean,
             peer_distance=peer_distance,
         )
-        speed = math.hypot(*velocity.tolist())
-        starts = self._first_guesses(planned_controls, age, velocity, speed, self.max_acceleration, self.period)
-        return self.objective.pose(posed, points, weights, peer_mean[:, -1].copy()), starts
+        return self.objective.pose(posed, points, weights), starts
 
     def _target_ahead(self, now: float) -> tuple[Array, Array, Array, Array]:
         """Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N, weights; K is 0 or 1."""
@@ -194,19 +222,3 @@ class RobustController(Actor):
             return np.empty((0, steps, 2)), np.empty((0, steps, 3)), np.empty((0, 2)), np.empty(0)
         age = max(0, round((now - self._target_at) / self.period))
         return self._expected_target(target.mean, target.covariance, self._process_noise, self.period, age, steps)
-
-    def _peers_ahead(self, now: float) -> tuple[Array, Array]:
-        """f5: positions (n, N, 2) and the distances to keep from them (n, N), sorted by the peers' names."""
-        if not self._peers:
-            return np.empty((0, self._steps, 2)), np.empty((0, self._steps))
-        peers = [self._peers[name] for name in sorted(self._peers)]
-        return self._peer_tubes(
-            np.array([peer.announced for peer in peers]),
-            np.concatenate([peer.controls for peer in peers]),
-            now,
-            self.period,
-            self._radius,
-            self.tube_growth,
-            self.safe_distance,
-            self.margin,
-        )

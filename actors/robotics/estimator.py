@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
-from .messages import RANGE, Array, Estimate, Measurement, all_finite
+from .messages import RANGE, RELATIVE_POSITION, Array, Estimate, Measurement
 
 EXPECTED, PREDICTED = "expected", "predicted"
-
-
-class _Columns(NamedTuple):
-    """Some measurements as the kernels take them."""
-
-    kinds: Array  # (m,) the kernels' numbers
-    observers: Array  # (m, 2)
-    values: Array  # (m, 2); of a range the first counts
-    deviations: Array  # (m, 2) along and across the line of sight
 
 
 class _Estimator(Actor):
@@ -58,61 +49,50 @@ class _Estimator(Actor):
         from .numerics.warm_up import compile_kernels
 
         compile_kernels()
-        # Kept, as an import takes 1 us whenever it is met.
-        self._sigma_points, self._measurement_noise = ukf.sigma_points, ukf.measurement_noise
-        self._ranged, self._relative = float(ukf.RANGE), float(ukf.RELATIVE_POSITION)
+        self._kinds = {RANGE: ukf.RANGE, RELATIVE_POSITION: ukf.RELATIVE_POSITION}
         self._predicted_at: int | None = None
         self._late: dict[tuple[str, str], Measurement] = {}  # what came since the last trigger
         self._process_noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
 
     def fire(self) -> None:
+        present = [each for each in self.measurements.tokens if each.finite]
         if not self.trigger.present:
-            self._late.update({(each.robot, each.kind): each for each in self.measurements.tokens if each.finite})
+            self._late.update({(each.robot, each.kind): each for each in present})
             return
         now = self.tag.time
-        if self._predicted_at is not None and now > self._predicted_at:
-            self._predict((now - self._predicted_at) / 1e9)
+        elapsed = 0.0 if self._predicted_at is None else (now - self._predicted_at) / 1e9
         self._predicted_at = now
-        present = [each for each in self.measurements.tokens if each.finite]
         if self._late:
             known = {(each.robot, each.kind) for each in present}
             present += [late for source, late in self._late.items() if source not in known]
             self._late.clear()
         # Sorted, so that the order of arrival decides nothing, not even the last bit.
         usable = sorted(present, key=_order)
-        fused = bool(usable) and self._update(usable)
-        sources = sorted({each.robot for each in usable}) if fused else ()
+        fused = self._step(elapsed, usable)
+        sources = dict.fromkeys(each.robot for each in usable) if fused else ()
         self.estimate.send(Estimate(*self._state(), tuple(sources)))
 
-    def _predict(self, elapsed: float) -> None:
-        raise NotImplementedError
-
-    def _update(self, measurements: list[Measurement]) -> bool:
-        """Fuse; whether it worked."""
+    def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
+        """Predict over ``elapsed`` seconds, 0 at the first trigger, and fuse; whether anything was fused."""
         raise NotImplementedError
 
     def _state(self) -> tuple[Array, Array]:
         """Mean and covariance."""
         raise NotImplementedError
 
-    def _columns(self, measurements: list[Measurement]) -> _Columns:
-        """The measurements as the kernels take them."""
-        # From lists, as np.array takes ten times as long to make one array of several.
-        return _Columns(
-            np.array([self._ranged if each.kind == RANGE else self._relative for each in measurements]),
-            np.array([each.observer.tolist() for each in measurements]),
-            np.array([[*each.value.tolist(), 0.0][:2] for each in measurements]),
-            np.array([(each.along, each.across) for each in measurements], dtype=float),
-        )
+    def _noise_over(self, elapsed: float) -> Array:
+        """The process noise of so many seconds."""
+        noise: Array = self._process_noise * (elapsed / self.period)
+        return noise
 
-    def _noises(self, columns: _Columns) -> Array:
-        """The measurements' covariances (m, 3), all as seen from the prediction, whatever the order of fusion."""
-        mean, covariance = self._state()
-        if self.noise_direction == EXPECTED:
-            points, weights = self._sigma_points(mean, covariance, 0.0)
-        else:
-            points, weights = np.array(mean)[np.newaxis], np.ones(1)
-        return self._measurement_noise(points, weights, columns.kinds, columns.observers, columns.deviations)
+    def _rows(self, measurements: list[Measurement]) -> Array:
+        """The measurements (m, 7) as the kernels take them."""
+        kinds = self._kinds
+        rows = [
+            (kinds[each.kind], *each.observer.tolist(), *[*each.value.tolist(), 0.0][:2], each.along, each.across)
+            for each in measurements
+        ]
+        return np.array(rows, np.float64).reshape(-1, 7)
 
 
 def _order(measurement: Measurement) -> Any:
@@ -125,27 +105,26 @@ class UnscentedEstimator(_Estimator):
     kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; 0 gives the centre no weight")
 
     def initialize(self) -> None:
-        from .numerics.ukf import constant_velocity, predict, update
+        from .numerics import ukf
 
         super().initialize()
-        self._transition = lru_cache(8)(constant_velocity)  # it is nearly always the same
-        self._move, self._fuse = predict, update
+        self._move_and_fuse = ukf.predict_and_fuse  # kept, as an import takes 1 us whenever it is met
+        self._model = lru_cache(8)(lambda elapsed: (ukf.constant_velocity(elapsed), self._noise_over(elapsed)))
         self._mean = np.array(self.prior_mean)
         self._covariance = np.diag(self.prior_variance)
 
-    def _predict(self, elapsed: float) -> None:
-        noise = self._process_noise * (elapsed / self.period)
-        self._mean, self._covariance = self._move(self._mean, self._covariance, self._transition(elapsed), noise)
-
-    def _update(self, measurements: list[Measurement]) -> bool:
-        columns = self._columns(measurements)
-        kinds, observers, values, _ = columns
-        noises = self._noises(columns)
-        mean, covariance = self._fuse(self._mean, self._covariance, self.kappa, kinds, observers, values, noises)
-        if not all_finite(mean.tolist() + covariance.ravel().tolist()):
-            return False
-        self._mean, self._covariance = mean, covariance
-        return True
+    def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
+        transition, noise = self._model(elapsed)  # nearly always the same
+        self._mean, self._covariance, fused = self._move_and_fuse(
+            self._mean,
+            self._covariance,
+            transition,
+            noise,
+            self.kappa,
+            self._rows(measurements),
+            self.noise_direction == EXPECTED,
+        )
+        return fused
 
     def _state(self) -> tuple[Array, Array]:
         return self._mean, self._covariance

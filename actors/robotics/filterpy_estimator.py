@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core import EpicycleError, Parameter
-from .estimator import _Estimator
+from .estimator import EXPECTED, _Estimator
 from .messages import RANGE, Array, Measurement
 
 # FilterPy's EnsembleKalmanFilter is left out: it draws from numpy's global random state, so no run could be
@@ -39,8 +39,13 @@ class FilterPyEstimator(_Estimator):
         self._filter.x = np.array(self.prior_mean).reshape((4, 1) if column else 4)
         self._filter.P = np.diag(self.prior_variance)
 
+    def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
+        if elapsed > 0.0:
+            self._predict(elapsed)
+        return bool(measurements) and self._update(measurements)
+
     def _predict(self, elapsed: float) -> None:
-        self._filter.Q = self._process_noise * (elapsed / self.period)
+        self._filter.Q = self._noise_over(elapsed)
         if self.filter in ("UnscentedKalmanFilter", "CubatureKalmanFilter"):
             self._filter.predict(dt=elapsed)
         else:
@@ -48,7 +53,7 @@ class FilterPyEstimator(_Estimator):
             self._filter.predict()
 
     def _update(self, measurements: list[Measurement]) -> bool:
-        noises = self._noises(self._columns(measurements))
+        noises = self._noises(measurements)
         before = np.array(self._filter.x), np.array(self._filter.P)
         for each, (xx, xy, yy) in zip(measurements, noises, strict=True):
             ranged = each.kind == RANGE
@@ -57,6 +62,18 @@ class FilterPyEstimator(_Estimator):
             return True
         self._filter.x, self._filter.P = before
         return False
+
+    def _noises(self, measurements: list[Measurement]) -> Array:
+        """The measurements' covariances (m, 3), all as seen from the prediction, whatever the order of fusion."""
+        from .numerics.ukf import measurement_noise, sigma_points
+
+        mean, covariance = self._state()
+        if self.noise_direction == EXPECTED:
+            points, weights = sigma_points(mean, covariance, 0.0)
+        else:
+            points, weights = np.array(mean)[np.newaxis], np.ones(1)
+        rows = self._rows(measurements)
+        return measurement_noise(points, weights, rows[:, 0].copy(), rows[:, 1:3].copy(), rows[:, 5:].copy())
 
     def _fuse(self, measurement: Measurement, noise: Array) -> None:
         observer, ranged = measurement.observer, measurement.kind == RANGE

@@ -14,14 +14,14 @@ Array = NDArray[np.float64]
 RELATIVE_POSITION = "relative_position"
 RANGE = "range"
 
-
-_set = object.__setattr__  # in a frozen token
+_FLOAT = np.dtype(np.float64)  # NumPy looks for it at each call where the type is given instead
+_set = object.__setattr__  # in a frozen token; each has its own __init__, as the dataclass's would set arrays twice
 
 
 def read_only(value: ArrayLike) -> Array:
     """A copy that nobody can write to."""
-    array = np.array(value, np.float64)
-    array.setflags(write=False)
+    array = np.array(value, _FLOAT)
+    array.setflags(False)  # type: ignore[call-arg]  # write=False takes as long as the copy
     return array
 
 
@@ -30,16 +30,16 @@ def all_finite(numbers: Sequence[float]) -> bool:
     return math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))  # finite ones can add up to infinity
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class BodyState:
     """Where a body is and how it moves."""
 
     position: Array  # (2,) m
     velocity: Array  # (2,) m/s
 
-    def __post_init__(self) -> None:
-        _set(self, "position", read_only(self.position))
-        _set(self, "velocity", read_only(self.velocity))
+    def __init__(self, position: ArrayLike, velocity: ArrayLike) -> None:
+        _set(self, "position", read_only(position))
+        _set(self, "velocity", read_only(velocity))
 
     @property
     def finite(self) -> bool:
@@ -47,7 +47,7 @@ class BodyState:
         return all_finite(self.position.tolist() + self.velocity.tolist())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class Measurement:
     """What a robot's sensor saw of the target, with what is needed to fuse it elsewhere."""
 
@@ -58,9 +58,15 @@ class Measurement:
     along: float  # standard deviation along the line of sight, m
     across: float  # standard deviation across it, m; no part of a range
 
-    def __post_init__(self) -> None:
-        _set(self, "observer", read_only(self.observer))
-        _set(self, "value", read_only(self.value))
+    def __init__(
+        self, robot: str, observer: ArrayLike, kind: str, value: ArrayLike, along: float, across: float
+    ) -> None:
+        _set(self, "robot", robot)
+        _set(self, "observer", read_only(observer))
+        _set(self, "kind", kind)
+        _set(self, "value", read_only(value))
+        _set(self, "along", along)
+        _set(self, "across", across)
 
     @property
     def finite(self) -> bool:
@@ -74,17 +80,18 @@ class Measurement:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class Estimate:
     """What a robot believes about the target: a normal distribution over (x, y, vx, vy)."""
 
     mean: Array  # (4,) m and m/s
     covariance: Array  # (4, 4)
-    sources: tuple[str, ...] = ()  # robots whose measurements were fused at this step, sorted
+    sources: tuple[str, ...]  # robots whose measurements were fused at this step, sorted
 
-    def __post_init__(self) -> None:
-        _set(self, "mean", read_only(self.mean))
-        _set(self, "covariance", read_only(self.covariance))
+    def __init__(self, mean: ArrayLike, covariance: ArrayLike, sources: tuple[str, ...] = ()) -> None:
+        _set(self, "mean", read_only(mean))
+        _set(self, "covariance", read_only(covariance))
+        _set(self, "sources", sources)
 
     @property
     def finite(self) -> bool:
@@ -92,7 +99,7 @@ class Estimate:
         return all_finite(self.mean.tolist() + self.covariance.ravel().tolist())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class Plan:
     """What a robot intends: its state at ``time`` and its accelerations from then on, one per period."""
 
@@ -101,8 +108,11 @@ class Plan:
     state: BodyState
     controls: Array  # (N + 1, 2) m/s^2: the one being applied now, then the planned ones
 
-    def __post_init__(self) -> None:
-        _set(self, "controls", read_only(self.controls))
+    def __init__(self, robot: str, time: float, state: BodyState, controls: ArrayLike) -> None:
+        _set(self, "robot", robot)
+        _set(self, "time", time)
+        _set(self, "state", state)
+        _set(self, "controls", read_only(controls))
 
     @property
     def finite(self) -> bool:

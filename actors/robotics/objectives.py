@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 class Objective(Configurable):
     """Base of the objectives: fills in the objective's fields of a horizon problem."""
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
         """The problem with this objective.
 
         ``points`` (M, 2) and ``weights`` (M,) are the target's sigma points at the end of the horizon (M = 0
-        while no target is known), ``peers`` (n, 2) where the other robots will be then.
+        while no target is known).
         """
         raise NotImplementedError
 
@@ -30,7 +30,7 @@ class ReachGoal(Objective):
 
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to go")
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
         return problem.to_reach(self.goal)
 
 
@@ -42,6 +42,7 @@ class Inform(Objective):
     variance = Parameter(float, 2.0, unit="m^2", min=1e-9, doc="eta: variance of the predicted ranges")
     joint = Parameter(bool, True, doc="count what all robots measure together; false: what this one measures")
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Array) -> HorizonProblem:
-        others = peers if self.joint else np.empty((0, 2))
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
+        # Where the other robots will be then; a copy, as the kernel takes rows that lie one after another.
+        others = problem.peer_mean[:, -1].copy() if self.joint else np.empty((0, 2))
         return problem.to_inform(points, weights, others, self.variance, self.penalty, self.range)

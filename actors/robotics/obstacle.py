@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from .messages import BodyState
 
@@ -35,8 +33,8 @@ class CircularMotion(Actor):
         chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
         direction, heading = self.heading + turned / 2.0, self.heading + turned
         x, y = self.start.tolist()
-        position = np.array([x + chord * math.cos(direction), y + chord * math.sin(direction)])
-        velocity = np.array([self.speed * math.cos(heading), self.speed * math.sin(heading)])
+        position = x + chord * math.cos(direction), y + chord * math.sin(direction)
+        velocity = self.speed * math.cos(heading), self.speed * math.sin(heading)
         self.state.send(BodyState(position, velocity))
 
 

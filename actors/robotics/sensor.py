@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..core import Actor, InputPort, OutputPort, Parameter
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, enclosing
 
@@ -37,7 +35,7 @@ class Sensor(Actor):
         self._name = self.robot_name or enclosing(self.path)
 
     def fire(self) -> None:
-        error_along, error_across = self.random_stream("noise").normal(size=2).tolist()
+        error_along, error_across = self.random_stream("noise").standard_normal(2).tolist()
         if not (self.robot.present and self.target.present):
             return
         position = self.robot.value.position
@@ -50,8 +48,8 @@ class Sensor(Actor):
             return
         along, across = self.along * error_along, self.across * error_across
         if self.kind == RANGE:
-            value = np.array([distance + along])
+            value = [distance + along]
         else:
             nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
-            value = np.array([dx + along * nx - across * ny, dy + along * ny + across * nx])
+            value = [dx + along * nx - across * ny, dy + along * ny + across * nx]
         self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across))

@@ -154,3 +154,22 @@ def test_no_measurement_changes_nothing() -> None:
     mean, covariance = ukf.update(*PRIOR, 0.0, np.empty(0), empty, empty, empty)
     assert (mean == PRIOR[0]).all()
     assert (covariance == PRIOR[1]).all()
+
+
+@pytest.mark.parametrize("averaged", [True, False])
+def test_a_step_is_prediction_noise_and_update_in_turn(averaged: bool) -> None:
+    random, transition = np.random.default_rng(3), ukf.constant_velocity(0.1)
+    kinds, observers, values = np.array([0.0, 1.0, 0.0]), random.normal(size=(3, 2)), random.normal(size=(3, 2))
+    deviations = random.uniform(0.1, 2.0, size=(3, 2))
+    rows = np.column_stack([kinds, observers, values, deviations])
+    predicted = ukf.predict(*PRIOR, transition, PROCESS_NOISE)
+    points, weights = ukf.sigma_points(*predicted, 0.0) if averaged else (predicted[0][np.newaxis], np.ones(1))
+    noises = ukf.measurement_noise(points, weights, kinds, observers, deviations)
+    expected = ukf.update(*predicted, 0.5, kinds, observers, values, noises)
+    mean, covariance, fused = ukf.predict_and_fuse(*PRIOR, transition, PROCESS_NOISE, 0.5, rows, averaged)
+    assert (mean.tolist(), covariance.tolist(), fused) == (expected[0].tolist(), expected[1].tolist(), True)
+    # Without measurements, and where the result would not be finite, the prediction stands.
+    rows[1, 3] = np.inf
+    for useless in (np.empty((0, 7)), rows):
+        mean, covariance, fused = ukf.predict_and_fuse(*PRIOR, transition, PROCESS_NOISE, 0.5, useless, averaged)
+        assert (mean.tolist(), covariance.tolist(), fused) == (predicted[0].tolist(), predicted[1].tolist(), False)

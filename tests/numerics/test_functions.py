@@ -203,8 +203,10 @@ def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> N
     ages, lengths = (0, 1, 3, 9, 25), (11, 2, 11, 1, 30)
     states, plans = random.normal(size=(5, 4)), [random.normal(size=(length, 2)) for length in lengths]
     made_at, radius = 7.0 - 0.1 * np.array(ages), 0.2 + 0.4 * np.arange(1, 11)
-    announced, controls = np.column_stack([states, made_at, lengths]), np.concatenate(plans)
-    positions, distances = reachability.peer_tubes(announced, controls, 7.0, 0.1, radius, 0.4, 2.0, 3.0)
+    table = np.full((5, 6 + 2 * 30), np.nan)  # what is past a plan's end is not looked at
+    for row, state, made, plan in zip(table, states, made_at, plans, strict=True):
+        row[: 6 + plan.size] = [*state, made, len(plan), *plan.ravel()]
+    positions, distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0)
     for row, (age, state, plan) in enumerate(zip(ages, states, plans, strict=True)):
         place, speed, driven = state[:2], state[2:], []
         for k in range(age + 10):
@@ -216,28 +218,25 @@ def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> N
 
 @pytest.mark.parametrize("made_at", [-1e5, -1e12, -1.7e308])
 def test_plans_from_time_immemorial_are_lost_in_the_distance_to_keep(made_at: float) -> None:
-    announced, radius = np.array([[1.0, 2.0, 0.0, 0.0, made_at, 2.0]]), np.ones(10)
-    positions, distances = reachability.peer_tubes(announced, np.zeros((2, 2)), 0.0, 0.1, radius, 0.4, 2.0, 3.0)
+    table, radius = np.array([[1.0, 2.0, 0.0, 0.0, made_at, 2.0, 0.0, 0.0, 0.0, 0.0]]), np.ones(10)
+    positions, distances = reachability.peer_tubes(table, 0.0, 0.1, radius, 0.4, 2.0, 3.0)
     assert positions == pytest.approx(np.tile([1.0, 2.0], (1, 10, 1)))
     assert distances == pytest.approx(2.0 + 3.0 * (1.0 + 0.4 * (reachability.OLDEST - 1)))
 
 
-def test_own_tube_is_free_where_the_plan_has_ended(random: np.random.Generator) -> None:
-    planned, radius = random.normal(size=(10, 2)), np.arange(1.0, 11.0)
-    for age in (0, 1, 9, 10):
-        centres, radii = reachability.own_tube(planned, radius, age)
-        assert centres[: 10 - age].tolist() == planned[age:].tolist()
-        assert radii.tolist() == [*radius[: 10 - age], *[np.inf] * age]
-
-
-def test_first_guesses_are_the_plan_shifted_and_braking(random: np.random.Generator) -> None:
-    planned = random.normal(size=(10, 2))
-    velocity = np.array([3.0, 4.0])
-    shifted, braking = horizon.first_guesses(planned, 3, velocity, 5.0, 8.0, 0.1)
-    assert shifted.tolist() == [*planned[3:].tolist(), *[[0.0, 0.0]] * 3]
+@pytest.mark.parametrize("age", [0, 1, 3, 9, 10])
+def test_a_standing_plan_is_shifted_and_binds_as_far_as_it_reaches(random: np.random.Generator, age: int) -> None:
+    controls, radius = random.normal(size=(10, 2)), np.arange(1.0, 11.0)
+    position, velocity, moving = random.normal(size=2), random.normal(size=2), np.array([3.0, 4.0])
+    begun = position, velocity, controls, age, radius
+    centres, radii, (shifted, braking) = reachability.standing_plan(*begun, moving, 5.0, 8.0, 0.1)
+    planned = horizon.trajectory(position, velocity, controls, 0.1, 10)
+    assert centres[: 10 - age].tolist() == planned[age:].tolist()
+    assert radii.tolist() == [*radius[: 10 - age], *[np.inf] * age]
+    assert shifted.tolist() == [*controls[age:].tolist(), *[[0.0, 0.0]] * age]
     assert np.hypot(*braking[:6].T) == pytest.approx(0.95 * 8.0)  # as hard as it may until the last period
-    assert velocity + 0.1 * braking.sum(axis=0) == pytest.approx(np.zeros(2), abs=1e-12)
-    assert not horizon.first_guesses(planned, 10, np.zeros(2), 0.0, 8.0, 0.1).any()
+    assert moving + 0.1 * braking.sum(axis=0) == pytest.approx(np.zeros(2), abs=1e-12)
+    assert not reachability.standing_plan(*begun, np.zeros(2), 0.0, 8.0, 0.1)[2][1].any()
 
 
 @pytest.mark.parametrize("age", [0, 2])

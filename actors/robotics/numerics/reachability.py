@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .compiled import kernel
+from .horizon import trajectory
 from .typing import Array
 from .ukf import constant_velocity, sigma_points
 
@@ -22,56 +23,69 @@ def tube_radius(initial: float, growth: float, step_length: float, steps: int) -
 
 
 @kernel
-def own_tube(planned: Array, radius: Array, age: int) -> tuple[Array, Array]:
-    """f3: centres (N, 2) and radii (N,) of the tube around the positions ``planned`` (N, 2) ``age`` periods ago.
+def standing_plan(
+    position: Array,
+    velocity: Array,
+    controls: Array,
+    age: int,
+    radius: Array,
+    moving: Array,
+    speed: float,
+    max_acceleration: float,
+    period: float,
+) -> tuple[Array, Array, Array]:
+    """What a plan from ``position`` and ``velocity`` with ``controls`` (N, 2) is good for, ``age`` periods later.
 
-    It binds where the plan reaches, with the ``radius`` (N,) of eq. (3), and is free beyond.
+    f3: centres (N, 2) and radii (N,) of the tube around it, which binds where the plan reaches, with the ``radius``
+    (N,) of eq. (3), and is free beyond.
+
+    Where a solver may start, (2, N, 2), the best guess first: the controls from now on, zero where they end; then
+    braking from the present velocity ``moving``, whose length is ``speed``, as fast as f2 allows, with 5 % to spare.
     """
     steps = radius.shape[0]
-    centres, radii = np.zeros((steps, 2)), np.empty(steps)
+    centres, radii, guesses = np.zeros((steps, 2)), np.empty(steps), np.zeros((2, steps, 2))
+    planned = trajectory(position, velocity, controls, period, steps)
     for s in range(steps):
         radii[s] = math.inf
         if s < steps - age:
             centres[s, 0], centres[s, 1] = planned[age + s, 0], planned[age + s, 1]
             radii[s] = radius[s]
-    return centres, radii
+            guesses[0, s, 0], guesses[0, s, 1] = controls[age + s, 0], controls[age + s, 1]
+    if not 1e-9 < speed < math.inf:
+        return centres, radii, guesses
+    x, y = moving[0] / speed, moving[1] / speed
+    for s in range(steps):
+        push = min(0.95 * max_acceleration, speed / period)
+        guesses[1, s, 0], guesses[1, s, 1] = -push * x, -push * y
+        speed -= push * period
+    return centres, radii, guesses
 
 
 @kernel
 def peer_tubes(
-    announced: Array,
-    controls: Array,
-    now: float,
-    period: float,
-    radius: Array,
-    growth: float,
-    safe_distance: float,
-    margin: float,
+    plans: Array, now: float, period: float, radius: Array, growth: float, safe_distance: float, margin: float
 ) -> tuple[Array, Array]:
     """f5: where n peers will be at steps 1..N from now on (n, N, 2), and the distances to keep from them (n, N).
 
-    Each row of ``announced`` (n, 6) is of one plan: x, y, vx, vy when it was made, the time (s) of that, and how many
-    of the rows of ``controls``, which are of all plans in turn, are the accelerations from then on; past the last of
-    them the velocity is kept.  To the ``radius`` (N,) of eq. (3), eq. (4) adds ``growth`` for every period that has
-    passed since but one, which is normal latency.  Plans older than ``OLDEST`` count as that old: what they say is lost
-    in the distance to keep.
+    Each row of ``plans`` is one plan: x, y, vx, vy when it was made, the time (s) of that, how many controls follow,
+    and these, the accelerations from then on; past the last of them the velocity is kept.  To the ``radius`` (N,) of
+    eq. (3), eq. (4) adds ``growth`` for every period that has passed since but one, which is normal latency.  Plans
+    older than ``OLDEST`` count as that old: what they say is lost in the distance to keep.
     """
-    count, steps = announced.shape[0], radius.shape[0]
+    count, steps = plans.shape[0], radius.shape[0]
     positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
-    first = 0
     for i in range(count):
-        px, py, vx, vy = announced[i, 0], announced[i, 1], announced[i, 2], announced[i, 3]
-        age = round(min(max((now - announced[i, 4]) / period, 0.0), OLDEST))
-        planned = int(announced[i, 5])
+        px, py, vx, vy = plans[i, 0], plans[i, 1], plans[i, 2], plans[i, 3]
+        age = round(min(max((now - plans[i, 4]) / period, 0.0), OLDEST))
+        planned = int(plans[i, 5])
         for k in range(age + steps):
             px += period * vx
             py += period * vy
             if k < planned:
-                vx += period * controls[first + k, 0]
-                vy += period * controls[first + k, 1]
+                vx += period * plans[i, 6 + 2 * k]
+                vy += period * plans[i, 7 + 2 * k]
             if k >= age:
                 positions[i, k - age, 0], positions[i, k - age, 1] = px, py
-        first += planned
         lost = max(0, age - 1)
         for s in range(steps):
             distances[i, s] = safe_distance + margin * (radius[s] + growth * lost)

@@ -201,6 +201,55 @@ def update(
 
 
 @inner
+def _finite(mean: Array, covariance: Array) -> bool:
+    for i in range(mean.shape[0]):
+        if not abs(mean[i]) < math.inf:
+            return False
+        for j in range(mean.shape[0]):
+            if not abs(covariance[i, j]) < math.inf:
+                return False
+    return True
+
+
+@kernel
+def predict_and_fuse(
+    mean: Array,
+    covariance: Array,
+    transition: Array,
+    process_noise: Array,
+    kappa: float,
+    measurements: Array,
+    averaged: bool,
+) -> tuple[Array, Array, bool]:
+    """``predict``, then ``update`` with the rows of ``measurements`` (m, 7), and whether anything was fused.
+
+    A row holds the kind, the observer's position, the value (of a range the first counts), and the deviations along and
+    across the line of sight.  All noises are as seen from the prediction, and ``averaged`` over its sigma points, or
+    turned along its mean.  Where the result would not be finite, the prediction stands.
+    """
+    mean, covariance = predict(mean, covariance, transition, process_noise)
+    count = measurements.shape[0]
+    if count == 0:
+        return mean, covariance, False
+    kinds = np.empty(count)
+    observers, values, deviations = np.empty((count, 2)), np.empty((count, 2)), np.empty((count, 2))
+    for m in range(count):
+        kinds[m] = measurements[m, 0]
+        for c in range(2):
+            observers[m, c], values[m, c] = measurements[m, 1 + c], measurements[m, 3 + c]
+            deviations[m, c] = measurements[m, 5 + c]
+    points, weights = sigma_points(mean, covariance, 0.0)
+    if not averaged:
+        points, weights = points[:1], weights[:1]
+        weights[0] = 1.0  # of the mean
+    noises = measurement_noise(points, weights, kinds, observers, deviations)
+    fused, spread = update(mean, covariance, kappa, kinds, observers, values, noises)
+    if _finite(fused, spread):
+        return fused, spread, True
+    return mean, covariance, False
+
+
+@inner
 def _gain(innovation_covariance: Array, cross: Array) -> Array:
     """cross @ inverse(innovation_covariance) by its Cholesky factor; a direction without variance gains nothing."""
     root = _root(innovation_covariance)

@@ -10,9 +10,9 @@ import numpy as np
 
 from .barrier import solve
 from .constraints import violations
-from .horizon import HorizonProblem, first_guesses, trajectory
-from .reachability import expected_target, own_tube, peer_tubes, tube_radius
-from .ukf import constant_velocity, measurement_noise, predict, sigma_points, update
+from .horizon import HorizonProblem
+from .reachability import expected_target, peer_tubes, standing_plan, tube_radius
+from .ukf import constant_velocity, predict_and_fuse
 
 _LOGGER = logging.getLogger("epicycle")
 _PATIENCE = 1.0  # s before the wait is explained; loading the cached kernels is quicker
@@ -33,18 +33,15 @@ def compile_kernels() -> None:
 
 def _call_every_kernel() -> None:
     steps, period = 3, 0.1
-    mean, covariance = predict(np.zeros(4), np.eye(4), constant_velocity(period), np.eye(4))
-    one, pair = np.zeros(1), np.ones((1, 2))
-    points, weights = sigma_points(mean, covariance, 0.0)
-    noises = measurement_noise(points, weights, one, pair, pair)
-    mean, covariance = update(mean, covariance, 0.0, one, pair, pair, noises)
+    model, pair = (constant_velocity(period), np.eye(4)), np.ones((1, 2))
+    mean, covariance, _ = predict_and_fuse(np.zeros(4), np.eye(4), *model, 0.0, np.zeros((1, 7)), True)
     for token in (mean, covariance):
         token.setflags(write=False)
     means, covariances, sigma_positions, weights = expected_target(mean, covariance, np.eye(4), period, 0, steps)
     controls = np.zeros((steps, 2))
-    positions = trajectory(np.zeros(2), np.zeros(2), controls, period, steps)
-    centre, radius = own_tube(positions, tube_radius(0.2, 0.4, 1.0, steps), 0)
-    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), controls, 0.0, period, radius, 0.4, 1.0, 1.0)
+    zero, tube = np.zeros(2), tube_radius(0.2, 0.4, 1.0, steps)
+    centre, radius, starts = standing_plan(zero, zero, controls, 0, tube, zero, 0.0, 1.0, period)
+    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), 0.0, period, tube, 0.4, 1.0, 1.0)
     posed = HorizonProblem(
         period=period,
         position=np.zeros(2),
@@ -62,4 +59,4 @@ def _call_every_kernel() -> None:
     )
     problem = posed.to_inform(sigma_positions, weights, pair, 1.0, 1.0, 1.0).to_reach(np.ones(2))
     violations(problem, controls)
-    solve(problem, first_guesses(controls, 0, np.zeros(2), 0.0, 1.0, period))
+    solve(problem, starts)
