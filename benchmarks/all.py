@@ -16,6 +16,8 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
+from measure import pace, table
+
 HERE = Path(__file__).parent
 PARTS = ("controllers", "studies", "events", "growth", "start")
 PACKAGES = ("numpy", "numba", "casadi", "scipy", "filterpy", "simpy", "networkx")
@@ -37,18 +39,8 @@ def machine() -> str:
     )
 
 
-def pace() -> float:
-    """The CPU time (s) of a fixed piece of Python: shared machines are not equally fast all the time."""
-    began, total = time.process_time(), 0
-    for number in range(3_000_000):
-        total += number * number
-    return time.process_time() - began
-
-
 def part(name: str) -> str:
     """The section of one part, measured now."""
-    from measure import table
-
     module = importlib.import_module(name)
     rows = []
     for row in module.rows():

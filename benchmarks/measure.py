@@ -28,6 +28,26 @@ class Row:
     reason: str = ""
 
 
+AT_BEST = 0.155  # s of CPU that the loop of ``pace`` takes on the machine of RESULTS.md while its host is idle
+
+
+def pace() -> float:
+    """The CPU time (s) of 3,000,000 turns of a loop in Python: shared machines are not equally fast all the time."""
+    began, total = time.process_time(), 0
+    for number in range(3_000_000):
+        total += number * number
+    return time.process_time() - began
+
+
+def of_the_pace(work: str, took: float, unit: str, paces: Iterable[float]) -> str:
+    """The reason why a time misses its goal: the pace at which it was measured, and what it is at the best one."""
+    loop = median(paces)
+    return (
+        f"{work}: times hang on the machine's pace; a loop of Python took {loop:.2f} s of CPU before and after this, "
+        f"and takes {AT_BEST:g} s at best, at which this would be {took * AT_BEST / loop:.3g} {unit}"
+    )
+
+
 def cpu_seconds(work: Callable[[], object]) -> float:
     """The CPU time of this process that a call takes; what lies about is collected before it."""
     gc.collect()

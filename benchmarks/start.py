@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 
-from measure import Row, table
+from measure import Row, of_the_pace, pace, table
 
 TINY = """\
 model: tiny
@@ -45,6 +45,7 @@ def rows(rounds: int = 9) -> Iterator[Row]:
         "epicycle validate of a tiny model": ([*epicycle, "validate", "tiny.yaml"], None),
         "python -c 'import numpy'": ([sys.executable, "-c", "import numpy"], None),
     }
+    paces = [pace()]
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "tiny.yaml").write_text(TINY, encoding="utf-8")
         took: dict[str, list[tuple[float, float]]] = {name: [] for name in commands}
@@ -53,13 +54,13 @@ def rows(rounds: int = 9) -> Iterator[Row]:
                 measured = seconds_of(command, folder)
                 if number:
                     took[name].append(measured)
+    paces.append(pace())
     how = f"{rounds} processes each, taking turns, after one that fills the caches"
     for name, (_, goal) in commands.items():
         wall, cpu = (median(each[index] for each in took[name]) for index in (0, 1))
         result = f"{wall:.2f} s ({cpu:.2f} s CPU)"
-        yield Row(
-            name, "", result, "" if goal is None else f"<= {goal:g} s", None if goal is None else wall <= goal, how
-        )
+        limit, is_met = ("", None) if goal is None else (f"<= {goal:g} s", wall <= goal)
+        yield Row(name, "", result, limit, is_met, how, of_the_pace(name, wall, "s", paces))
 
 
 if __name__ == "__main__":

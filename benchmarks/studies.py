@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from measure import Row, table
+from measure import Row, of_the_pace, pace, table
 
 CONDITIONS, ALL = 60, 6_000
 REPLICATIONS, ALONE = 20, 5  # of each condition, in two processes and in one
@@ -40,11 +40,16 @@ def rate(replications: int, jobs: int) -> float:
 
 def rows(replications: int = REPLICATIONS) -> Iterator[Row]:
     """The table's lines."""
-    two, one = rate(replications, 2), rate(ALONE, 1)
+    paces = [pace()]
+    two = rate(replications, 2)
+    paces.append(pace())
+    one = rate(ALONE, 1)
     minutes = ALL / two / 60
     how = f"{replications} replications of each of the 60 conditions, wall-clock time from the command to its end"
     result = f"{minutes:.1f} min at the rate of {CONDITIONS * replications:,} of them ({two:.1f} runs a second)"
-    yield Row(f"table_1, {ALL:,} runs, 2 processes", "", result, f"<= {GOAL:g} min", minutes <= GOAL, how)
+    work = f"table_1, {ALL:,} runs, 2 processes"
+    reason = of_the_pace(work, minutes, "min", paces)
+    yield Row(work, "", result, f"<= {GOAL:g} min", minutes <= GOAL, how, reason)
     how = f"the same against {ALONE} replications in one process"
     yield Row("two processes", "one process", f"{two / one:.2g}x ({one:.1f} runs a second)", "", None, how)
 
