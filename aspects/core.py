@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -92,11 +93,23 @@ class JoinPoint:
         self.counts: dict[str, int] = {}
         self.memory: dict[Any, Any] = {}
         self.shared: dict[Any, Any] = {} if shared is None else shared
-        self.random: np.random.Generator = random_stream(weaver.seed, place or port, f"aspect {aspect}")
+        self._place = place or port
+        self._first: JoinPoint = self
         self._weaver = weaver
         self._forward = forward
         self._readings = readings or {}
         self._selections = selections or {}
+
+    @cached_property
+    def random(self) -> np.random.Generator:
+        """The random stream of the aspect at this port; many never ask for theirs."""
+        if self._first is not self:
+            return self._first.random
+        return random_stream(self._weaver.seed, self._place, f"aspect {self.aspect}")
+
+    def share(self, first: JoinPoint) -> None:
+        """Engine: the port has another connection, on which ``first`` stands: one stream, one memory."""
+        self._first, self.memory, self.counts = first, first.memory, first.counts
 
     @property
     def tag(self) -> Tag:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from .core import JoinPoint
 
+_AHEAD = 64
+
 
 def loses(point: JoinPoint, probability: float, spare_first: bool) -> bool:
     """Whether this token is lost, independently of all others (Bernoulli).
@@ -11,8 +13,7 @@ def loses(point: JoinPoint, probability: float, spare_first: bool) -> bool:
     One uniform number is drawn for every token, whatever the probability: runs at two probabilities from one seed lose
     nested sets of tokens.  With ``spare_first`` the tokens of the first tag at which any passes here are kept.
     """
-    lost = bool(point.random.random() < probability)
-    return spared(point, lost, spare_first)
+    return spared(point, _draw(point) < probability, spare_first)
 
 
 def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:
@@ -21,17 +22,33 @@ def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:
     ``worsens`` is the probability of good -> bad in a step, ``recovers`` that of bad -> good.  One uniform number is
     drawn for every token.
     """
-    draw = point.random.random()
+    draw = _draw(point)
     bad = point.memory.get("bad")
     if bad is None:
         bad = draw * (worsens + recovers) < worsens
     else:
         bad = draw >= recovers if bad else draw < worsens
     point.memory["bad"] = bad
-    return bool(bad)
+    return bad
 
 
 def spared(point: JoinPoint, lost: bool, spare_first: bool) -> bool:
     """``lost``, but false for the tokens of the first tag if these are to be kept."""
-    first = point.memory.setdefault("first tag", point.tag)
-    return lost and not (spare_first and first == point.tag)
+    if not spare_first:
+        return lost
+    first = point.memory.get("first tag")
+    if first is None:
+        point.memory["first tag"] = point.tag
+        return False
+    return lost and bool(point.tag != first)
+
+
+def _draw(point: JoinPoint) -> float:
+    """The next uniform number of the point's stream, from which nothing else may be drawn then.
+
+    They are drawn many at a time, which takes a tenth of the time, and gives the same numbers.
+    """
+    ahead: list[float] = point.memory.setdefault("drawn", [])
+    if not ahead:
+        ahead += point.random.random(_AHEAD)[::-1].tolist()
+    return ahead.pop()

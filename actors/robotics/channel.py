@@ -29,8 +29,9 @@ class BroadcastChannel(Actor):
             )
 
     def fire(self) -> None:
+        send, listeners = self.output.send, range(self.output.width)
         for speaker, tokens in enumerate(self.input.by_channel()):
             for token in tokens:
-                for listener in range(self.output.width):
+                for listener in listeners:
                     if listener != speaker:
-                        self.output.send(token, listener)
+                        send(token, listener)

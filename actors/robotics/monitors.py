@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import combinations
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
@@ -30,9 +29,9 @@ class GoalMonitor(Actor):
     def fire(self) -> None:
         position: list[float] = self.state.value.position.tolist()
         if self._last is not None:
-            self._length += separation(position, self._last)
+            self._length += math.dist(position, self._last)
         self._last = position
-        distance = separation(position, self.goal.tolist())
+        distance = math.dist(position, self.goal.tolist())
         self.path_length.send(self._length)
         self.distance.send(distance)
         if distance <= self.tolerance and not self._has_arrived:
@@ -50,7 +49,7 @@ class DistanceMonitor(Actor):
 
     def fire(self) -> None:
         if self.a.present and self.b.present:
-            self.distance.send(separation(self.a.value.position.tolist(), self.b.value.position.tolist()))
+            self.distance.send(math.dist(self.a.value.position.tolist(), self.b.value.position.tolist()))
 
 
 class SeparationMonitor(Actor):
@@ -63,9 +62,4 @@ class SeparationMonitor(Actor):
         # One state of each body: a state that was duplicated on its way is not two bodies at one place.
         positions = [states[-1].position.tolist() for states in self.bodies.by_channel() if states]
         if len(positions) >= 2:
-            self.distance.send(min(separation(a, b) for a, b in combinations(positions, 2)))
-
-
-def separation(a: Sequence[float], b: Sequence[float]) -> float:
-    """Metres between two points."""
-    return math.hypot(a[0] - b[0], a[1] - b[1])
+            self.distance.send(min(math.dist(a, b) for a, b in combinations(positions, 2)))

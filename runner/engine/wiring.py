@@ -324,8 +324,8 @@ class Wiring:
         first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)
-        else:  # another connection of the same port: one stream, one memory
-            point.random, point.memory, point.counts = first.random, first.memory, first.counts
+        else:
+            point.share(first)
         return point
 
     def _join(self, point: ActorPoint, woven: WovenAspect, weaver: Loom) -> None:
