@@ -57,6 +57,13 @@ _REDUCTION = 0.03  # of the barrier parameter from one minimisation to the next
 _CLOSE = 0.5  # decrease, in barrier parameters, that a minimisation but the last of them may leave
 _SHARE = 0.8  # of the way to the nearest limit that a step goes at most
 _NEWTON_STEPS = 40  # per barrier parameter
+_ALIKE = 1e-3  # m/s^2; starts that differ by less lead to the same plan
+# What bounds the time of problems that no scenario poses, see ``tests/numerics/robustness.py``.
+_HOPELESS = 1e3  # m^2; where squared violations sum up to more, it is enough to know them roughly:
+_ROUGH = 1e-3  # the share of them that a minimisation may leave, and
+_ROUGH_TO = 1e-5  # the barrier parameter, divided by them, at which restoration ends
+_MANY = 80  # limits and constraints from which on a minimisation may leave more
+_LITTLE = 0.1  # of what a minimisation may leave: a step that gains less is its last
 
 
 class Solution(NamedTuple):
@@ -226,10 +233,11 @@ def _objective(task: _Task, mu: float) -> float:
 
 
 @borrower
-def _evaluate(task: _Task, phase: float, mu: float, dual: float) -> float:
+def _evaluate(task: _Task, phase: float, mu: float, dual: float, limit: float) -> float:
     """The function the current phase minimises at the controls tried, with derivatives; inf outside its domain.
 
-    The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``_minimise``.
+    The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``_minimise``.  Where the
+    value is beyond ``limit``, it may be a smaller one that is so too.
     """
     plan, stages, constraints = task.plan, task.stages, task.constraints
     clear(stages)
@@ -251,28 +259,32 @@ def _evaluate(task: _Task, phase: float, mu: float, dual: float) -> float:
         if product < 1e-100:
             value -= mu * math.log(product)
             product = 1.0
+    if phase == _RESTORE:
+        for i in range(constraints.shape[0]):
+            s = int(constraints[i, WHEN])
+            if certainly_kept(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1]):
+                continue  # most are
+            h, gx, gy, hxx, hxy, hyy = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])
+            over = h - constraints[i, BOUND]
+            if not over <= 0.0:
+                value += 0.5 * over * over
+                add(stages, s, over, over, 1.0, gx, gy, hxx, hxy, hyy)
+                if value > limit:  # what is to come is not negative
+                    break
+        return value - mu * math.log(product)
     for i in range(constraints.shape[0]):
         s = int(constraints[i, WHEN])
-        if phase == _RESTORE and certainly_kept(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1]):
-            continue  # most are
         h, gx, gy, hxx, hxy, hyy = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])
         slack = constraints[i, BOUND] - h
-        if phase == _OPTIMISE:
-            if not slack > 0.0:
-                return math.inf
-            product *= slack
-            if not 1e-100 < product < 1e100:
-                value -= mu * math.log(product)
-                product = 1.0
-            slope = 1.0 / slack
-            add(stages, s, mu * slope, dual * slope, dual * slope * slope, gx, gy, hxx, hxy, hyy)
-        elif not slack >= 0.0:
-            value += 0.5 * slack * slack
-            add(stages, s, -slack, -slack, 1.0, gx, gy, hxx, hxy, hyy)
-    value -= mu * math.log(product)
-    if phase == _OPTIMISE:
-        value += _objective(task, mu)
-    return value
+        if not slack > 0.0:
+            return math.inf
+        product *= slack
+        if not 1e-100 < product < 1e100:
+            value -= mu * math.log(product)
+            product = 1.0
+        slope = 1.0 / slack
+        add(stages, s, mu * slope, dual * slope, dual * slope * slope, gx, gy, hxx, hxy, hyy)
+    return value - mu * math.log(product) + _objective(task, mu)
 
 
 @borrower
@@ -330,24 +342,29 @@ def _minimise(task: _Task, phase: float, mu: float, dual: float, tolerance: floa
     the central path, which lowers the slacks of active constraints to mu / dual of themselves and no further.  With
     the curvature of ``mu`` the step leaves the domain, and every reduction costs several more.
     """
-    value = _evaluate(task, phase, mu, dual)
+    value = _evaluate(task, phase, mu, dual, math.inf)
     if not value < math.inf:  # numbers too large to be squared, or none
         return 0
     for iteration in range(_NEWTON_STEPS):
         descent = newton_step(task.stages, task.period)
-        if not -0.5 * descent > tolerance:
+        hopeless = phase == _RESTORE and value > 0.5 * _HOPELESS
+        enough = max(tolerance, _ROUGH * value) if hopeless else tolerance
+        if not -0.5 * descent > enough:
             return iteration
         length = _longest(task, phase)
         while True:
             _try(task, length)
-            reached = _evaluate(task, phase, mu, mu)
-            if reached <= value + 0.05 * length * descent:
+            limit = value + 0.05 * length * descent
+            reached = _evaluate(task, phase, mu, mu, limit)
+            if reached <= limit:
                 break
             length *= 0.5
             if length < 1e-10:  # rounding hides any further descent
                 return iteration
         _keep(task)
-        value = reached
+        gained, value = value - reached, reached
+        if gained < _LITTLE * enough and (hopeless or phase == _OPTIMISE):  # else a kink may be all in the way
+            return iteration + 1
     return _NEWTON_STEPS
 
 
@@ -391,7 +408,7 @@ def _restore(task: _Task) -> tuple[int, float]:
     constraints = task.constraints
     for i in range(constraints.shape[0]):
         constraints[i, BOUND] = -_SLACK
-    iterations, least = 0, _RESTORE_TO
+    iterations, least, left = 0, _RESTORE_TO, 0.0
     mu = dual = _RESTORE_FROM
     while True:
         last = mu <= least
@@ -400,14 +417,17 @@ def _restore(task: _Task) -> tuple[int, float]:
         excess = _excess(task)
         if excess < 0.0:
             return iterations, 0.0
+        left = 0.0
+        for i in range(constraints.shape[0]):
+            left += max(0.0, constraints[i, VALUE]) ** 2
         if last and excess <= _SLACK:
             last, least = least == _RESTORE_ON, _RESTORE_ON
+        if left > _HOPELESS:
+            least = _ROUGH_TO * left
+            last = last or mu <= least
         if last or taken == _NEWTON_STEPS:  # in circles, as it would at smaller parameters
             break
         dual, mu = mu, max(_REDUCTION * mu, least)
-    left = 0.0
-    for i in range(constraints.shape[0]):
-        left += max(0.0, constraints[i, VALUE]) ** 2
     # A plan that touches a bound without breaking it still ranks behind a strictly feasible one.
     return iterations, max(left, TOLERANCE**2)
 
@@ -421,13 +441,16 @@ def _optimise(task: _Task) -> tuple[int, float]:
         value = constraints[i, VALUE]
         constraints[i, BOUND] = value + _SLACK if value >= 0.0 else 0.0
     count = 2 * task.plan.shape[0] + constraints.shape[0]
+    # With hundreds of constraints Newton's method crawls, as much curvature is cut off, long after what is left is
+    # small beside the gap, which is count times mu.
+    crowded = max(1.0, count / _MANY) ** 2
     objective = _objective(task, 0.0)
     iterations = 0
     mu = dual = max(1e-3, _OPTIMISE_FROM * abs(objective) / count)
     while True:
         least = _GAP * max(1e-2, abs(objective)) / count
         last = not mu > 1.1 * least  # also if it is not a number
-        iterations += _minimise(task, _OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * mu)
+        iterations += _minimise(task, _OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * crowded * mu)
         _excess(task)
         objective = _objective(task, 0.0)
         if last:
@@ -436,11 +459,23 @@ def _optimise(task: _Task) -> tuple[int, float]:
 
 
 @borrower
+def _alike(starts: Array, index: int) -> bool:
+    """Whether a start is nearly the one before."""
+    for s in range(starts.shape[1]):
+        for c in range(2):
+            if not abs(starts[index, s, c] - starts[index - 1, s, c]) < _ALIKE:
+                return False
+    return True
+
+
+@borrower
 def _search(task: _Task, starts: Array, best: Array) -> tuple[float, float, int]:
     """Write the best plan: (largest violation, objective, Newton steps); -inf is violated if no start can be used."""
     plan = task.plan
     least, iterations = math.inf, 0
     for index in range(starts.shape[0]):
+        if index > 0 and _alike(starts, index):
+            continue
         _brake(task, 0.5)
         for s in range(plan.shape[0]):
             for c in range(2):
