@@ -28,10 +28,6 @@ class _Standing(NamedTuple):
     velocity: Array
     controls: Array  # (N, 2) U_{t+1} .. U_{t+N}, as seen from made_at
 
-    def age(self, now: float, period: float) -> int:
-        """Periods that have passed since, N at most."""
-        return max(0, round(min((now - self.made_at) / period, len(self.controls))))
-
 
 class _Peers:
     """The latest plans of the other robots, as the kernels take them."""
@@ -151,7 +147,8 @@ class RobustController(Actor):
         problem, starts = self._problem(own, now)
         solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
-        if not all_finite(controls.ravel().tolist()):  # input so large that its squares are not finite
+        # Input may be so large that its squares are not finite.
+        if not violation < math.inf and not all_finite(controls.ravel().tolist()):
             controls, violation = starts[1], math.inf  # braking
         self._send(own, problem, controls, now)
         self._infeasible += violation > 0.0
@@ -185,9 +182,12 @@ class RobustController(Actor):
         position = np.array([x + period * vx, y + period * vy])
         vx, vy = vx + period * ux, vy + period * uy
         velocity, speed = np.array([vx, vy]), math.hypot(vx, vy)
+        standing = self._standing
         tube_centre, tube_radius, starts = self._standing_plan(
-            *self._standing[1:],
-            self._standing.age(now, period),
+            standing.position,
+            standing.velocity,
+            standing.controls,
+            now - standing.made_at,
             self._radius,
             velocity,
             speed,
@@ -220,5 +220,5 @@ class RobustController(Actor):
         target, steps = self._target, self._steps
         if target is None:
             return np.empty((0, steps, 2)), np.empty((0, steps, 3)), np.empty((0, 2)), np.empty(0)
-        age = max(0, round((now - self._target_at) / self.period))
-        return self._expected_target(target.mean, target.covariance, self._process_noise, self.period, age, steps)
+        elapsed = now - self._target_at
+        return self._expected_target(target.mean, target.covariance, self._process_noise, self.period, elapsed, steps)

@@ -119,7 +119,7 @@ class Plan:
         """Whether it can be rolled out: finite numbers, one control at least."""
         controls = self.controls
         shaped = controls.ndim == 2 and controls.shape[1] == 2 and len(controls) > 0
-        return shaped and all_finite([self.time, *controls.ravel().tolist()]) and self.state.finite
+        return shaped and math.isfinite(self.time) and all_finite(controls.ravel().tolist()) and self.state.finite
 
 
 def enclosing(path: str) -> str:

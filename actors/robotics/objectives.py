@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..core import Configurable, Parameter, array_parameter
 from .messages import Array
 
@@ -43,6 +41,5 @@ class Inform(Objective):
     joint = Parameter(bool, True, doc="count what all robots measure together; false: what this one measures")
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
-        # Where the other robots will be then; a copy, as the kernel takes rows that lie one after another.
-        others = problem.peer_mean[:, -1].copy() if self.joint else np.empty((0, 2))
+        others = problem.peer_mean if self.joint else problem.peer_mean[:0]
         return problem.to_inform(points, weights, others, self.variance, self.penalty, self.range)

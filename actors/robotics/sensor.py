@@ -32,10 +32,11 @@ class Sensor(Actor):
     robot_name = Parameter(str, "", doc="name in the measurement; empty: the path of what the sensor stands in")
 
     def initialize(self) -> None:
+        self._draw = self.random_stream("noise").standard_normal
         self._name = self.robot_name or enclosing(self.path)
 
     def fire(self) -> None:
-        error_along, error_across = self.random_stream("noise").standard_normal(2).tolist()
+        error_along, error_across = self._draw(2).tolist()
         if not (self.robot.present and self.target.present):
             return
         position = self.robot.value.position

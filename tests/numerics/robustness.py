@@ -102,7 +102,7 @@ def pose(random: np.random.Generator) -> Posed:
         goal=random.normal(scale=scale, size=2),
         sigma_positions=points,
         sigma_weights=np.append(0.0, np.full(8, 0.125)),
-        others_distance=information.pairwise_distance(points, peer_mean[:, -1].copy(), 2.0),
+        others_distance=information.pairwise_distance(points, peer_mean, 2.0),
         measurement_variance=2.0,
         range_penalty=float(random.choice([0.0, 1e-3, 1.0])),
         measurement_range=float(random.choice([0.0, 5.0, 30.0])),

@@ -81,7 +81,7 @@ def test_mutual_information(random: np.random.Generator, kappa: float) -> None:
         points = np.ascontiguousarray(points[:, :2])
         others = random.normal(scale=10.0, size=(int(random.integers(0, 4)), 2))
         own = random.normal(scale=10.0, size=2)
-        distance = information.pairwise_distance(points, others, 2.0)
+        distance = information.pairwise_distance(points, others[:, np.newaxis], 2.0)
 
         def negative(
             x: float, y: float, p: np.ndarray = points, w: np.ndarray = weights, d: np.ndarray = distance
@@ -228,7 +228,7 @@ def test_plans_from_time_immemorial_are_lost_in_the_distance_to_keep(made_at: fl
 def test_a_standing_plan_is_shifted_and_binds_as_far_as_it_reaches(random: np.random.Generator, age: int) -> None:
     controls, radius = random.normal(size=(10, 2)), np.arange(1.0, 11.0)
     position, velocity, moving = random.normal(size=2), random.normal(size=2), np.array([3.0, 4.0])
-    begun = position, velocity, controls, age, radius
+    begun = position, velocity, controls, 0.1 * age, radius
     centres, radii, (shifted, braking) = reachability.standing_plan(*begun, moving, 5.0, 8.0, 0.1)
     planned = horizon.trajectory(position, velocity, controls, 0.1, 10)
     assert centres[: 10 - age].tolist() == planned[age:].tolist()
@@ -243,7 +243,7 @@ def test_a_standing_plan_is_shifted_and_binds_as_far_as_it_reaches(random: np.ra
 def test_target_is_expected_where_prediction_takes_it(random: np.random.Generator, age: int) -> None:
     mean, covariance, noise = random.normal(size=4), spread(random, 4), np.diag([0.002, 0.002, 0.4, 0.4])
     transition = ukf.constant_velocity(0.1)
-    means, covariances, points, weights = reachability.expected_target(mean, covariance, noise, 0.1, age, 10)
+    means, covariances, points, weights = reachability.expected_target(mean, covariance, noise, 0.1, 0.1 * age, 10)
     every = reachability.propagate(mean, covariance, transition, noise, age + 10)
     assert means[0].tolist() == every[0][age:].tolist()
     assert covariances[0].tolist() == every[1][age:].tolist()

@@ -54,7 +54,7 @@ class HorizonProblem(NamedTuple):
     def to_inform(
         self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float
     ) -> HorizonProblem:
-        """The same problem with the objective of eq. (5), where ``others`` (n, 2) measure as well."""
+        """The same problem with the objective of eq. (5), where ``others`` (n, N, 2) end to measure as well."""
         return self._to(
             objective=INFORM,
             sigma_positions=points,

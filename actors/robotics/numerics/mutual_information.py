@@ -21,13 +21,14 @@ from .typing import Array
 
 @kernel
 def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) -> Array:
-    """``others_distance``: (M, M) from sigma points (M, 2) and the other robots' positions (n, 2)."""
-    count = sigma_positions.shape[0]
+    """``others_distance``: (M, M) from sigma points (M, 2) and the ends of the other robots' ways (n, N, 2)."""
+    count, last = sigma_positions.shape[0], robots.shape[1] - 1
     distance = np.zeros((count, count))
     ranges = np.empty(count)
     for r in range(robots.shape[0]):
         for i in range(count):
-            ranges[i] = math.hypot(sigma_positions[i, 0] - robots[r, 0], sigma_positions[i, 1] - robots[r, 1])
+            x, y = sigma_positions[i, 0] - robots[r, last, 0], sigma_positions[i, 1] - robots[r, last, 1]
+            ranges[i] = math.hypot(x, y)
         for i in range(count):
             for j in range(count):
                 distance[i, j] += (ranges[i] - ranges[j]) ** 2 / (2.0 * variance)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .compiled import kernel
+from .compiled import inner, kernel
 from .horizon import trajectory
 from .typing import Array
 from .ukf import constant_velocity, sigma_points
@@ -22,19 +22,25 @@ def tube_radius(initial: float, growth: float, step_length: float, steps: int) -
     return np.array([initial + growth * step_length * s for s in range(1, steps + 1)])
 
 
+@inner
+def _age(elapsed: float, period: float, oldest: float) -> int:
+    """How many periods have passed, ``oldest`` at most."""
+    return round(min(max(elapsed / period, 0.0), oldest))
+
+
 @kernel
 def standing_plan(
     position: Array,
     velocity: Array,
     controls: Array,
-    age: int,
+    elapsed: float,
     radius: Array,
     moving: Array,
     speed: float,
     max_acceleration: float,
     period: float,
 ) -> tuple[Array, Array, Array]:
-    """What a plan from ``position`` and ``velocity`` with ``controls`` (N, 2) is good for, ``age`` periods later.
+    """What a plan from ``position`` and ``velocity`` with ``controls`` (N, 2) is good for, ``elapsed`` seconds later.
 
     f3: centres (N, 2) and radii (N,) of the tube around it, which binds where the plan reaches, with the ``radius``
     (N,) of eq. (3), and is free beyond.
@@ -45,6 +51,7 @@ def standing_plan(
     steps = radius.shape[0]
     centres, radii, guesses = np.zeros((steps, 2)), np.empty(steps), np.zeros((2, steps, 2))
     planned = trajectory(position, velocity, controls, period, steps)
+    age = _age(elapsed, period, steps)
     for s in range(steps):
         radii[s] = math.inf
         if s < steps - age:
@@ -76,7 +83,7 @@ def peer_tubes(
     positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
     for i in range(count):
         px, py, vx, vy = plans[i, 0], plans[i, 1], plans[i, 2], plans[i, 3]
-        age = round(min(max((now - plans[i, 4]) / period, 0.0), OLDEST))
+        age = _age(now - plans[i, 4], period, OLDEST)
         planned = int(plans[i, 5])
         for k in range(age + steps):
             px += period * vx
@@ -127,15 +134,15 @@ def propagate(
 
 @kernel
 def expected_target(
-    mean: Array, covariance: Array, process_noise: Array, period: float, age: int, steps: int
+    mean: Array, covariance: Array, process_noise: Array, period: float, elapsed: float, steps: int
 ) -> tuple[Array, Array, Array, Array]:
-    """What f4 and eq. (5) need of a target with constant velocity that was estimated ``age`` periods ago.
+    """What f4 and eq. (5) need of a target with constant velocity that was estimated ``elapsed`` seconds ago.
 
     Means (1, N, 2) and covariances (1, N, 3) at steps 1..N from now on; the positions (M, 2) to which its sigma points
     have gone at step N, and their weights (M,).
     """
     # Copies, as tokens are read-only, and what they are handed to would be compiled once more for that.
-    now, spread = mean.copy(), covariance.copy()
+    now, spread, age = mean.copy(), covariance.copy(), _age(elapsed, period, OLDEST)
     means, covariances = propagate(now, spread, constant_velocity(period), process_noise, age + steps)
     points, weights = sigma_points(now, spread, 0.0)
     places, spreads, last = np.empty((1, steps, 2)), np.empty((1, steps, 3)), np.empty((points.shape[0], 2))

@@ -33,14 +33,14 @@ def compile_kernels() -> None:
 
 def _call_every_kernel() -> None:
     steps, period = 3, 0.1
-    model, pair = (constant_velocity(period), np.eye(4)), np.ones((1, 2))
+    model = constant_velocity(period), np.eye(4)
     mean, covariance, _ = predict_and_fuse(np.zeros(4), np.eye(4), *model, 0.0, np.zeros((1, 7)), True)
     for token in (mean, covariance):
         token.setflags(write=False)
-    means, covariances, sigma_positions, weights = expected_target(mean, covariance, np.eye(4), period, 0, steps)
+    means, covariances, sigma_positions, weights = expected_target(mean, covariance, np.eye(4), period, 0.0, steps)
     controls = np.zeros((steps, 2))
     zero, tube = np.zeros(2), tube_radius(0.2, 0.4, 1.0, steps)
-    centre, radius, starts = standing_plan(zero, zero, controls, 0, tube, zero, 0.0, 1.0, period)
+    centre, radius, starts = standing_plan(zero, zero, controls, 0.0, tube, zero, 0.0, 1.0, period)
     peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), 0.0, period, tube, 0.4, 1.0, 1.0)
     posed = HorizonProblem(
         period=period,
@@ -57,6 +57,6 @@ def _call_every_kernel() -> None:
         peer_mean=peer_mean + 200.0,
         peer_distance=peer_distance,
     )
-    problem = posed.to_inform(sigma_positions, weights, pair, 1.0, 1.0, 1.0).to_reach(np.ones(2))
+    problem = posed.to_inform(sigma_positions, weights, peer_mean, 1.0, 1.0, 1.0).to_reach(np.ones(2))
     violations(problem, controls)
     solve(problem, starts)
