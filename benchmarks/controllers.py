@@ -124,9 +124,12 @@ def filters() -> Iterator[Row]:
     random = np.random.default_rng(7)
     noise = np.diag([0.002, 0.002, 0.4, 0.4])
     prior = np.array([10.0, 0.0, 0.0, 0.0]), np.diag([4.0, 4.0, 4.0, 4.0])
-    kinds, transition = np.full(count, float(ukf.RELATIVE_POSITION)), ukf.constant_velocity(0.1)
+    transition = ukf.constant_velocity(0.1)
     observers = random.uniform(-20.0, 30.0, size=(steps, count, 2))
     values = np.array([12.0, 0.0]) - observers + random.normal(size=observers.shape)
+    # Their deviations are in the ellipse.
+    kinds, unused = np.full((steps, count, 1), ukf.RELATIVE_POSITION), np.zeros((steps, count, 2))
+    measurements = np.concatenate([kinds, observers, values, unused], axis=2)
     ellipse = np.array([[1.0, 0.3, 2.0]] * count)
     stacked = np.kron(np.eye(count), [[1.0, 0.3], [0.3, 2.0]])
     ended: dict[str, tuple[np.ndarray, np.ndarray]] = {}
@@ -135,7 +138,7 @@ def filters() -> Iterator[Row]:
         mean, covariance = prior
         for step in range(steps):
             mean, covariance = ukf.predict(mean, covariance, transition, noise)
-            mean, covariance = ukf.update(mean, covariance, 0.0, kinds, observers[step], values[step], ellipse)
+            mean, covariance = ukf.update(mean, covariance, 0.0, measurements[step], ellipse)
         ended[OURS] = mean, covariance
 
     def theirs() -> None:

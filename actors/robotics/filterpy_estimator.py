@@ -72,8 +72,7 @@ class FilterPyEstimator(_Estimator):
             points, weights = sigma_points(mean, covariance, 0.0)
         else:
             points, weights = np.array(mean)[np.newaxis], np.ones(1)
-        rows = self._rows(measurements)
-        return measurement_noise(points, weights, rows[:, 0].copy(), rows[:, 1:3].copy(), rows[:, 5:].copy())
+        return measurement_noise(points, weights, self._rows(measurements))
 
     def _fuse(self, measurement: Measurement, noise: Array) -> None:
         observer, ranged = measurement.observer, measurement.kind == RANGE

@@ -60,7 +60,8 @@ def test_200_steps_agree_with_filterpy(kind: int) -> None:
             observers, values = measure(random, kind, count)
             width = 1 if kind == ukf.RANGE else 2
             noise = np.zeros((width * count, width * count))
-            noises = noise_along(mean, kind, observers, np.tile([0.2, 2.0], (count, 1)))
+            rows = table(kind, observers, values, 0.2, 2.0)
+            noises = noise_along(mean, rows)
             for row, (xx, xy, yy) in enumerate(noises):
                 block = np.array([[xx, xy], [xy, yy]])[:width, :width]
                 noise[width * row : width * (row + 1), width * row : width * (row + 1)] = block
@@ -71,24 +72,20 @@ def test_200_steps_agree_with_filterpy(kind: int) -> None:
 
             oracle.sigmas_f = points.sigma_points(oracle.x, oracle.P)
             oracle.update(values[:, :width].ravel(), R=noise, hx=observe)
-            mean, covariance = ukf.update(
-                mean,
-                covariance,
-                0.0,
-                np.full(count, float(kind)),
-                observers,
-                values,
-                noises,
-            )
+            mean, covariance = ukf.update(mean, covariance, 0.0, rows, noises)
         assert mean == pytest.approx(oracle.x, abs=1e-9)
         assert covariance == pytest.approx(oracle.P, abs=1e-9)
 
 
-def noise_along(mean: np.ndarray, kind: int, observers: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+def table(kind: int, observers: np.ndarray, values: np.ndarray, along: float, across: float) -> np.ndarray:
+    """Measurements of one kind as the kernels take them."""
+    count = len(observers)
+    return np.column_stack([np.full(count, kind), observers, values, np.full(count, along), np.full(count, across)])
+
+
+def noise_along(mean: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """The noise ellipses turned along the directions to the mean."""
-    return ukf.measurement_noise(
-        mean[np.newaxis], np.ones(1), np.full(len(observers), float(kind)), observers, deviations
-    )
+    return ukf.measurement_noise(mean[np.newaxis], np.ones(1), rows)
 
 
 def test_expected_noise_is_the_average_over_the_sigma_points() -> None:
@@ -99,14 +96,15 @@ def test_expected_noise_is_the_average_over_the_sigma_points() -> None:
         along = point[:2] / np.linalg.norm(point[:2])
         across = np.array([-along[1], along[0]])
         expected += weight * (0.04 * np.outer(along, along) + 4.0 * np.outer(across, across))
-    noises = ukf.measurement_noise(points, weights, np.zeros(1), np.zeros((1, 2)), np.array([[0.2, 2.0]]))
+    origin = np.zeros((1, 2))
+    noises = ukf.measurement_noise(points, weights, table(ukf.RELATIVE_POSITION, origin, origin, 0.2, 2.0))
     assert noises[0] == pytest.approx([expected[0, 0], expected[0, 1], expected[1, 1]])
     assert noises[0, 0] + noises[0, 2] == pytest.approx(0.04 + 4.0)  # turning keeps the trace
 
 
 def test_measurement_noise_is_an_ellipse_along_the_line_of_sight() -> None:
-    place, deviations = np.zeros((1, 2)), np.array([[0.2, 2.0]])
-    ((xx, xy, yy),) = noise_along(np.array([3.0, 4.0]), ukf.RELATIVE_POSITION, place, deviations)
+    origin = np.zeros((1, 2))
+    ((xx, xy, yy),) = noise_along(np.array([3.0, 4.0]), table(ukf.RELATIVE_POSITION, origin, origin, 0.2, 2.0))
     values, vectors = np.linalg.eigh([[xx, xy], [xy, yy]])
     assert values == pytest.approx([0.04, 4.0])
     assert abs(vectors[:, 0] @ [0.6, 0.8]) == pytest.approx(1.0)
@@ -124,14 +122,11 @@ def test_covariance_stays_positive_definite(
     random = np.random.default_rng(seed)
     kind = ukf.RANGE if ranged else ukf.RELATIVE_POSITION
     mean, covariance = np.array([10.0, 0.0, 0.0, 0.0]), np.diag([10.0**prior, 10.0**prior, 4.0, 4.0])
-    deviations = np.tile([10.0**along, 10.0**across], (count, 1))
     for step in range(12):
         mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.1), PROCESS_NOISE)
         if step % 3 != 2:  # a gap now and then
-            observers, values = measure(random, kind, count)
-            kinds = np.full(count, float(kind))
-            noises = noise_along(mean, kind, observers, deviations)
-            mean, covariance = ukf.update(mean, covariance, 0.0, kinds, observers, values, noises)
+            rows = table(kind, *measure(random, kind, count), 10.0**along, 10.0**across)
+            mean, covariance = ukf.update(mean, covariance, 0.0, rows, noise_along(mean, rows))
         assert np.isfinite(mean).all()
         assert (covariance == covariance.T).all()
         # From sizes 1e8 and more, the smallest eigenvalue is known up to rounding of the largest only.
@@ -141,17 +136,15 @@ def test_covariance_stays_positive_definite(
 
 def test_huge_prior_and_tiny_noise_are_positive_definite_strictly() -> None:
     mean, covariance = np.zeros(4), np.diag([1e8, 1e8, 4.0, 4.0])
-    one = np.ones((1, 2))
+    rows = table(ukf.RELATIVE_POSITION, np.zeros((1, 2)), np.ones((1, 2)), 1e-3, 1e-3)
     for _ in range(50):
-        noises = np.array([[1e-6, 0.0, 1e-6]])
-        mean, covariance = ukf.update(mean, covariance, 0.0, np.zeros(1), 0.0 * one, one, noises)
+        mean, covariance = ukf.update(mean, covariance, 0.0, rows, np.array([[1e-6, 0.0, 1e-6]]))
         mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.1), PROCESS_NOISE)
         assert np.linalg.eigvalsh(covariance)[0] > 0.0
 
 
 def test_no_measurement_changes_nothing() -> None:
-    empty = np.empty((0, 2))
-    mean, covariance = ukf.update(*PRIOR, 0.0, np.empty(0), empty, empty, empty)
+    mean, covariance = ukf.update(*PRIOR, 0.0, np.empty((0, 7)), np.empty((0, 3)))
     assert (mean == PRIOR[0]).all()
     assert (covariance == PRIOR[1]).all()
 
@@ -159,13 +152,11 @@ def test_no_measurement_changes_nothing() -> None:
 @pytest.mark.parametrize("averaged", [True, False])
 def test_a_step_is_prediction_noise_and_update_in_turn(averaged: bool) -> None:
     random, transition = np.random.default_rng(3), ukf.constant_velocity(0.1)
-    kinds, observers, values = np.array([0.0, 1.0, 0.0]), random.normal(size=(3, 2)), random.normal(size=(3, 2))
-    deviations = random.uniform(0.1, 2.0, size=(3, 2))
-    rows = np.column_stack([kinds, observers, values, deviations])
+    observed, deviations = random.normal(size=(3, 4)), random.uniform(0.1, 2.0, size=(3, 2))
+    rows = np.column_stack([[0.0, 1.0, 0.0], observed, deviations])
     predicted = ukf.predict(*PRIOR, transition, PROCESS_NOISE)
     points, weights = ukf.sigma_points(*predicted, 0.0) if averaged else (predicted[0][np.newaxis], np.ones(1))
-    noises = ukf.measurement_noise(points, weights, kinds, observers, deviations)
-    expected = ukf.update(*predicted, 0.5, kinds, observers, values, noises)
+    expected = ukf.update(*predicted, 0.5, rows, ukf.measurement_noise(points, weights, rows))
     mean, covariance, fused = ukf.predict_and_fuse(*PRIOR, transition, PROCESS_NOISE, 0.5, rows, averaged)
     assert (mean.tolist(), covariance.tolist(), fused) == (expected[0].tolist(), expected[1].tolist(), True)
     # Without measurements, and where the result would not be finite, the prediction stands.

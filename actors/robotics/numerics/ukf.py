@@ -12,6 +12,13 @@ from .typing import Array
 RELATIVE_POSITION = 0
 RANGE = 1
 
+# Columns of a table of measurements, one a row.
+_KIND = 0
+_OBSERVER = 1  # x, y
+_VALUE = 3  # x, y from there to the target, or the range and anything
+_ALONG = 5  # standard deviations along the line of sight
+_ACROSS = 6  # and across it; no part of a range
+
 
 @inner
 def _root(covariance: Array) -> Array:
@@ -101,23 +108,23 @@ def predict(mean: Array, covariance: Array, transition: Array, process_noise: Ar
 
 
 @kernel
-def measurement_noise(points: Array, weights: Array, kinds: Array, observers: Array, deviations: Array) -> Array:
-    """Covariances (m, 3) as (xx, xy, yy) of m measurements of a target at ``points`` (M, n); of a range xx counts.
+def measurement_noise(points: Array, weights: Array, measurements: Array) -> Array:
+    """Covariances (m, 3) as (xx, xy, yy) of measurements (m, 7) of a target at ``points`` (M, n); of a range xx counts.
 
-    A relative position has deviation ``deviations[m, 0]`` (sigma_d) on the line of sight and ``deviations[m, 1]``
-    (sigma_b) across it, so its covariance depends on where the target is.  It is averaged over the points.  With
-    the sigma points it is the expected covariance: near a target whose direction is uncertain the ellipse is
-    rounder than the one turned along the mean, which would let the large deviation leak into the small one.  With
-    the mean as the only point it is that ellipse.
+    A relative position has one deviation (sigma_d) on the line of sight and another (sigma_b) across it, so its
+    covariance depends on where the target is.  It is averaged over the points.  With the sigma points it is the
+    expected covariance: near a target whose direction is uncertain the ellipse is rounder than the one turned along
+    the mean, which would let the large deviation leak into the small one.  With the mean as the only point it is that
+    ellipse.
     """
-    noises = np.zeros((kinds.shape[0], 3))
-    for m in range(kinds.shape[0]):
-        a, b = deviations[m, 0] ** 2, deviations[m, 1] ** 2
-        if kinds[m] == RANGE:
+    noises = np.zeros((measurements.shape[0], 3))
+    for m in range(measurements.shape[0]):
+        a, b = measurements[m, _ALONG] ** 2, measurements[m, _ACROSS] ** 2
+        if measurements[m, _KIND] == RANGE:
             noises[m, 0] = a
             continue
         for i in range(points.shape[0]):
-            dx, dy = points[i, 0] - observers[m, 0], points[i, 1] - observers[m, 1]
+            dx, dy = points[i, 0] - measurements[m, _OBSERVER], points[i, 1] - measurements[m, _OBSERVER + 1]
             length = math.hypot(dx, dy)
             nx, ny = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
             noises[m, 0] += weights[i] * (a * nx * nx + b * ny * ny)
@@ -127,16 +134,8 @@ def measurement_noise(points: Array, weights: Array, kinds: Array, observers: Ar
 
 
 @kernel
-def update(
-    mean: Array,
-    covariance: Array,
-    kappa: float,
-    kinds: Array,
-    observers: Array,
-    values: Array,
-    noises: Array,
-) -> tuple[Array, Array]:
-    """Fuse m measurements at once: kinds (m,), observers' positions (m, 2), values (m, 2), noises (m, 3).
+def update(mean: Array, covariance: Array, kappa: float, measurements: Array, noises: Array) -> tuple[Array, Array]:
+    """Fuse measurements (m, 7) with covariances ``noises`` (m, 3), all at once.
 
     Stacking them makes the result independent of their order up to rounding.  The posterior covariance is built as
     sum_i w_i e_i e_i^T + K R K^T with e_i = (x_i - x) - K (z_i - z), which is C - K S K^T written so that rounding
@@ -146,29 +145,29 @@ def update(
     points, weights = sigma_points(mean, covariance, kappa)
     count = points.shape[0]
     rows = 0
-    for m in range(kinds.shape[0]):
-        rows += 1 if kinds[m] == RANGE else 2
+    for m in range(measurements.shape[0]):
+        rows += 1 if measurements[m, _KIND] == RANGE else 2
     if rows == 0:
         return mean.copy(), covariance.copy()
     noise = np.zeros((rows, rows))
     images = np.empty((count, rows))
     observed = np.empty(rows)
     row = 0
-    for m in range(kinds.shape[0]):
-        kind = int(kinds[m])
+    for m in range(measurements.shape[0]):
+        x, y = measurements[m, _OBSERVER], measurements[m, _OBSERVER + 1]
         noise[row, row] = noises[m, 0]
-        observed[row] = values[m, 0]
-        if kind == RANGE:
+        observed[row] = measurements[m, _VALUE]
+        if measurements[m, _KIND] == RANGE:
             for i in range(count):
-                images[i, row] = math.hypot(points[i, 0] - observers[m, 0], points[i, 1] - observers[m, 1])
+                images[i, row] = math.hypot(points[i, 0] - x, points[i, 1] - y)
             row += 1
         else:
             noise[row, row + 1] = noise[row + 1, row] = noises[m, 1]
             noise[row + 1, row + 1] = noises[m, 2]
-            observed[row + 1] = values[m, 1]
+            observed[row + 1] = measurements[m, _VALUE + 1]
             for i in range(count):
-                images[i, row] = points[i, 0] - observers[m, 0]
-                images[i, row + 1] = points[i, 1] - observers[m, 1]
+                images[i, row] = points[i, 0] - x
+                images[i, row + 1] = points[i, 1] - y
             row += 2
     expected = np.zeros(rows)
     for i in range(count):
@@ -221,29 +220,20 @@ def predict_and_fuse(
     measurements: Array,
     averaged: bool,
 ) -> tuple[Array, Array, bool]:
-    """``predict``, then ``update`` with the rows of ``measurements`` (m, 7), and whether anything was fused.
+    """``predict``, then ``update`` with measurements (m, 7), and whether anything was fused.
 
-    A row holds the kind, the observer's position, the value (of a range the first counts), and the deviations along and
-    across the line of sight.  All noises are as seen from the prediction, and ``averaged`` over its sigma points, or
-    turned along its mean.  Where the result would not be finite, the prediction stands.
+    All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  Where
+    the result would not be finite, the prediction stands.
     """
     mean, covariance = predict(mean, covariance, transition, process_noise)
-    count = measurements.shape[0]
-    if count == 0:
+    if measurements.shape[0] == 0:
         return mean, covariance, False
-    kinds = np.empty(count)
-    observers, values, deviations = np.empty((count, 2)), np.empty((count, 2)), np.empty((count, 2))
-    for m in range(count):
-        kinds[m] = measurements[m, 0]
-        for c in range(2):
-            observers[m, c], values[m, c] = measurements[m, 1 + c], measurements[m, 3 + c]
-            deviations[m, c] = measurements[m, 5 + c]
     points, weights = sigma_points(mean, covariance, 0.0)
     if not averaged:
         points, weights = points[:1], weights[:1]
         weights[0] = 1.0  # of the mean
-    noises = measurement_noise(points, weights, kinds, observers, deviations)
-    fused, spread = update(mean, covariance, kappa, kinds, observers, values, noises)
+    noises = measurement_noise(points, weights, measurements)
+    fused, spread = update(mean, covariance, kappa, measurements, noises)
     if _finite(fused, spread):
         return fused, spread, True
     return mean, covariance, False
