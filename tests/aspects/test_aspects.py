@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import pytest
 from scipy.stats import binom
 
+from epicycle.actors import random_stream
 from epicycle.aspects import Aspect, CommunicationAspect, JoinPoint
 from epicycle.runner.engine import ActorError, Results, Simulation
 from epicycle.runner.model import load_model
@@ -122,6 +123,12 @@ def test_an_aspect_does_not_move_the_stream_of_another() -> None:
     assert lost(pair(packets(0.3), failure), "b.input") == alone
     assert lost(pair(packets(0.3, '"b.input"')), "b.input") == alone
     assert lost(pair(packets(0.3, name="other")), "b.input") != alone
+
+
+def test_losses_take_one_number_of_the_stream_for_each_token() -> None:
+    random = random_stream(1, "b.input", "aspect loss")
+    expected = {tick for tick in range(TICKS) if random.random() < 0.3}
+    assert lost(pair(packets(0.3)), "b.input") == expected
 
 
 @pytest.mark.parametrize("seed", [1, 2])
