@@ -21,7 +21,7 @@ newton = importlib.import_module(PREFIX + "newton")
 # Called by kernels only; numba looks them up as globals.
 new_stages, newton_step = newton.new_stages, newton.newton_step
 POSITION, VELOCITY, CONTROL, STEP = newton.POSITION, newton.VELOCITY, newton.CONTROL, newton.STEP
-constraints_of = constraints.constraints_of
+constraints_of, ROUNDING = constraints.constraints_of, constraints.ROUNDING
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -317,7 +317,7 @@ def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, st
 @numba.njit
 def kept_and_all(*fields: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     problem = HorizonProblem(*fields)
-    every, kept = constraints_of(problem, True)[:, :2].astype(np.int64), constraints_of(problem, False).astype(np.int64)
+    every, kept = constraints_of(problem, np.inf).astype(np.int64), constraints_of(problem, ROUNDING).astype(np.int64)
     return every[:, 0], every[:, 1], kept[:, 0], kept[:, 1]
 
 

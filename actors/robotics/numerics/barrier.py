@@ -31,13 +31,13 @@ from .constraints import (
     MARGIN,
     NEED,
     PLACE,
+    ROUNDING,
     ROW,
     VALUE,
     WHEN,
     certainly_kept,
     constraints_of,
     term,
-    violations,
 )
 from .horizon import REACH_GOAL, HorizonProblem
 from .mutual_information import informed, new_points
@@ -109,7 +109,7 @@ class _Task(NamedTuple):
 
 
 @inner
-def _new_task(problem: HorizonProblem, steps: int) -> _Task:
+def _new_task(problem: HorizonProblem, steps: int, spare: float) -> _Task:
     plan = np.zeros((steps, _COLUMNS))
     informs = problem.objective != REACH_GOAL and problem.obstacle_mean.shape[0] > 0
     if informs:
@@ -124,7 +124,7 @@ def _new_task(problem: HorizonProblem, steps: int) -> _Task:
         problem.max_speed, problem.max_acceleration, problem.objective == REACH_GOAL, problem.goal[0], problem.goal[1],
         informs,
         problem.measurement_variance, problem.range_penalty, problem.measurement_range,
-        plan, new_stages(steps), constraints_of(problem, False), points,
+        plan, new_stages(steps), constraints_of(problem, spare), points,
     )  # fmt: skip
 
 
@@ -469,41 +469,6 @@ def _alike(starts: Array, index: int) -> bool:
 
 
 @borrower
-def _search(task: _Task, starts: Array, best: Array) -> tuple[float, float, int]:
-    """Write the best plan: (largest violation, objective, Newton steps); -inf is violated if no start can be used."""
-    plan = task.plan
-    least, iterations = math.inf, 0
-    for index in range(starts.shape[0]):
-        if index > 0 and _alike(starts, index):
-            continue
-        _brake(task, 0.5)
-        for s in range(plan.shape[0]):
-            for c in range(2):
-                plan[s, _TAKEN + c] = (1.0 - _CENTRING) * starts[index, s, c] + _CENTRING * plan[s, _TAKEN + c]
-        if not _inside(task):
-            continue
-        left = 0.0
-        if not _excess(task) < 0.0:
-            taken, left = _restore(task)
-            iterations += taken
-        if left < least:
-            least = left
-            _read(plan, best)
-        if least == 0.0:
-            break
-    if least == math.inf:
-        _brake(task, 0.999)
-        _read(plan, best)
-        return -math.inf, math.inf, iterations
-    for s in range(plan.shape[0]):
-        plan[s, _TAKEN], plan[s, _TAKEN + 1] = best[s, 0], best[s, 1]
-    taken, objective = _optimise(task)
-    _read(plan, best)
-    largest = _excess(task)
-    return largest if largest > TOLERANCE else 0.0, objective, iterations + taken
-
-
-@borrower
 def _read(plan: Array, controls: Array) -> None:
     """Write the controls taken."""
     for s in range(plan.shape[0]):
@@ -525,9 +490,35 @@ def solve(problem: HorizonProblem, starts: Array) -> Solution:
 def _solve(*fields: Any) -> tuple[Array, float, float, int]:
     """The fields of the problem, then the starts."""
     problem, starts = HorizonProblem(*fields[:-1]), fields[-1]
-    best = np.empty((starts.shape[1], 2))
-    violation, objective, iterations = _search(_new_task(problem, starts.shape[1]), starts, best)
-    if violation < 0.0:  # what is out of reach is so within f1 and f2 only
-        largest = violations(problem, best).max()
-        violation = max(0.0, largest) if largest < math.inf else math.inf
-    return best, violation, objective, iterations
+    task, best = _new_task(problem, starts.shape[1], ROUNDING), np.empty(starts.shape[1:])
+    plan = task.plan
+    least, iterations = math.inf, 0
+    for index in range(starts.shape[0]):
+        if index > 0 and _alike(starts, index):
+            continue
+        _brake(task, 0.5)
+        for s in range(plan.shape[0]):
+            for c in range(2):
+                plan[s, _TAKEN + c] = (1.0 - _CENTRING) * starts[index, s, c] + _CENTRING * plan[s, _TAKEN + c]
+        if not _inside(task):
+            continue
+        left = 0.0
+        if not _excess(task) < 0.0:
+            taken, left = _restore(task)
+            iterations += taken
+        if left < least:
+            least = left
+            _read(plan, best)
+        if least == 0.0:
+            break
+    if least == math.inf:
+        task = _new_task(problem, starts.shape[1], math.inf)  # what is out of reach is so within f1 and f2 only
+        _brake(task, 0.999)
+        _read(task.plan, best)
+        return best, max(0.0, _excess(task)), math.inf, iterations
+    for s in range(plan.shape[0]):
+        plan[s, _TAKEN], plan[s, _TAKEN + 1] = best[s, 0], best[s, 1]
+    taken, objective = _optimise(task)
+    _read(plan, best)
+    largest = _excess(task)
+    return best, largest if largest > TOLERANCE else 0.0, objective, iterations + taken

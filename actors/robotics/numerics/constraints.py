@@ -11,7 +11,7 @@ from .horizon import HorizonProblem, roll_out
 from .terms import Term, keep_away, keep_away_uncertain, stay_near
 from .typing import Array
 
-_ROUNDING = 1e-6  # m; a constraint that is kept by less than this is not left out
+ROUNDING = 1e-6  # m; a constraint that is kept by less than this is not left out
 
 
 # Columns of a table of constraints, each at one step, one a row: what a solver walks through at every step of its own.
@@ -27,15 +27,18 @@ _COLUMNS = 11
 
 
 @inner
-def constraints_of(problem: HorizonProblem, every: bool) -> Array:
-    """All that bind, or those of them within reach.  Steps 1 and 2 are decided before U_{t+1} acts: none bind there."""
+def constraints_of(problem: HorizonProblem, spare: float) -> Array:
+    """All that bind but those that any plan keeps by more than ``spare``, which may be inf.
+
+    Steps 1 and 2 are decided before U_{t+1} acts: none bind there.
+    """
     steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
     table = np.empty(((1 + obstacles + peers) * steps, _COLUMNS))
-    return table[: _fill(problem, table, every)]
+    return table[: _fill(problem, table, spare)]
 
 
 @borrower
-def _fill(problem: HorizonProblem, table: Array, every: bool) -> int:
+def _fill(problem: HorizonProblem, table: Array, spare: float) -> int:
     """Write the constraints; returns how many they are."""
     steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
     count = 0
@@ -53,41 +56,43 @@ def _fill(problem: HorizonProblem, table: Array, every: bool) -> int:
             else:
                 i = r - 1 - obstacles
                 x, y, need = problem.peer_mean[i, s, 0], problem.peer_mean[i, s, 1], problem.peer_distance[i, s]
+            most = need
+            if margin != 0.0:
+                centre, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
+                most += margin * math.sqrt(max(centre + math.sqrt(half * half + xy * xy), 0.0))
+            if not _within_reach(problem, r == 0, s, x, y, most, spare):
+                continue
             table[count, ROW], table[count, WHEN] = r, s
             table[count, PLACE], table[count, PLACE + 1], table[count, NEED] = x, y, need
             table[count, MARGIN], table[count, _COVARIANCE] = margin, xx
             table[count, _COVARIANCE + 1], table[count, _COVARIANCE + 2] = xy, yy
             table[count, BOUND] = table[count, VALUE] = 0.0
-            if every or _within_reach(problem, table, count):
-                count += 1
+            count += 1
     return count
 
 
 @borrower
-def _within_reach(problem: HorizonProblem, table: Array, i: int) -> bool:
-    """Whether a plan within f1 and f2 can break the i-th constraint.
+def _within_reach(
+    problem: HorizonProblem, near: bool, s: int, x: float, y: float, distance: float, spare: float
+) -> bool:
+    """Whether a plan within f1 and f2 can break a constraint at step s, or keep it by less than ``spare``.
 
-    Leaving out a constraint that every such plan keeps changes no optimum.  Step s (counted from 0) lies at
-    ``P + s h V + h^2 sum_{j < s - 1} (s - 1 - j) U_j``.  As |U_j| <= Amax, this is at most
-    ``Amax h^2 s (s - 1) / 2`` from ``P + s h V``; and as the speed is at most Vmax from the second step on, it is at
-    most ``(s - 1) h Vmax`` from ``P + h V``.  A distance to a point changes by no more than that, and the deviation
-    along any direction is at most the root of the covariance's largest eigenvalue.
+    The constraint is to stay ``near`` (x, y), or away from it.  Leaving out one that every such plan keeps changes no
+    optimum.  Step s (counted from 0) lies at ``P + s h V + h^2 sum_{j < s - 1} (s - 1 - j) U_j``.  As |U_j| <= Amax,
+    this is at most ``Amax h^2 s (s - 1) / 2`` from ``P + s h V``; and as the speed is at most Vmax from the second step
+    on, it is at most ``(s - 1) h Vmax`` from ``P + h V``.  A distance to a point changes by no more than that, and the
+    deviation along any direction is at most the root of the covariance's largest eigenvalue.
     """
     h = problem.period
     px, py = problem.position[0], problem.position[1]
     vx, vy = problem.velocity[0], problem.velocity[1]
-    s, x, y, need = table[i, WHEN], table[i, PLACE], table[i, PLACE + 1], table[i, NEED]
-    if table[i, MARGIN] != 0.0:
-        xx, mixed, yy = table[i, _COVARIANCE], table[i, _COVARIANCE + 1], table[i, _COVARIANCE + 2]
-        mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
-        need += table[i, MARGIN] * math.sqrt(max(mean + math.sqrt(half * half + mixed * mixed), 0.0))
     driven = math.sqrt((px + s * h * vx - x) ** 2 + (py + s * h * vy - y) ** 2)
     pushed = 0.5 * problem.max_acceleration * h * h * s * (s - 1.0)
     begun = math.sqrt((px + h * vx - x) ** 2 + (py + h * vy - y) ** 2)
     raced = (s - 1.0) * h * problem.max_speed
-    if table[i, ROW] == 0.0:
-        return not min(driven + pushed, begun + raced) < need - _ROUNDING
-    return not max(driven - pushed, begun - raced) > need + _ROUNDING
+    if near:
+        return not min(driven + pushed, begun + raced) < distance - spare
+    return not max(driven - pushed, begun - raced) > distance + spare
 
 
 @inlined
@@ -121,7 +126,7 @@ def violations(problem: HorizonProblem, controls: Array) -> Array:
     steps = controls.shape[0]
     positions, velocities = np.empty((steps, 2)), np.empty((steps, 2))
     roll_out(problem.position, problem.velocity, controls, problem.period, positions, velocities)
-    constraints = constraints_of(problem, True)
+    constraints = constraints_of(problem, math.inf)
     found = np.full((1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0], steps), -math.inf)
     for i in range(constraints.shape[0]):
         s = int(constraints[i, WHEN])

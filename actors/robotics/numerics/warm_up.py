@@ -9,7 +9,6 @@ import threading
 import numpy as np
 
 from .barrier import solve
-from .constraints import violations
 from .horizon import HorizonProblem
 from .reachability import expected_target, peer_tubes, standing_plan, tube_radius
 from .ukf import constant_velocity, predict_and_fuse
@@ -20,8 +19,8 @@ _PATIENCE = 1.0  # s before the wait is explained; loading the cached kernels is
 
 @functools.cache
 def compile_kernels() -> None:
-    """Call every kernel with small arrays; the first call of a process does it, later ones do nothing."""
-    message = "compiling the numeric kernels (once, about 30 s) ..."
+    """Call every kernel of a run with small arrays; the first call of a process does it, later ones do nothing."""
+    message = "compiling the numeric kernels (once, about 20 s) ..."
     notice = threading.Timer(_PATIENCE, _LOGGER.info, (message,))
     notice.daemon = True
     notice.start()
@@ -58,5 +57,4 @@ def _call_every_kernel() -> None:
         peer_distance=peer_distance,
     )
     problem = posed.to_inform(sigma_positions, weights, peer_mean, 1.0, 1.0, 1.0).to_reach(np.ones(2))
-    violations(problem, controls)
     solve(problem, starts)
