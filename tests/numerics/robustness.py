@@ -32,7 +32,7 @@ LIMIT = 8.0  # Vmax in m/s and Amax in m/s^2
 KINDS = ("plain", "inside", "at zero", "contradictory", "huge", "crowd", "fast", "not a number")
 
 BOUND = 20.0  # times the median
-SLOWEST, OTHERS, ROUNDS = 200, 1000, 5  # how many problems are timed again, and how often
+SLOWEST, OTHERS, ROUNDS = 200, 1000, 15  # how many problems are timed again, and how often
 
 Posed = tuple[str, Any, np.ndarray]
 

@@ -62,6 +62,7 @@ _ALIKE = 1e-3  # m/s^2; starts that differ by less lead to the same plan
 _HOPELESS = 1e3  # m^2; where squared violations sum up to more, it is enough to know them roughly:
 _ROUGH = 1e-3  # the share of them that a minimisation may leave, and
 _ROUGH_TO = 1e-5  # the barrier parameter, divided by them, at which restoration ends
+_ROUGH_STEPS = 20  # per barrier parameter, while they are
 _MANY = 80  # limits and constraints from which on a minimisation may leave more
 _LITTLE = 0.1  # of what a minimisation may leave: a step that gains less is its last
 
@@ -349,7 +350,7 @@ def _minimise(task: _Task, phase: float, mu: float, dual: float, tolerance: floa
         descent = newton_step(task.stages, task.period)
         hopeless = phase == _RESTORE and value > 0.5 * _HOPELESS
         enough = max(tolerance, _ROUGH * value) if hopeless else tolerance
-        if not -0.5 * descent > enough:
+        if not -0.5 * descent > enough or (hopeless and iteration == _ROUGH_STEPS):
             return iteration
         length = _longest(task, phase)
         while True:
