@@ -57,14 +57,12 @@ _REDUCTION = 0.03  # of the barrier parameter from one minimisation to the next
 _CLOSE = 0.5  # decrease, in barrier parameters, that a minimisation but the last of them may leave
 _SHARE = 0.8  # of the way to the nearest limit that a step goes at most
 _NEWTON_STEPS = 40  # per barrier parameter
-_ALIKE = 1e-3  # m/s^2; starts that differ by less lead to the same plan
 # What bounds the time of problems that no scenario poses, see ``tests/numerics/robustness.py``.
-_HOPELESS = 1e3  # m^2; where squared violations sum up to more, it is enough to know them roughly:
+_MANY = 80  # limits and constraints of all problems but crowds
+_HOPELESS = 1e3  # m^2; where a crowd's squared violations sum up to more, it is enough to know them roughly:
 _ROUGH = 1e-3  # the share of them that a minimisation may leave, and
 _ROUGH_TO = 1e-5  # the barrier parameter, divided by them, at which restoration ends
-_ROUGH_STEPS = 20  # per barrier parameter, while they are
-_MANY = 80  # limits and constraints from which on a minimisation may leave more
-_LITTLE = 0.1  # of what a minimisation may leave: a step that gains less is its last
+_LITTLE = 0.01  # of what a minimisation may leave: a step that gains less is its last
 
 
 class Solution(NamedTuple):
@@ -335,6 +333,23 @@ def _longest(task: _Task, phase: float) -> float:
 
 
 @borrower
+def _crowd(task: _Task) -> float:
+    """How much more than otherwise a minimisation of the objective may leave, 1 in all but crowds.
+
+    With hundreds of constraints Newton's method crawls, as much curvature is cut off, long after what is left is small
+    beside the gap, which is their number times the barrier parameter.
+    """
+    share: float = (2 * task.plan.shape[0] + task.constraints.shape[0]) / _MANY
+    return max(1.0, share) ** 2
+
+
+@borrower
+def _is_hopeless(task: _Task, squared: float) -> bool:
+    """Whether so much is violated in a crowd that the last digits of it tell nothing."""
+    return squared > _HOPELESS and _crowd(task) > 1.0
+
+
+@borrower
 def _minimise(task: _Task, phase: float, mu: float, dual: float, tolerance: float) -> int:
     """Newton's method with backtracking (0.05, 0.5) from the controls taken; returns the steps it took.
 
@@ -348,9 +363,9 @@ def _minimise(task: _Task, phase: float, mu: float, dual: float, tolerance: floa
         return 0
     for iteration in range(_NEWTON_STEPS):
         descent = newton_step(task.stages, task.period)
-        hopeless = phase == _RESTORE and value > 0.5 * _HOPELESS
+        hopeless = phase == _RESTORE and _is_hopeless(task, 2.0 * value)
         enough = max(tolerance, _ROUGH * value) if hopeless else tolerance
-        if not -0.5 * descent > enough or (hopeless and iteration == _ROUGH_STEPS):
+        if not -0.5 * descent > enough:
             return iteration
         length = _longest(task, phase)
         while True:
@@ -423,7 +438,7 @@ def _restore(task: _Task) -> tuple[int, float]:
             left += max(0.0, constraints[i, VALUE]) ** 2
         if last and excess <= _SLACK:
             last, least = least == _RESTORE_ON, _RESTORE_ON
-        if left > _HOPELESS:
+        if _is_hopeless(task, left):
             least = _ROUGH_TO * left
             last = last or mu <= least
         if last or taken == _NEWTON_STEPS:  # in circles, as it would at smaller parameters
@@ -442,31 +457,19 @@ def _optimise(task: _Task) -> tuple[int, float]:
         value = constraints[i, VALUE]
         constraints[i, BOUND] = value + _SLACK if value >= 0.0 else 0.0
     count = 2 * task.plan.shape[0] + constraints.shape[0]
-    # With hundreds of constraints Newton's method crawls, as much curvature is cut off, long after what is left is
-    # small beside the gap, which is count times mu.
-    crowded = max(1.0, count / _MANY) ** 2
+    crowd = _crowd(task)
     objective = _objective(task, 0.0)
     iterations = 0
     mu = dual = max(1e-3, _OPTIMISE_FROM * abs(objective) / count)
     while True:
         least = _GAP * max(1e-2, abs(objective)) / count
         last = not mu > 1.1 * least  # also if it is not a number
-        iterations += _minimise(task, _OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * crowded * mu)
+        iterations += _minimise(task, _OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * crowd * mu)
         _excess(task)
         objective = _objective(task, 0.0)
         if last:
             return iterations, objective
         dual, mu = mu, max(_REDUCTION * mu, least)
-
-
-@borrower
-def _alike(starts: Array, index: int) -> bool:
-    """Whether a start is nearly the one before."""
-    for s in range(starts.shape[1]):
-        for c in range(2):
-            if not abs(starts[index, s, c] - starts[index - 1, s, c]) < _ALIKE:
-                return False
-    return True
 
 
 @borrower
@@ -495,8 +498,6 @@ def _solve(*fields: Any) -> tuple[Array, float, float, int]:
     plan = task.plan
     least, iterations = math.inf, 0
     for index in range(starts.shape[0]):
-        if index > 0 and _alike(starts, index):
-            continue
         _brake(task, 0.5)
         for s in range(plan.shape[0]):
             for c in range(2):
