@@ -62,7 +62,7 @@ _MANY = 80  # limits and constraints of all problems but crowds
 _HOPELESS = 1e3  # m^2; where a crowd's squared violations sum up to more, it is enough to know them roughly:
 _ROUGH = 1e-3  # the share of them that a minimisation may leave, and
 _ROUGH_TO = 1e-5  # the barrier parameter, divided by them, at which restoration ends
-_LITTLE = 0.01  # of what a minimisation may leave: a step that gains less is its last
+_LITTLE = 1e-3  # of what a minimisation may leave: a step that gains less is its last
 
 
 class Solution(NamedTuple):
