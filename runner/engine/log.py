@@ -99,10 +99,10 @@ class EventLog:
 
     def _new_writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
         head = b"".join(map(canonical, (event, actor, port, aspect, channel)))
-        pieces, keep = self._pieces, self._tokens.keep
+        pieces, tokens = self._pieces, self._tokens
 
         def write(tag: Tag, value: Any) -> None:
-            kept = value if type(value) is float else keep(value)  # raises what cannot be logged
+            kept = tokens[type(value)](value)  # raises what cannot be logged
             if tag is not self._tag:
                 self._turn_to(tag)
             pieces.extend((self._stamp, head, kept))

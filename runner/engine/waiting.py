@@ -17,15 +17,22 @@ from .encoding import canonical, encoders, field_values
 
 LARGE = 10_000  # bytes of a token, more or less: those above do not wait, lest a thousand of them fill the memory
 _BEYOND = LARGE + 1
+_SMALL = frozenset({float, bool, type(None), np.float64})
+_AT_ONCE = _SMALL | {int}  # types whose tokens are encoded as fast as they are looked up
 
 
-class WaitingTokens:
-    """What is ``kept`` of a token, and later the bytes of all that were kept."""
+class WaitingTokens(dict[type, Callable[[Any], Any]]):
+    """``waiting[type(token)](token)`` is what to keep of a token; later there are the bytes of all that was kept."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._known: dict[int, Any] = {}  # tokens that wait, by their id: while they do, no other one has it
 
-    def keep(self, token: Any) -> Any:
+    def __missing__(self, cls: type) -> Callable[[Any], Any]:
+        self[cls] = keep = encoders[cls] if cls in _AT_ONCE else self._keep
+        return keep
+
+    def _keep(self, token: Any) -> Any:
         """The token itself, if it cannot change until it is encoded, or else its bytes.
 
         Raises what makes it impossible to encode.
@@ -40,11 +47,13 @@ class WaitingTokens:
     def encode(self, kept: list[Any]) -> list[bytes]:
         """The bytes of tokens, from what was kept of them.  Now none of them waits any more."""
         self._known.clear()
-        made = dict(zip(map(id, kept), kept, strict=True))
-        for number, token in made.items():
-            if type(token) is not bytes:
-                made[number] = encoders[type(token)](token)
-        return list(map(made.__getitem__, map(id, kept)))
+        made: dict[int, bytes] = {}
+        return [each if type(each) is bytes else made.get(id(each)) or _encode(each, made) for each in kept]
+
+
+def _encode(token: Any, made: dict[int, bytes]) -> bytes:
+    encoded = made[id(token)] = canonical(token)
+    return encoded
 
 
 def weight(token: Any) -> int:
@@ -75,6 +84,3 @@ def _values_of_fixed(cls: type) -> Callable[[Any], Iterable[Any]] | None:
         return iter
     params = vars(cls).get("__dataclass_params__")
     return field_values(cls) if params is not None and params.frozen else None
-
-
-_SMALL = frozenset({float, bool, type(None), np.float64})
