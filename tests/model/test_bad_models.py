@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 import tempfile
 from pathlib import Path
 
@@ -18,9 +17,7 @@ from epicycle.aspects import MeasurementFailure, PacketLoss
 from epicycle.runner.model import ModelError, load_model
 from epicycle.runner.model import load as load_module
 from epicycle.runner.model.catalogue import Catalogue
-
-sys.path.insert(0, str(Path(__file__).parent))
-from model_parts import TYPES
+from tests.model.model_parts import TYPES
 
 # Only these types, so that messages that list them stay the same when the houses grow.
 CATALOGUE = Catalogue({}, {"PacketLoss": PacketLoss, "MeasurementFailure": MeasurementFailure})

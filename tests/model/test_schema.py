@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -36,10 +35,8 @@ from epicycle.runner.model.schema import _value as value_schema
 from epicycle.runner.model.wiring import _ENDPOINT as ENDPOINT
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import study_figure_types
-
-sys.path.insert(0, str(Path(__file__).parent))
-from model_parts import TYPES
-from test_bad_models import CASES
+from tests.model.model_parts import TYPES
+from tests.model.test_bad_models import CASES
 
 ROOT = Path(__file__).parents[2]
 PACKAGED = sorted(path for folder in model_folders() for path in folder.rglob("*.yaml"))

@@ -1,14 +1,13 @@
 """What is said about studies that are wrong: whole messages, from ``bad_studies.txt``.
 
 A case is ``### its name``, ``$ option`` lines for --set, the study, ``>>>``, and the message.
-``python tests/study/test_bad_studies.py`` writes the messages anew; read the difference before keeping it.
+``python -m tests.study.test_bad_studies`` writes the messages anew; read the difference before keeping it.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import sys
 import tempfile
 from pathlib import Path
 
@@ -23,9 +22,7 @@ from epicycle.runner.model.document import parse, plain
 from epicycle.runner.model.schema import json_schema
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import check_figures, study_figure_types
-
-sys.path.insert(0, str(Path(__file__).parent))
-from study_parts import STUDY, plan_of, write
+from tests.study.study_parts import STUDY, plan_of, write
 
 FILE = Path(__file__).parent / "bad_studies.txt"
 CASE = re.compile(r"^### ([^\n]+)\n((?:\$ [^\n]*\n)*)(.*?)^>>>\n(.*?)(?=^### |\Z)", re.MULTILINE | re.DOTALL)
