@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-import numpy as np
-
-from epicycle.actors import REQUIRED, Configurable, Distribution, Parameter, ParameterError
+from epicycle.actors import REQUIRED, Configurable, Distribution, Parameter, ParameterError, Stream
 
 Duration: TypeAlias = float | Distribution
 
@@ -34,6 +32,6 @@ class DurationParameter(Parameter[Duration]):
         return super().convert(value)
 
 
-def drawn(duration: Duration, random: np.random.Generator) -> float:
+def drawn(duration: Duration, random: Stream) -> float:
     """A time in seconds; a number is drawn only from a distribution, and counts as 0 where it is negative."""
     return max(0.0, float(duration.draw(random))) if isinstance(duration, Distribution) else duration

@@ -20,7 +20,7 @@ from .port_parameter import PortParameter
 from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
 from .quantity import Quantity, counted_in_si, plain
-from .random import random_stream
+from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
 from .words import counted
@@ -42,6 +42,7 @@ __all__ = [
     "PortParameter",
     "Process",
     "Quantity",
+    "Stream",
     "Tag",
     "UnitError",
     "Wake",

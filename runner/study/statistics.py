@@ -9,6 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from epicycle.actors import random_stream
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 LEVEL = 0.95
 
@@ -68,6 +75,21 @@ def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, seed: int =
     )
     low, high = found.confidence_interval
     return Estimate(math.fsum(values) / len(values), float(found.standard_error), float(low), float(high), len(values))
+
+
+def resamples(count: int, number: int) -> NDArray[np.int64]:
+    """Which of ``count`` values each of a number of bootstrap samples takes: (number, count)."""
+    return random_stream(0, "resampling").integers(count, size=(number, count))
+
+
+def resampled_sums(values: Sequence[float], draws: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The sum of the values that each bootstrap sample takes, added in its order on every machine."""
+    import numpy as np
+
+    known, sums = np.asarray(values, float), np.zeros(len(draws))
+    for column in draws.T:
+        sums += known[column]
+    return sums
 
 
 def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
