@@ -7,12 +7,13 @@ USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 
 .NOTPARALLEL:
-.PHONY: help run paper test check bench fuzz robust lint reference wheel clean
+.PHONY: help run paper test check bench fuzz robust portable lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
 	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
+	@echo "make portable  every digest under settings that stand for other machines (10 min)"
 	@echo "make lint   ruff, formatting and types"
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
@@ -43,6 +44,9 @@ fuzz: $(DEV)
 
 robust: $(DEV)
 	$(BIN)/python -m tests.numerics.robustness
+
+portable: $(DEV)
+	$(BIN)/python -m tests.portable.portable
 
 lint: $(DEV)
 	$(BIN)/ruff check .

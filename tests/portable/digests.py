@@ -26,6 +26,9 @@ from tests.test_docs import TUTORIALS, Reader, blocks
 DISTURBED = "collision_avoidance"
 UNTIL = {DISTURBED: 2.0}  # s; the other models run to their ends
 SETTINGS = {DISTURBED: {"observers": 2, "disturbance": 0.25}}
+TWO_ARGUMENTS = ("atan2", "hypot", "pow")
+GROWING = ("cosh", "exp", "expm1", "sinh")
+ONE_ARGUMENT = (*GROWING, "acos", "asin", "atan", "cos", "log", "log10", "log1p", "log2", "sin", "tan", "tanh")
 SMALL = ("functions", "laws", "model mm1", "model bouncing_ball", "model feedback")  # what an emulator has time for
 
 
@@ -38,20 +41,30 @@ def functions(compiled: bool = False) -> str:
     """All elementary functions, over their domains."""
     from epicycle.actors.core import elementary
 
-    names = {name: getattr(elementary, name) for name in elementary.__all__}
     stream, found = random_stream(0, "portable"), []
-    for name, function in sorted(names.items()):
+    for name in ONE_ARGUMENT + TWO_ARGUMENTS:
+        function = getattr(elementary, name)
         if compiled:
-            import numba
-
-            function = numba.njit(function)
+            function = _compiled(function, name in TWO_ARGUMENTS)
         for _ in range(2_000):
-            x = stream.uniform(-1.0, 1.0) * 10.0 ** stream.below(4)
-            y = stream.uniform(0.0, 4.0)
-            for arguments in ((x,), (abs(x) % 1.0,), (abs(x), y)):
-                with contextlib.suppress(TypeError, ValueError, OverflowError):
-                    found.append((name, arguments, function(*arguments)))
-    return hashed(len(found), *found)
+            x = stream.uniform(-1.0, 1.0) * (1.0, 10.0, 700.0, 1e9)[stream.below(4)]
+            x = abs(x) % 1.0 if name in ("acos", "asin") else abs(x) if name in ("log", "log2", "log10", "pow") else x
+            x = abs(x) if name == "log1p" else max(-700.0, min(700.0, x)) if name in GROWING else x
+            found.append((name, function(x, stream.uniform(0.0, 4.0)) if name in TWO_ARGUMENTS else function(x)))
+    return hashed(*found)
+
+
+def _compiled(function: Any, two: bool) -> Any:
+    """As kernels call it."""
+    import numba
+
+    def of_one(x: float) -> Any:
+        return function(x)
+
+    def of_two(x: float, y: float) -> Any:
+        return function(x, y)
+
+    return numba.njit(of_two if two else of_one)
 
 
 def laws() -> str:
@@ -64,7 +77,9 @@ def laws() -> str:
 def run(name: str, **options: Any) -> str:
     """A run: its log, metrics and signals."""
     results = Simulation(load_model(name, set=SETTINGS.get(name, {}), **options), seed=11).run(until=UNTIL.get(name))
-    signals = {path: (signal.times.tolist(), list(map(repr, signal.tokens))) for path, signal in results.signals.items()}
+    signals = {
+        path: (signal.times.tolist(), list(map(repr, signal.tokens))) for path, signal in results.signals.items()
+    }
     return hashed(results.digest, results.metrics, results.aspects, signals)
 
 

@@ -1,7 +1,7 @@
 """``make portable``: is every digest the same under settings that stand for other machines and other versions?
 
-Each setting is a process of its own that computes all of ``digests``; the result is compared with ``golden.json``, which
-is in the repository.  ``--golden`` writes that file anew, from the first setting.
+Each setting is a process of its own that computes all of ``digests``; the result is compared with ``golden.json``,
+which is in the repository.  ``--golden`` writes that file anew, from the first setting.
 """
 
 from __future__ import annotations
@@ -46,14 +46,22 @@ def numpy_features() -> str:
     return " ".join(__cpu_dispatch__)
 
 
+def threads(count: int) -> dict[str, str]:
+    """So many threads for whoever uses threads."""
+    return dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), str(count))
+
+
+def old_libraries() -> dict[str, str]:
+    """BLAS, libm and NumPy as on an old processor."""
+    return {"OPENBLAS_CORETYPE": "Prescott", "GLIBC_TUNABLES": NO_FMA, "NPY_DISABLE_CPU_FEATURES": numpy_features()}
+
+
 def settings() -> list[Setting]:
     """Those that make a difference on this kind of machine, the plain one first."""
     found = [
         Setting("as it is"),
-        Setting("hash seed 1, one thread", {"PYTHONHASHSEED": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
-                                            "NUMBA_NUM_THREADS": "1"}),
-        Setting("hash seed 77, two threads, German", {"PYTHONHASHSEED": "77", "OMP_NUM_THREADS": "2", "TZ": "Asia/Tokyo",
-                                                      "OPENBLAS_NUM_THREADS": "2", "LC_ALL": "C.UTF-8"}),
+        Setting("hash seed 1, one thread", {"PYTHONHASHSEED": "1", **threads(1)}),
+        Setting("hash seed 77, two threads, Tokyo", {"PYTHONHASHSEED": "77", **threads(2), "TZ": "Asia/Tokyo"}),
         Setting("NumPy's plain loops", {"NPY_DISABLE_CPU_FEATURES": numpy_features()}),
         Setting("kernels for any processor", {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}),
         Setting("kernels not compiled", {"NUMBA_DISABLE_JIT": "1"}),
@@ -65,9 +73,7 @@ def settings() -> list[Setting]:
             Setting("BLAS of a Nehalem", {"OPENBLAS_CORETYPE": "Nehalem"}),
             Setting("libm without AVX2 and FMA", {"GLIBC_TUNABLES": NO_FMA}),
             Setting("kernels of a Nehalem", {"NUMBA_CPU_NAME": "nehalem", "NUMBA_CPU_FEATURES": ""}),
-            Setting("all of the old at once", {"OPENBLAS_CORETYPE": "Prescott", "GLIBC_TUNABLES": NO_FMA, "PYTHONHASHSEED": "2",
-                                               "NPY_DISABLE_CPU_FEATURES": numpy_features(), "NUMBA_CPU_NAME": "core2",
-                                               "NUMBA_CPU_FEATURES": ""}),
+            Setting("all of the old at once", {**old_libraries(), "NUMBA_CPU_NAME": "core2", "NUMBA_CPU_FEATURES": ""}),
         ]  # fmt: skip
         if {"avx2", "fma"} <= flags:
             found += [
@@ -84,8 +90,17 @@ def settings() -> list[Setting]:
 
 def older_packages(folder: Path) -> Setting | None:
     """The oldest versions of NumPy and SciPy that are supported; None where they cannot be installed."""
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--target"]
-    if subprocess.run([*command, str(folder), *OLD], capture_output=True).returncode:
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+        "--no-deps",
+        "--target",
+    ]
+    if subprocess.run([*command, str(folder), *OLD], check=False, capture_output=True).returncode:
         return None
     return Setting(", ".join(OLD).replace("==", " "), {"PYTHONPATH": str(folder)})
 
@@ -96,6 +111,7 @@ def outcome(setting: Setting) -> tuple[dict[str, str], str, float]:
     with tempfile.TemporaryDirectory() as cache:
         done = subprocess.run(
             [*setting.command, sys.executable, "-W", "ignore", "-m", "tests.portable.digests", *setting.parts],
+            check=False,
             cwd=ROOT,
             env={**os.environ, "NUMBA_CACHE_DIR": cache, **setting.variables},
             capture_output=True,
@@ -126,11 +142,17 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         older = older_packages(Path(folder))
         chosen = [*settings(), *([older] if older else [])]
-        print(f"{len(parts())} parts (functions, laws, models, disturbances, a study, tutorials) under {len(chosen)} settings")
+        print(
+            f"{len(parts())} digests of functions, laws, models, disturbances, a study and tutorials; {len(chosen)} settings"
+        )
         for setting, (found, wrong, seconds) in zip(chosen, pool.map(outcome, chosen), strict=True):
             others = differences(found, wanted)
             missing = len(setting.parts or parts()) - len(found)
-            said = wrong or (f"{missing} missing" if missing else "") or ("differ: " + ", ".join(others) if others else "same")
+            said = (
+                wrong
+                or (f"{missing} missing" if missing else "")
+                or ("differ: " + ", ".join(others) if others else "same")
+            )
             bad += said != "same"
             print(f"{setting.name:36} {len(found):3} digests  {seconds:4.0f} s  {said}", flush=True)
         if older is None:

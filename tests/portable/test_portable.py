@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import json
 
-from .digests import parts
-from .portable import GOLDEN, Setting, differences, outcome, settings
+from epicycle.actors.core import elementary
+
+from .digests import ONE_ARGUMENT, TWO_ARGUMENTS, functions, parts
+from .portable import GOLDEN, Setting, differences, old_libraries, outcome
 
 
 def test_every_part_has_a_digest_in_the_repository() -> None:
     assert list(json.loads(GOLDEN.read_text())) == list(parts())
 
 
-def test_digests_hold_with_old_libraries() -> None:
-    setting = next(each for each in [*settings(), Setting("as it is")] if "old" in each.name or not each.variables)
-    found, wrong, _ = outcome(setting)
+def test_every_function_is_in_it() -> None:
+    assert {*ONE_ARGUMENT, *TWO_ARGUMENTS, "distance"} <= set(elementary.__all__)
+    assert {*elementary.__all__} - {*ONE_ARGUMENT, *TWO_ARGUMENTS} <= {"distance", "power", "total", "log_gamma"}
+
+
+def test_compiled_functions_have_the_same_bits() -> None:
+    assert functions(compiled=True) == functions()
+
+
+def test_digests_hold_with_the_libraries_of_an_old_processor() -> None:
+    found, wrong, _ = outcome(Setting("old", {**old_libraries(), "PYTHONHASHSEED": "2"}))
     assert wrong == ""
     assert differences(found, json.loads(GOLDEN.read_text())) == []
