@@ -144,8 +144,8 @@ def test_airtime_of_the_shared_radio_grows_with_the_robots() -> None:
     for robots in (1, 3, 5):
         model = load_model("collision_avoidance", set={"observers": robots - 1, "horizon": 3}, disturb="shared_radio")
         share.append(Simulation(model, seed=1).run(until=1.0).aspects["radio"]["utilisation"])
-    # A plan of 3 steps has 1 + 4 + 2 * 4 numbers, a measurement 6, 64 bits each, beside what every message has.
-    airtime = 2 * (242e-6 + 768e-6) + (13 + 6) * 64e-6
+    # A plan of 3 steps has 1 + 5 + 2 * 4 numbers, a measurement 7, 64 bits each, beside what every message has.
+    airtime = 2 * (242e-6 + 768e-6) + (14 + 7) * 64e-6
     assert share[0] == pytest.approx(airtime / 0.1, rel=0.11)  # up to the airtime of the last tick
     for robots, each in ((3, share[1]), (5, share[2])):  # what collides takes its time only once
         assert 0.6 * robots * share[0] < each <= robots * share[0]

@@ -46,7 +46,7 @@ class Vehicle(Actor):
                 self._move((now - self._moved_at) / 1e9)
             self._held = self._next
             self._moved_at = now
-            self.state.send(BodyState(self._position, self._velocity))
+            self.state.send(BodyState(self._position, self._velocity, self.now))
         if self.acceleration.present and all_finite(wanted := _pair(self.acceleration.value)):
             self._next = shortened(wanted, self.max_acceleration)
             if self._moved_at == now:
