@@ -81,9 +81,11 @@ class RobustController(TargetModel, Actor):
     """
 
     trigger = InputPort(object, doc="plan now")
-    state = InputPort(BodyState, doc="where the robot is")
-    estimate = InputPort(Estimate, required=False, doc="of the target; unconnected: there is none to avoid")
-    peer_plans = InputPort(Plan, multi=True, required=False, doc="what the other robots intend")
+    state = InputPort(BodyState, triggers=False, doc="where the robot is")
+    estimate = InputPort(
+        Estimate, required=False, triggers=False, doc="of the target; unconnected: there is none to avoid"
+    )
+    peer_plans = InputPort(Plan, multi=True, required=False, triggers=False, doc="what the other robots intend")
     control = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, for the period after this one")
     plan = OutputPort(Plan, doc="what this robot intends, for the others")
     violation = OutputPort(float, doc="metres by which the plan breaks a constraint at worst; 0 if it keeps all")

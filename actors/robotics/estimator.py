@@ -42,7 +42,7 @@ class _Estimator(TargetModel, Actor):
     """
 
     trigger = InputPort(object, doc="predict to the present time, fuse, and send the estimate")
-    measurements = InputPort(Measurement, multi=True, required=False, doc="of all robots, own included")
+    measurements = InputPort(Measurement, multi=True, required=False, triggers=False, doc="of all robots, own included")
     estimate = OutputPort(Estimate, doc="the target's state (x, y, vx, vy) after fusion")
     too_late = OutputPort(int, doc="how many measurements so far came more than max_delay late; sent with each of them")
 

@@ -24,7 +24,7 @@ class Vehicle(Actor):
     """
 
     trigger = InputPort(object, doc="move to the present time and send the state")
-    acceleration = InputPort(np.ndarray, shape=(2,), doc="m/s^2, the control to be applied from now on")
+    acceleration = InputPort(np.ndarray, shape=(2,), triggers=False, doc="m/s^2, the control to be applied from now on")
     state = OutputPort(BodyState, depends_on=("trigger",), doc="position and velocity at this time")
 
     start = array_parameter((2,), unit="m", doc="position at the first trigger")
