@@ -151,7 +151,7 @@ class Corrupt(CommunicationAspect):
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is damaged")
     kind = Parameter(str, GAUSSIAN, choices=(GAUSSIAN, BIT_FLIP), doc="what happens to a number")
     deviation = Parameter(float, 1.0, min=0.0, doc="standard deviation of the error, in the number's own unit")
-    fields = texts_parameter((), doc="fields of the message that can be damaged; none: all numbers in it")
+    fields = texts_parameter((), doc="fields of the message that can be damaged; none: all numbers but its time")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         hit = point.random.random() < self.probability

@@ -7,6 +7,7 @@ from keyword import iskeyword
 
 from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
+from epicycle.aspects import FiringTime
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import Position, did_you_mean, nearest
@@ -91,7 +92,7 @@ class PointcutText:
     """Where an aspect stands: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
 
     For an aspect that is a model, ``request`` is the port by which tokens or firings come in, ``time`` says that it
-    stands at actors and how long their firings take; ``seconds`` is its value.
+    stands at actors and how long their firings take; ``firing_time`` is its value.
     One that holds neither pattern, type nor tag is misshapen, and has been told so.
     """
 
@@ -104,7 +105,7 @@ class PointcutText:
     parameter: Text | None = None
     request: Text | None = None
     time: Node | None = None
-    seconds: float = 0.0
+    firing_time: FiringTime = 0.0
 
     @classmethod
     def of(cls, text: Text) -> PointcutText:

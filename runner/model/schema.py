@@ -14,9 +14,9 @@ from keyword import kwlist
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import Actor, Configurable, Parameter, declared_parameters
+from epicycle.actors import Actor, Configurable, MappingParameter, Parameter, declared_parameters
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
-from epicycle.aspects import Aspect
+from epicycle.aspects import Aspect, FiringTimeParameter
 
 from . import declarations as language
 from .catalogue import Catalogue
@@ -53,6 +53,7 @@ def json_schema(
         "text": TEXT,
         "texts": one_or_more({"type": "string"}),
         "expression": {"type": "string", "pattern": EXPRESSION},
+        "firing_time": _value(FiringTimeParameter()),
         "port": {
             "type": "string",
             **text(
@@ -222,7 +223,7 @@ _POINTCUT: dict[str, tuple[Schema, str]] = {
     "port": (ref("text"), "The name of the port; none: all ports where it can stand."),
     "parameter": (ref("text"), "The name of a parameter of the actors, for an aspect that alters numbers."),
     "request": (ref("text"), "For an aspect that is a composite: the input by which these tokens come in."),
-    "time": (_number("number", 0.0, unit="s"), "For a composite at actors: how long their firings take."),
+    "time": (ref("firing_time"), "For a composite at actors: how long their firings take."),
 }
 _METRIC: dict[str, tuple[Schema, str]] = {
     "of": (_PATTERN, "The output port (or a pattern for several)."),
@@ -411,6 +412,9 @@ def _value(parameter: Parameter[Any]) -> Schema:
 def _plain_value(parameter: Parameter[Any]) -> Schema:
     if parameter.forms:
         return {"anyOf": [_plain_value(form) for form in parameter.forms]}
+    if isinstance(parameter, MappingParameter):
+        found = {"type": ["object", "string"], "additionalProperties": _plain_value(parameter.item)}
+        return found | text(EXPRESSION, f"expected a {parameter.describe_type()}")
     if type(parameter).convert is not Parameter.convert:
         return {}  # what a parameter with a conversion of its own takes, only the conversion knows
     if is_part(parameter):

@@ -202,6 +202,7 @@ def _port_row(port: PortReference) -> list[str]:
     notes = []
     if port.direction == "input":
         notes += [] if port.required else ["optional"]
+        notes += [] if port.triggers else ["does not trigger"]
     elif port.depends_on is not None:  # the port may stand in a loop
         notes.append(f"depends at once on {' and '.join(port.depends_on) or 'no input'}")
     notes += ["any number of connections"] if port.multi else []

@@ -142,9 +142,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         older = older_packages(Path(folder))
         chosen = [*settings(), *([older] if older else [])]
-        print(
-            f"{len(parts())} digests of functions, laws, models, disturbances, a study and tutorials; {len(chosen)} settings"
-        )
+        print(f"{len(parts())} digests of functions, laws, models, studies and tutorials; {len(chosen)} settings")
         for setting, (found, wrong, seconds) in zip(chosen, pool.map(outcome, chosen), strict=True):
             others = differences(found, wanted)
             missing = len(setting.parts or parts()) - len(found)
