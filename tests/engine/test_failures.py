@@ -125,15 +125,6 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             ),
         ),
         (
-            "{type: Broken, where: text}",
-            IN,
-            "metrics:\n  total: {of: a.output, take: sum}",
-            (
-                "metric total failed in taking the sum of a.output at (0 s, 1): TypeError: unsupported operand type(s) "
-                "for +=: 'int' and 'str'\n   declared at m.yaml:16:3"
-            ),
-        ),
-        (
             "{type: Broken, where: array}",
             IN,
             "run:\n  stop_when: a.output",
