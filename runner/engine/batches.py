@@ -78,10 +78,8 @@ class TimeBatches:
 
     def add(self, value: float, begin: int, end: int) -> None:
         """Take in a value that stands from ``begin`` to ``end``, neither before the start."""
+        last = self._slice(end - 1)  # which may make them wider
         first = (begin - self._start) // self._width
-        last = self._slice(end - 1)
-        if last >= len(self._sums):
-            first = self._slice(begin)
         for index in range(first, last + 1):
             edge = self._start + index * self._width
             length = float(min(end, edge + self._width) - max(begin, edge))

@@ -6,11 +6,11 @@ import math
 from array import array
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
-from epicycle.actors.expression import operand
+from epicycle.actors.expression import Formula, operand
 
 from ..model import Metric
 from ..model.measure import MSER5, TIME, Measure
@@ -53,9 +53,8 @@ class Outcome:
         found = []
         if self.interval is not None:
             found.append(
-                f"{100 * self.interval.level:.6g} % interval from {self.interval.batches} batch means, "
-                f"autocorrelation {self.interval.autocorrelation:.2f}"
-                + (": too much, make the run longer" if self.interval.is_shaky else "")
+                f"{100 * self.interval.level:.6g} % interval, autocorrelation {self.interval.autocorrelation:.2f}"
+                + (" (too much: make the run longer)" if self.interval.is_shaky else "")
             )
         if self.unsure:
             found.append(f"no interval, because {self.unsure}")
@@ -135,10 +134,7 @@ def _measured(measure: Measure, token: Any) -> Any:
     if measure.take in ("first", "last", "count", "rate"):
         return token
     if measure.when is not None:
-        try:
-            return float(bool(measure.when({"value": operand(token)})))
-        except Exception as error:
-            return _Unfit(f"{short(token)}, of which {measure.when.source!r} cannot be told ({error}),")
+        return (_known if isinstance(token, (int, str)) else _holds)(measure.when, token)
     if isinstance(token, str):  # some of which float() reads
         return _Unfit(f"{short(token)}, which is no number,")
     try:
@@ -148,6 +144,17 @@ def _measured(measure: Measure, token: Any) -> Any:
     if math.isnan(number) or (math.isinf(number) and measure.take not in _AS_SENT):
         return _Unfit(f"{number}")
     return token if measure.take in (*_AS_SENT, "sum") else number
+
+
+def _holds(when: Formula, token: Any) -> float | _Unfit:
+    """Whether a condition holds for a token: 1 or 0."""
+    try:
+        return float(bool(when({"value": operand(token)})))
+    except Exception as error:
+        return _Unfit(f"{short(token)}, of which {when.source!r} cannot be told ({error}),")
+
+
+_known = lru_cache(maxsize=1024, typed=True)(_holds)  # states come again and again
 
 
 # -- tokens, each of which counts as much ---------------------------------------------------------------------------
@@ -347,8 +354,8 @@ class _Kept:
             sums, covered = slices.batches(origin + pieces * width)
             means = [each / weight for each, weight in zip(sums, covered, strict=True) if weight]
         else:
-            of_five = partial(range, 0, pieces * OF_MSER, OF_MSER)
-            means = [math.fsum(self._values[place : place + OF_MSER]) / OF_MSER for place in of_five()]
+            places = range(0, pieces * OF_MSER, OF_MSER)
+            means = [math.fsum(self._values[place : place + OF_MSER]) / OF_MSER for place in places]
         if (found := mser(means)) is None:
             return "it does not settle in the first half of the run, says MSER-5: make it longer"
         if measure.kind.over == TIME:

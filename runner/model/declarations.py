@@ -43,6 +43,7 @@ STUDY_KEYS = (
     "guideline",
     "figures",
 )
+STUDY_METRIC_KEYS = ("value", "unit", "to", "doc")
 RANGE_KEYS = ("from", "to", "step")
 HYPERCUBE_KEYS = ("size", "seed", "ranges")
 UNTIL_KEYS = ("metric", "half_width", "batch", "at_most")

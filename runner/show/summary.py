@@ -58,7 +58,7 @@ def summary_table(model: Model, results: Results) -> Group:
     for metric in model.metrics:
         found = results.outcomes[metric.name]
         said = "; ".join([metric.measure.doc, *found.remarks] if metric.measure.doc else found.remarks)
-        table.add_row(metric.name, found.shown(shown), metric.unit, said)
+        table.add_row(metric.name, found.shown(shown), "" if metric.unit == "1" else metric.unit, said)
     for name, figures in results.aspects.items():
         woven = next(each for each in model.aspects if each.name == name)
         for what, figure in figures.items():

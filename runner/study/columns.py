@@ -35,7 +35,8 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
             found[setting.path] = Column(unit, declared.doc)
     own = {metric.name: Column(metric.unit, metric.measure.doc) for metric in model.metrics}
     for metric in metrics:
-        found[metric.name] = own.get(metric.source.strip(), Column())
+        known = own.get(metric.source.strip(), Column())
+        found[metric.name] = Column(metric.to or known.unit or metric.unit, metric.doc or known.doc)
     return found
 
 

@@ -33,7 +33,7 @@ class Broken(Actor):
     def fire(self) -> None:
         if self.where == "fire" and self.now >= 1:
             raise RuntimeError("no more")
-        things = {"text": "1.5", "array": np.zeros(2), "nameless": object(), "number": 1.0}
+        things = {"array": np.zeros(2), "nameless": object(), "number": 1.0}
         if self.where in things:
             self.output.send(things[self.where])
         if self.where == "channel":
