@@ -133,7 +133,7 @@ class Measure(Configurable):
             yield "after", f"{MSER5} cannot tell when {self.take!r} has settled", "give the warm-up as a time"
         is_number = isinstance(self.initial, (bool, int, float))
         if self.initial is not None and kind.of == "numbers" and not is_number:
-            yield "initial", f"{self.initial!r} is not a number", ""
+            yield "initial", f"initial: {self.initial!r} is not a number", ""
         if kind.unit and self.unit not in ("", kind.unit):
             yield "unit", f"{self.take!r} counts in {kind.unit}", f"write 'to: {self.unit}'"
         elif problem := conversion_problem(self.own_unit, self.to):

@@ -98,7 +98,7 @@ class StudyMetric:
             problems.add(
                 f"metric {self.name}: {self.source.strip()} counts in {own}, not in {self.unit}",
                 self.places.get("unit"),
-                f"write 'to: {self.unit}' if it is to be converted",
+                "leave 'unit' out; 'to: ...' converts",
             )
         elif found := conversion_problem(own or self.unit, self.to):
             problems.add(f"metric {self.name}: {found[0]}", self.places.get("to"), *([found[1]] if found[1] else []))
