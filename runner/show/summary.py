@@ -21,6 +21,7 @@ def summary_object(results: Results) -> dict[str, Any]:
             "seed": results.seed,
             "parameters": {name: plain(value) for name, value in results.parameters.items()},
             "metrics": {name: plain(value) for name, value in results.metrics.items()},
+            "outcomes": {name: said for name, each in results.outcomes.items() if (said := each.plain())},
             "aspects": results.aspects,
             "stopped": results.stopped,
             "end": results.end,
@@ -55,7 +56,9 @@ def summary_table(model: Model, results: Results) -> Group:
     table.add_column("unit")
     table.add_column("", style="dim")
     for metric in model.metrics:
-        table.add_row(metric.name, shown(results.metrics[metric.name]), metric.unit, metric.doc)
+        found = results.outcomes[metric.name]
+        said = "; ".join([metric.measure.doc, *found.remarks] if metric.measure.doc else found.remarks)
+        table.add_row(metric.name, found.shown(shown), "" if metric.unit == "1" else metric.unit, said)
     for name, figures in results.aspects.items():
         woven = next(each for each in model.aspects if each.name == name)
         for what, figure in figures.items():

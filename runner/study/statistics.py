@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+from ..student import student_quantile, student_tail
+
 LEVEL = 0.95
 
 
@@ -35,9 +37,7 @@ def half_width(values: Sequence[float], level: float = LEVEL) -> float:
     """Half the width of Student's confidence interval of the mean; infinite for fewer than two values."""
     if len(values) < 2:
         return math.inf
-    from scipy.stats import t
-
-    return float(t.ppf((1 + level) / 2, len(values) - 1)) * standard_error(values)
+    return student_quantile((1 + level) / 2, len(values) - 1) * standard_error(values)
 
 
 def standard_error(values: Sequence[float]) -> float:
@@ -46,7 +46,8 @@ def standard_error(values: Sequence[float]) -> float:
     if count < 2:
         return math.nan
     mean = math.fsum(values) / count
-    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1) / count)
+    gaps = [value - mean for value in values]
+    return math.sqrt(math.fsum(gap * gap for gap in gaps) / (count - 1) / count)
 
 
 def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
@@ -125,9 +126,7 @@ def paired_difference(first: dict[int, float], second: dict[int, float], level: 
         return Difference(estimate, math.nan)
     if min(gaps) == max(gaps):
         return Difference(estimate, 1.0 if gaps[0] == 0 else 2.0 ** (1 - len(gaps)))
-    from scipy.stats import t
-
-    return Difference(estimate, float(2 * t.sf(abs(estimate.value) / estimate.error, len(gaps) - 1)))
+    return Difference(estimate, 2.0 * student_tail(abs(estimate.value) / estimate.error, len(gaps) - 1))
 
 
 def without_rounding(values: Iterable[float], scale: float) -> list[float]:
