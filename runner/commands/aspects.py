@@ -33,11 +33,12 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from ..model.catalogue import installed
     from ..model.packaged import is_path, packaged_models
 
-    name, types, models = options.model, installed().with_types(own_types(options)).aspects, packaged_models()
+    known = installed().with_types(own_types(options))
+    name, types, models = options.model, known.aspects, packaged_models()
     if name is None or name in types or not (name in models or is_path(name)):
         if options.set or options.overrides or options.disturb or options.aspect or options.without:
             raise EpicycleError("--set, --overrides, --disturb, --aspect and --without change a model: name one")
-        print_reference(types, "aspect", name, options.json, also=models)
+        print_reference(types, known.actors, "aspect", name, options.json, also=models)
         return DONE
     from ..show import aspects_at, weaving
 

@@ -20,9 +20,16 @@ def add_json(command: argparse.ArgumentParser) -> None:
 
 
 def print_reference(
-    types: Mapping[str, type[Any]], kind: str, name: str | None, as_json: bool, *, also: Iterable[str] = ()
+    types: Mapping[str, type[Any]],
+    others: Mapping[str, type[Any]],
+    kind: str,
+    name: str | None,
+    as_json: bool,
+    *,
+    also: Iterable[str] = (),
 ) -> None:
-    """The list of all types, or all about one; ``also`` are other names that could have been meant."""
+    """The list of all types, or all about one; ``others`` are those of the other kind, ``also`` names that could have
+    been meant, too."""
     from dataclasses import asdict
 
     from epicycle.actors import EpicycleError
@@ -33,10 +40,16 @@ def print_reference(
 
     if name is not None:
         if name not in types:
-            other = " or packaged model" if also else ""
+            if name in others:
+                other = "aspect" if kind == "actor" else "actor"
+                raise EpicycleError(
+                    f"{name} is an {other}, not an {kind}\n   help: 'epicycle {other}s {name}' describes it"
+                )
+            what = f"{kind} type or packaged model" if also else f"{kind} type"
             raise EpicycleError(
-                f"there is no {kind} type{other} {name!r}{did_you_mean(name, [*types, *also])}\n"
-                f"   help: 'epicycle {kind}s' lists them"
+                f"there is no {what} {name!r}{did_you_mean(name, [*types, *also])}\n"
+                f"   help: 'epicycle {kind}s' lists them\n"
+                f"   help: one of your own is known after '--types FILE.py'"
             )
         (reference,) = described({name: types[name]})
         parts = parts_described([types[name]])

@@ -164,7 +164,7 @@ class Elaborator(AspectElaborator):
             self.problems.add(
                 f"{path}: there is no actor type {part.type.text!r}{did_you_mean(part.type.text, known)}",
                 part.type.position,
-                self._valid_types("actor", part.type.text),
+                *self._valid_types("actor", part.type.text),
                 scope=composite,
             )
             return None

@@ -21,6 +21,7 @@ from .weave import Weaving
 from .woven import WovenAspect
 
 MAX_SHOWN = 12  # types in one message
+OF_YOUR_OWN = "one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]"
 
 
 class AspectElaborator(Configurator):
@@ -136,7 +137,7 @@ class AspectElaborator(Configurator):
             self.problems.add(
                 f"aspect {name}: there is no aspect type {wanted!r}{did_you_mean(wanted, [*known, *self.composites])}",
                 part.type.position,
-                self._valid_types("aspect", wanted),
+                *self._valid_types("aspect", wanted),
                 scope=scope,
             )
             return None
@@ -174,16 +175,18 @@ class AspectElaborator(Configurator):
             self.problems.add(f"{label}: {error}", part.enabled.position, scope=scope)
             return True
 
-    def _valid_types(self, kind: str, asked: str) -> str:
-        """Which types there are: their names, or how to see them if they are too many for a message."""
+    def _valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
+        """Which types there are: their names, or how to see them if they are too many; and how there can be more."""
         is_actor = kind == "actor"
         types: Collection[str] = self.catalogue.actors if is_actor else self.catalogue.aspects
         others: Collection[str] = self.catalogue.aspects if is_actor else self.catalogue.actors
         if asked in others:
             other = "aspect" if is_actor else "actor"
-            return f"{asked} is an {other}: it belongs under '{other}s'"
+            return (f"{asked} is an {other}: it belongs under '{other}s'",)
         composites = sorted(self.composites) if is_actor else []
         if len(composites) + len(types) <= MAX_SHOWN:
-            return f"valid types: {', '.join(sorted([*composites, *types]))}"
-        own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
-        return f"valid types: {f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+            valid = ", ".join(sorted([*composites, *types]))
+        else:
+            own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
+            valid = f"{f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+        return f"valid types: {valid}", OF_YOUR_OWN
