@@ -8,11 +8,13 @@ from collections.abc import Callable, Sequence
 
 from .collection import seldom_collecting
 from .commands import COMMANDS
-from .commands.options import BAD_INPUT, FAILED, INTERRUPTED, complain
+from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
+from .printing import complain, open_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input."""
+    open_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = parser().parse_args(given)
     command: Callable[[argparse.Namespace, list[str]], int] = options.command
@@ -20,7 +22,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         with seldom_collecting():
-            return command(options, given)
+            code = command(options, given)
+        sys.stdout.flush()  # here, where it can be told that it fails
+        return code
     except EpicycleError as error:
         from .engine import ActorError, LoopError  # here, for many commands do without the engine
 

@@ -22,6 +22,7 @@ from .quantity import Quantity, counted_in_si, plain
 from .random import random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
+from .visible import readable, shortened, visible, visible_character, visible_lines
 from .words import counted
 
 __all__ = [
@@ -57,11 +58,16 @@ __all__ = [
     "parse_unit",
     "plain",
     "random_stream",
+    "readable",
     "shaped",
+    "shortened",
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
     "type_name",
     "unknown_parameter",
     "variants",
+    "visible",
+    "visible_character",
+    "visible_lines",
 ]

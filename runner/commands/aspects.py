@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 
+from ..printing import console, tell_json
 from .options import DONE, add_changes, load, own_types
-from .reference import add_json, print_reference, show
+from .reference import add_json, print_reference
 
 DESCRIPTION = (
     "List the aspects that a model may use, describe one, or show which aspects stand at the ports of a model, in the "
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     model, _ = load(options)
     if options.json:
-        print(json.dumps(aspects_at(model), indent=2, ensure_ascii=False, allow_nan=False))
+        tell_json(aspects_at(model), indent=2)
     else:
-        show(weaving(model))
+        console().print(weaving(model))
     return DONE

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from ..printing import complain
 
 if TYPE_CHECKING:
     from ..model import Model
@@ -135,8 +136,3 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, d
     figures = figures_of(model, problems)
     problems.raise_if_any()
     return model, figures
-
-
-def complain(text: str) -> None:
-    """Say what went wrong."""
-    print(text, file=sys.stderr)

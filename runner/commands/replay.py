@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import DONE, FAILED, complain
+from ..printing import complain, console, tell
+from .options import DONE, FAILED
 
 DESCRIPTION = "Repeat one run of a study alone, with its event log, all recorded signals and figures."
 
@@ -33,16 +34,14 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     written = write_folder(folder, results, figures, ["epicycle", *given], "" if error is None else str(error))
     written.append(folder / "log.parquet")
     write_log(simulation.log.records, written[-1])
-    from rich.console import Console
-
-    Console(width=120).print(summary_table(model, results))
+    console().print(summary_table(model, results))
     for path in written:
-        print(f"wrote {path}")
+        tell(f"wrote {path}")
     if error is not None:
         complain(f"error: {error}")
         return FAILED
     if row["digest"] is not None and row["digest"] != results.digest:
         complain(f"error: the digest is {results.digest}, but was {row['digest']}: something has changed since")
         return FAILED
-    print(f"digest {results.digest}" + (": the same" if row["digest"] is not None else ""))
+    tell(f"digest {results.digest}" + (": the same" if row["digest"] is not None else ""))
     return DONE

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
-import logging
 import math
-import sys
 from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import DONE, add_model, complain, load, seconds, seed
+from ..printing import complain, console, notices, tell, tell_json
+from .options import DONE, add_model, load, seconds, seed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -110,38 +108,26 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         write_log(simulation.log.records, options.log)
     written = [] if folder is None else write_folder(folder, results, figures, ["epicycle", *given])
     if options.json:
-        print(json.dumps(summary_object(results)))
+        tell_json(summary_object(results))
         return DONE
-    from rich.console import Console
-
-    # Piped output has no width of its own; the default of 80 would fold the table.
-    console = Console() if sys.stdout.isatty() else Console(width=120)
-    console.print(summary_table(model, results))
+    console().print(summary_table(model, results))
     for path in written:
-        console.print(f"wrote {path}", highlight=False, markup=False)
+        tell(f"wrote {path}")
     return DONE
 
 
 @contextmanager
 def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None] | None]:
     """A bar on a terminal's standard error, and notices of what takes long."""
-    from rich.console import Console
-    from rich.logging import RichHandler
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    console = Console(stderr=True)
-    notices = logging.getLogger("epicycle")
-    handler = RichHandler(console=console, show_time=False, show_level=False, show_path=False)
-    notices.addHandler(handler)
-    notices.setLevel(logging.INFO)
-    try:
-        if not console.is_terminal:
+    terminal = console(stderr=True)
+    with notices(terminal):
+        if not terminal.is_terminal:
             yield None
             return
         end = until if until is not None else model.stop
-        text = TextColumn("{task.description} {task.completed:.1f} s of model time")
-        with Progress(text, BarColumn(), TimeElapsedColumn(), console=console, transient=True) as bar:
+        text = TextColumn("{task.description} {task.completed:.1f} s of model time", markup=False)
+        with Progress(text, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
             task = bar.add_task(model.name, total=end)
             yield lambda now: bar.update(task, completed=now)
-    finally:
-        notices.removeHandler(handler)

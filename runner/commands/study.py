@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import DONE, FAILED, INTERRUPTED, add_types, complain
+from ..printing import complain, tell
+from .options import DONE, FAILED, INTERRUPTED, add_types
 
 if TYPE_CHECKING:
     from ..study import Plan
@@ -126,14 +127,14 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     from ..study.progress import progress
 
     try:
-        with progress(plan.study.name) as tell:
+        with progress(plan.study.name) as told:
             outcome = run_study(
                 plan,
                 folder,
                 jobs=options.jobs,
                 timeout=options.run_timeout,
                 retry=options.retry,
-                tell=tell,
+                tell=told,
                 executor=options.executor,
                 scheduler=options.scheduler,
             )
@@ -143,11 +144,11 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     except (WorkerError, WriteError) as error:  # no fault of the study's
         complain(f"error: {error}")
         return FAILED
-    print(
+    tell(
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
         f"{outcome.there:,} there before" + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
     )
-    print(f"wrote {outcome.table}")
+    tell(f"wrote {outcome.table}")
     if outcome.is_good:
         return DONE
     failures = open_study(folder).failures()

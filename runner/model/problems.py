@@ -5,9 +5,9 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from epicycle.actors import EpicycleError, did_you_mean, nearest
+from epicycle.actors import EpicycleError, did_you_mean, nearest, shortened, visible, visible_character
 
-# The runner takes the last two from here, as it does all that makes a message.
+# The runner takes the functions from here, as it does all that makes a message.
 __all__ = ["ModelError", "Position", "Problem", "Problems", "did_you_mean", "nearest", "visible"]
 
 MAX_PROBLEMS = 100
@@ -37,7 +37,7 @@ class Problem:
     severity: str = "error"  # or "warning"
 
     def __str__(self) -> str:
-        head = f"{self.severity}: {visible(self.message)}"
+        head = f"{self.severity}: {visible(shortened(self.message))}"
         lines = [head]
         if (at := self.position) is not None:
             lines = [f"{visible(at.file)}:{at.line}:{at.column}: {head}"]
@@ -45,7 +45,7 @@ class Problem:
                 source, carets = _excerpt(at)
                 gutter = max(5, len(str(at.line)))
                 lines += [f"{at.line:>{gutter}} | {source}".rstrip(), f"{'':>{gutter}} | {carets}"]
-        lines += [f"   help: {visible(line)}" for line in self.help]
+        lines += [f"   help: {visible(shortened(line))}" for line in self.help]
         return "\n".join(lines)
 
 
@@ -136,22 +136,11 @@ class Problems:
         return files.index(at.file), at.line, at.column
 
 
-def visible(text: str) -> str:
-    """Return the text with everything a terminal would obey or hide written as an escape."""
-    return text if text.isprintable() else "".join(map(_visible_character, text))
-
-
-def _visible_character(character: str) -> str:
-    if character.isprintable():
-        return character
-    return character.encode("unicode_escape").decode("ascii")
-
-
 def _cell(character: str) -> tuple[str, int]:
     """Return how one character of a source line is shown, and how many columns that takes."""
     if character == "\t":
         return "    ", 4
-    shown = _visible_character(character)
+    shown = visible_character(character)
     if len(shown) > 1 or shown.isascii():
         return shown, len(shown)
     if unicodedata.category(shown) in ("Mn", "Me"):

@@ -28,7 +28,7 @@ def sent(values: list[float], delta: float) -> list[Any]:
 
 
 # Of these, (value + delta) - value is less than delta as floats are rounded.
-@pytest.mark.parametrize(("value", "delta"), [(0.7, 0.1), (1e9, 1e-8), (2.1, 0.02), (1e300, 1.0)])
+@pytest.mark.parametrize(("value", "delta"), [(0.7, 0.1), (1e9, 1e-8), (0.2, 0.02), (1e300, 1.0)])
 def test_the_first_measurement_is_sent(value: float, delta: float) -> None:
     assert sent([value] * 5, delta) == [value]
     assert sent([value, value, value + 4 * max(delta, abs(value))], delta)[1:] == [value + 4 * max(delta, abs(value))]
