@@ -37,13 +37,13 @@ check: lint
 	$(BIN)/python -m pytest -n 2 -q -m ""
 
 bench: $(DEV)
-	$(BIN)/python benchmarks/all.py
+	$(BIN)/python -m benchmarks.all
 
 fuzz: $(DEV)
-	$(BIN)/python tests/fuzz/fuzz.py
+	$(BIN)/python -m tests.fuzz.fuzz
 
 robust: $(DEV)
-	$(BIN)/python tests/numerics/robustness.py
+	$(BIN)/python -m tests.numerics.robustness
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -210,7 +210,10 @@ if __name__ == "__main__":
     for tutorial in TUTORIALS:
         for module in [name for name, each in sys.modules.items() if "tutorial-" in str(getattr(each, "__file__", ""))]:
             del sys.modules[module]
-        with tempfile.TemporaryDirectory(prefix="tutorial-") as folder, contextlib.chdir(folder):
-            sys.path.insert(0, folder)
+        with (
+            tempfile.TemporaryDirectory(prefix="tutorial-") as folder,
+            contextlib.chdir(folder),
+            pytest.MonkeyPatch.context() as patch,
+        ):
+            patch.syspath_prepend(folder)
             refresh(tutorial)
-            sys.path.remove(folder)

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -320,6 +321,15 @@ def run_in(folder: Path, *command: object) -> str:
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+@pytest.mark.parametrize("folder", ["tests", "benchmarks"])
+def test_what_is_shared_is_imported_from_the_root(folder: str) -> None:
+    """Two files of one name would be mixed up if each changed where modules are found."""
+    change = re.compile(r"sys\.path(\.[a-z]|\[|\s*\+?=[^=])")
+    files = list((ROOT / folder).rglob("*.py"))
+    assert len(files) > 10
+    assert [file.name for file in files if change.search(file.read_text(encoding="utf-8"))] == []
 
 
 @pytest.mark.slow

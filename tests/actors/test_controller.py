@@ -5,8 +5,6 @@ import sys
 
 import numpy as np
 import pytest
-from harness import Harness
-from scenario import _Recorder, play
 
 from epicycle.actors import (
     BodyState,
@@ -19,6 +17,8 @@ from epicycle.actors import (
     ReachGoal,
     RobustController,
 )
+from tests.actors.harness import Harness
+from tests.actors.scenario import _Recorder, play
 
 
 def state(x: float = 30.0, y: float = 0.0, vx: float = 0.0, vy: float = 0.0) -> BodyState:

@@ -5,7 +5,6 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from harness import Harness
 from scipy.stats import chi2
 
 from epicycle.actors import (
@@ -18,6 +17,7 @@ from epicycle.actors import (
     Sensor,
     UnscentedEstimator,
 )
+from tests.actors.harness import Harness
 
 FILTERS = (
     "KalmanFilter",

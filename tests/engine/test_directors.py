@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Generator
 from fractions import Fraction
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,9 +16,7 @@ from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process, Ta
 from epicycle.aspects import Aspect, JoinPoint
 from epicycle.runner.engine import ActorError
 from epicycle.runner.model import Clock, ModelError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, load, seen, sends, simulate
+from tests.engine.engine_parts import Plan, load, seen, sends, simulate
 
 
 class Repeat(Actor):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import pickle
-import sys
 from collections.abc import Generator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +12,7 @@ import pytest
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
 from epicycle.aspects import Aspect, JoinPoint
 from epicycle.runner.engine import ActorError, Simulation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import load
+from tests.engine.engine_parts import load
 
 
 class Broken(Actor):

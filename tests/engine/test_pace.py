@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from pathlib import Path
 
 import pytest
 
 from epicycle.runner.engine import Pace, Simulation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, load
+from tests.engine.engine_parts import Plan, load
 
 START = 128.0
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Generator
-from pathlib import Path
 from typing import Any
 
 import pytest
 import simpy
 
 from epicycle.runner.engine import ActorError, Results, Simulation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, Script, load, seen, sends, simulate
+from tests.engine.engine_parts import Plan, Script, load, seen, sends, simulate
 
 Behaviour = Callable[[Script], Generator[Any, Any, None]]
 ALONE = "actors: {a: {type: Script}, probe: {type: Probe}}\nconnections: [a.output -> probe.input]\n"

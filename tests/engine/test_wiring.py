@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from epicycle.actors import Actor, EpicycleError
 from epicycle.runner.engine import ActorError, Simulation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, load, seen, sends, simulate
+from tests.engine.engine_parts import Plan, load, seen, sends, simulate
 
 
 def test_channels_are_in_the_order_of_the_connections() -> None:

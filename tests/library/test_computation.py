@@ -9,7 +9,6 @@ import re
 import statistics
 import sys
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,7 @@ from epicycle.actors import Function, ParameterError
 from epicycle.actors.expression import Formula
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.model import ModelError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from feeding import feed, load, model_of, tokens
+from tests.library.feeding import feed, load, model_of, tokens
 
 
 def seconds(*values: Any) -> list[tuple[float, Any]]:

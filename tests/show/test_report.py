@@ -6,7 +6,6 @@ import json
 import math
 import re
 import shutil
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -26,9 +25,7 @@ from epicycle.runner.study import Plan, StudyMetric, read_study
 from epicycle.runner.study.columns import Column, si_unit
 from epicycle.runner.study.replays import Replay, ReplayError, repeat
 from epicycle.runner.study.statistics import half_width
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
-from study_parts import STUDY, THIS, write
+from tests.study.study_parts import STUDY, THIS, write
 
 QUEUE = """
 study: queue
