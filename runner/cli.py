@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from .collection import seldom_collecting
 from .commands import COMMANDS
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
-from .printing import complain, open_streams
+from .printing import complain, complain_traceback, open_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,6 +26,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()  # here, where it can be told that it fails
         return code
     except EpicycleError as error:
+        if options.debug:
+            complain_traceback(error)
         from .engine import ActorError, LoopError  # here, for many commands do without the engine
 
         if isinstance(error, (ActorError, LoopError)):
@@ -56,6 +58,7 @@ def parser() -> argparse.ArgumentParser:
         name = module.__name__.rpartition(".")[2]
         command = commands.add_parser(name, help=module.__doc__, description=module.DESCRIPTION)
         module.add(command)
+        command.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
         command.set_defaults(command=module.run)
     return top
 

@@ -10,6 +10,7 @@ import json
 import logging
 import os
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
@@ -45,6 +46,18 @@ def complain(text: str) -> None:
     from epicycle.actors import readable
 
     print(readable(text), file=sys.stderr, flush=True)
+
+
+def complain_traceback(error: BaseException) -> None:
+    """Show through which lines of code an exception came, or the one that an error of ours tells of."""
+    from epicycle.actors import visible_lines
+
+    print(
+        visible_lines("".join(traceback.format_exception(error.__cause__ or error))),
+        end="",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def tell_json(value: object, *, indent: int | None = None) -> None:

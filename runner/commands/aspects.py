@@ -42,7 +42,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         return DONE
     from ..show import aspects_at, weaving
 
-    model, _ = load(options)
+    model = load(options)
     if options.json:
         tell_json(aspects_at(model), indent=2)
     else:

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     if options.out is not None:
         check_graph_path(options.out)
-    model, _ = load(options)
+    model = load(options)
     drawn = outline(model, depth=options.depth, expand=options.expand)
     if options.out is None:
         tell(mermaid(drawn).rstrip("\n"))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, console, notices, tell, tell_json
-from .options import DONE, add_model, load, seconds, seed
+from .options import add_model, complain_of, load, seconds, seed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -73,7 +73,8 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from epicycle.actors import EpicycleError
 
     from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation, check_log_path, write_log
-    from ..show import summary_object, summary_table, write_folder
+    from ..model import Problems
+    from ..show import FigureError, draw_figures, figures_of, summary_object, summary_table, write_folder
 
     if options.log is not None:
         check_log_path(options.log)
@@ -81,7 +82,8 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, to which the log is written")
     log_filter = LogFilter.of(options.log_where)
     until = seconds("--until", options.until) if options.until is not None else None
-    model, figures = load(options)
+    model = load(options)
+    figures = figures_of(model, Problems())
     folder = options.out or (None if options.json else Path("results") / model.name)
     if folder is not None and folder.exists() and not folder.is_dir():
         raise EpicycleError(f"--out {folder} is a file, not a folder")
@@ -96,7 +98,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
             if options.log is not None:
                 write_log(simulation.log.records, options.log)
             if folder is not None:
-                write_folder(folder, results, {}, ["epicycle", *given], "interrupted" if interrupted else str(error))
+                write_folder(folder, results, ["epicycle", *given], "interrupted" if interrupted else str(error))
                 complain(f"what was recorded until then is in {folder}")
             raise
     if pace is not None and pace.worst > NOTICEABLE:
@@ -106,14 +108,18 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         )
     if options.log is not None:
         write_log(simulation.log.records, options.log)
-    written = [] if folder is None else write_folder(folder, results, figures, ["epicycle", *given])
+    written, failed = [], list[FigureError]()
+    if folder is not None:
+        written = write_folder(folder, results, ["epicycle", *given])
+        drawn, failed = draw_figures(folder, results, figures)
+        written = [*drawn, *written]
     if options.json:
         tell_json(summary_object(results))
-        return DONE
-    console().print(summary_table(model, results))
-    for path in written:
-        tell(f"wrote {path}")
-    return DONE
+    else:
+        console().print(summary_table(model, results))
+        for path in written:
+            tell(f"wrote {path}")
+    return complain_of(failed, options)
 
 
 @contextmanager

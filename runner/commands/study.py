@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..printing import complain, tell
+from ..printing import complain, complain_traceback, tell
 from .options import DONE, FAILED, INTERRUPTED, add_types
 
 if TYPE_CHECKING:
@@ -124,6 +124,7 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     from epicycle.actors import counted
 
     from ..study import WorkerError, WriteError, open_study, run_study
+    from ..study.one_run import again
     from ..study.progress import progress
 
     try:
@@ -156,5 +157,10 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
         complain(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
     if len(failures) > SHOWN:
         complain(f"... and {len(failures) - SHOWN:,} more: epicycle status {folder}")
+    if options.debug and failures:
+        *_, raised = again(plan, plan.condition(failures[0]["condition"]), failures[0]["seed"])
+        if raised is not None:
+            complain(f"the first of them, repeated: run {failures[0]['run'][:12]}")
+            complain_traceback(raised)
     complain(f"error: {counted(outcome.failed, 'run')} failed")
     return FAILED

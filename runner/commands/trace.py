@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     start = to_nanoseconds(seconds("--from", options.start)) if options.start is not None else 0
     end = seconds("--to", options.to) if options.to is not None else None
-    model, _ = load(options)
+    model = load(options)
     actors = _actors(options.actor, model.graph)
     show = _as_json if options.json else _as_text(actors, model.graph)
     say = tell_json_text if options.json else tell

@@ -21,7 +21,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Load the model, and say how large it is."""
     if is_study(options.model):
         return check_study(options)
-    model, _ = load(options, strict=options.strict)
+    model = load(options, strict=options.strict)
     tell(f"{options.model} is valid: {model.extent}")
     return DONE
 

@@ -32,7 +32,7 @@ from typing import Any
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake, readable
 from epicycle.aspects import Job
 
-from ..model import Position, told_raised
+from ..model import Position, describe, told_raised
 from .agenda import Environment, Instant, Turn
 from .pace import Pace
 
@@ -367,11 +367,3 @@ class Director:
                 return ActorError(actor.path, self.tag, "run()", describe(failure)), failure
         cause = error.__cause__ or error  # SimPy raises a copy of it
         return ActorError("a SimPy process", self.tag, "its generator", describe(cause)), cause
-
-
-def describe(error: BaseException) -> str:
-    """An exception in one line; our own explain themselves without their type."""
-    text = str(error).strip()
-    if isinstance(error, EpicycleError):
-        return text
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -15,8 +15,9 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import ActorPoint, Job
 
+from ..model import describe
 from .agenda import Turn
-from .director import ActorError, Director, describe
+from .director import ActorError, Director
 from .local import LocalDirector
 
 

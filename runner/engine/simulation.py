@@ -10,8 +10,8 @@ from typing import Any
 from epicycle.actors import Actor, to_nanoseconds, to_seconds
 
 from ..collection import without_collection
-from ..model import Metric, Model, WovenAspect, raised_at
-from .director import ActorError, Director, describe
+from ..model import Metric, Model, WovenAspect, describe, raised_at
+from .director import ActorError, Director
 from .local import Deliver
 from .log import EventLog
 from .log_filter import LogFilter

@@ -20,8 +20,8 @@ from epicycle.actors import (
 )
 from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint, Medium, Unit
 
-from ..model import Clock, Hop, Model, WovenAspect
-from .director import ActorError, Director, LoopError, describe
+from ..model import Clock, Hop, Model, WovenAspect, describe
+from .director import ActorError, Director, LoopError
 from .execution import Execution
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog, Write

@@ -2,7 +2,7 @@
 
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
-from .culprit import raised_at
+from .culprit import describe, raised_at
 from .ends import CompositePort, Instance
 from .graph import Hop, ModelGraph, Wire
 from .load import load_model
@@ -32,6 +32,7 @@ __all__ = [
     "Problems",
     "Wire",
     "WovenAspect",
+    "describe",
     "did_you_mean",
     "extent",
     "firing_order",

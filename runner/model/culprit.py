@@ -1,4 +1,4 @@
-"""Where an exception comes from: the last line of a user's own code that it went through."""
+"""What an exception says and where it comes from: the last line of a user's own code that it went through."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import PurePath
 from traceback import FrameSummary, extract_tb, walk_tb
 from types import FrameType
 
-from epicycle.actors import Configurable
+from epicycle.actors import Configurable, EpicycleError
 
 from .problems import Position
 
@@ -63,3 +63,11 @@ def _source(line: FrameSummary) -> str:
 def in_short(file: str) -> str:
     """A file as seen from the present folder, if it is in there."""
     return file.removeprefix(os.getcwd() + os.sep)
+
+
+def describe(error: BaseException) -> str:
+    """An exception in one line; our own explain themselves without their type."""
+    text = str(error).strip()
+    if isinstance(error, EpicycleError):
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
-from epicycle.actors import Actor, EpicycleError, Parameter, ParameterError
+from epicycle.actors import Actor, Parameter, ParameterError
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, class_decorations
 
 from .catalogue import Catalogue, CatalogueError
@@ -81,8 +81,8 @@ class AspectElaborator(Configurator):
         is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)
-        except (EpicycleError, ValueError) as error:
-            self.problems.add(f"aspect {name}: {error}", part.position, scope=scope)
+        except Exception as error:  # whatever an aspect's own __init__ does
+            self._blame(f"aspect {name}", error, part.position, scope)
             aspect = None
         if aspect is None:
             weaving.select(part.at)  # for what is wrong with it
