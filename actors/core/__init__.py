@@ -23,6 +23,7 @@ from .quantity import Quantity, counted_in_si, plain
 from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
+from .visible import readable, shortened, visible, visible_character, visible_lines
 from .words import counted
 
 __all__ = [
@@ -63,11 +64,16 @@ __all__ = [
     "random_stream",
     "read_regular",
     "read_table",
+    "readable",
     "shaped",
+    "shortened",
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
     "type_name",
     "unknown_parameter",
     "variants",
+    "visible",
+    "visible_character",
+    "visible_lines",
 ]

@@ -10,8 +10,8 @@ from typing import Any
 from epicycle.actors import Actor, to_nanoseconds, to_seconds
 
 from ..collection import without_collection
-from ..model import Model
-from .director import ActorError, Director, describe
+from ..model import Model, WovenAspect, describe, raised_at
+from .director import ActorError, Director
 from .local import Deliver
 from .log import EventLog
 from .log_filter import LogFilter
@@ -59,8 +59,12 @@ class Simulation:
         self._has_run = False
         self._started = 0.0
         self._stop: int | None = None
-        with without_collection():
-            self._wiring = Wiring(model, self.director, self.log, self._listeners(), self.signals)
+        self._unreported: ActorError | None = None
+        try:
+            with without_collection():
+                self._wiring = Wiring(model, self.director, self.log, self._listeners(), self.signals)
+        except ActorError as error:  # of a clock that is wrong in a way that cannot be told
+            raise self._placed(error) from _cause(error)
 
     # -- what is watched ------------------------------------------------------------------------------------------
 
@@ -124,15 +128,17 @@ class Simulation:
             self._wiring.open()
             stopped = director.run(stop, actors, progress, pace)
         except ActorError as error:
-            raise self._placed(error) from error.__cause__
+            raise self._placed(error) from _cause(error)
         finally:
             self._wiring.close()
             if self._tracer is not None:
                 self._tracer.end()
             late = self._wrap_up(begun)
+        results = self.results(stopped)
+        late = late or self._unreported
         if late is not None:
-            raise self._placed(late) from late.__cause__
-        return self.results(stopped)
+            raise self._placed(late) from _cause(late)
+        return results
 
     def results(self, stopped: str) -> Results:
         """What has come of the run so far; ``stopped`` says why it is over."""
@@ -172,10 +178,10 @@ class Simulation:
             raise ActorError(actor.path, self.director.tag, f"{method}()", describe(error)) from error
 
     def _placed(self, error: ActorError) -> ActorError:
-        """The error with the place in the model file where its actor is declared."""
+        """The error with the place in the model file where its actor is declared, and the user's line it comes from."""
         position = self.model.graph.positions.get(error.path)
         where = f"{position.file}:{position.line}:{position.column}" if position else ""
-        return ActorError(error.path, error.tag, error.doing, error.reason, where)
+        return ActorError(error.path, error.tag, error.doing, error.reason, where, raised_at(_cause(error)))
 
     def _figures(self) -> dict[str, dict[str, float | None]]:
         """How often each event of each aspect happened, over all its ports, and what the aspect reports."""
@@ -185,8 +191,22 @@ class Simulation:
             for point in self._wiring.points[woven.name]:
                 for event, number in point.counts.items():
                     total[event] = total.get(event, 0) + number
-            figures[woven.name] = {
-                **total,
-                **woven.aspect.report(self._wiring.shared(woven), self.director.last.time),
-            }
+            figures[woven.name] = {**total, **self._report(woven)}
         return figures
+
+    def _report(self, woven: WovenAspect) -> dict[str, float | None]:
+        """What an aspect reports; if it fails, that is told when all results are there."""
+        try:
+            return dict(woven.aspect.report(self._wiring.shared(woven), self.director.last.time))
+        except Exception as error:
+            self._unreported = ActorError(f"aspect {woven.name}", self.director.tag, "report()", describe(error))
+            self._unreported.__cause__ = error
+            return {}
+
+
+def _cause(error: ActorError) -> BaseException | None:
+    """What an actor really raised: SimPy raises a copy of an error, whose cause the error itself is."""
+    cause = error.__cause__
+    while isinstance(cause, ActorError):
+        cause = cause.__cause__
+    return cause

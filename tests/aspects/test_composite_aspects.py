@@ -427,7 +427,8 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
         (
             "net: {type: Desks, at: a.input}",
             """m.yaml:33:23: error: aspect net: there is no aspect type 'Desks', did you mean 'Desk'?
-   help: valid types: those that 'epicycle aspects' lists""",
+   help: valid types: those that 'epicycle aspects' lists
+   help: one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]""",
         ),
         (
             "net: {type: Crossing, at: a.input}",
