@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import EpicycleError
 from .nearest import did_you_mean
-from .quantity import Quantity, counted_in_si
+from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
 
 T = TypeVar("T")
@@ -179,6 +179,8 @@ class Parameter(Generic[T]):
 
     def _scalar(self, value: object) -> object:
         if self.type is object:
+            if is_too_deep(value):
+                raise ParameterError(f"nested deeper than {MAX_DEPTH} levels")
             return counted_in_si(value)
         if self.type is Path:
             if isinstance(value, (str, Path)) and str(value) and "\0" not in str(value):

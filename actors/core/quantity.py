@@ -8,6 +8,8 @@ from typing import Any
 
 from .units import UnitError, between, is_compound, parse_unit
 
+MAX_DEPTH = 100  # of lists and mappings in each other, in files and in what expressions make of them
+
 
 class Quantity(float):
     """A float that is counted in ``unit``.
@@ -152,6 +154,18 @@ def _is_readable(unit: str) -> bool:
         parse_unit(unit)
     except UnitError:  # powers, or a text, without end
         return False
+    return True
+
+
+def is_too_deep(value: object) -> bool:
+    """Whether lists and mappings stand in each other at more than ``MAX_DEPTH`` levels."""
+    level: list[Any] = [value]
+    for _ in range(MAX_DEPTH + 1):
+        # What several share is looked at once, or else a few could hold more than can be counted.
+        holders = {id(each): each for each in level if isinstance(each, (list, tuple, dict))}.values()
+        if not holders:
+            return False
+        level = [inner for each in holders for inner in (each.values() if isinstance(each, dict) else each)]
     return True
 
 

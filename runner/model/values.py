@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Container
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, Quantity
+from epicycle.actors import MAX_DEPTH, Parameter, ParameterError, Quantity, is_too_deep
 from epicycle.actors.expression import Budget, BudgetError, ExpressionError, check_names, interpolate, names_in
 
 from .declarations import ParameterText
@@ -37,13 +37,20 @@ class Values:
         ``label`` is whose value it is, ``scope`` the composite in which it stands; ``later`` are the names that are
         declared but have no value yet.
         """
+        value = self._of(node, names, label, scope, later)
+        if not isinstance(node, Scalar) and is_too_deep(value):
+            self.problems.add(f"{label}: nested deeper than {MAX_DEPTH} levels", node.position, scope=scope)
+            return self.missing
+        return value
+
+    def _of(self, node: Node, names: dict[str, object], label: str, scope: str, later: Collection[str]) -> Any:
         if not isinstance(node, Scalar):
             self._pay(node, len(node.items if isinstance(node, Sequence) else node.entries) // 3, label, scope)
         if isinstance(node, Sequence):
-            items = [self.of(item, names, label, scope, later) for item in node.items]
+            items = [self._of(item, names, label, scope, later) for item in node.items]
             return self.missing if any(item is self.missing for item in items) else items
         if isinstance(node, Mapping):
-            entries = {k: self.of(entry.value, names, label, scope, later) for k, entry in node.entries.items()}
+            entries = {k: self._of(entry.value, names, label, scope, later) for k, entry in node.entries.items()}
             return self.missing if any(item is self.missing for item in entries.values()) else entries
         if not isinstance(node.value, str) or "${" not in node.value:
             return node.value
