@@ -9,11 +9,14 @@ from collections.abc import Callable, Sequence
 from .collection import seldom_collecting
 from .commands import COMMANDS
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED, complain
+from .leaving import leave
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:  # as a program, not called by one
+        return leave(main(sys.argv[1:]))
+    given = list(arguments)
     options = parser().parse_args(given)
     command: Callable[[argparse.Namespace, list[str]], int] = options.command
     from epicycle.actors import EpicycleError

@@ -40,13 +40,13 @@ class Quantity(float):
         number = float(self)
         if unit == self.unit:
             return number
-        return _times(number, *between(self.unit, unit, f"{number:g} {self.unit}"))
+        return _times(number, *between(self.unit, unit, f"{number:g} {self.unit}"), self.unit, unit)
 
     @property
     def si(self) -> float:
         """The number counted in SI units."""
         unit = parse_unit(self.unit)
-        return _times(float(self), unit.scale, unit.pi_power)
+        return _times(float(self), unit.scale, unit.pi_power, self.unit, "SI units")
 
     def _beside(self, other: float) -> float:
         """The other side of a sum or comparison, in this unit."""
@@ -129,11 +129,14 @@ class Quantity(float):
     __hash__ = float.__hash__
 
 
-def _times(number: float, factor: Fraction, pi_power: int) -> float:
+def _times(number: float, factor: Fraction, pi_power: int, unit: str, wanted: str) -> float:
     if not math.isfinite(number) or (factor == 1 and not pi_power):
         return number
     exact = Fraction(number) * factor
-    return float(exact * Fraction(math.pi) ** pi_power if pi_power else exact)
+    try:
+        return float(exact * Fraction(math.pi) ** pi_power if pi_power else exact)
+    except OverflowError:
+        raise UnitError(f"{number:g} {unit} is too large for a number in {wanted}") from None
 
 
 def _in(number: float, unit: str, sign: str, other: float) -> float:
@@ -146,7 +149,7 @@ def _in(number: float, unit: str, sign: str, other: float) -> float:
     if _is_readable(text):
         return Quantity(number, text)
     whole = parse_unit(unit) * parse_unit(other.unit) ** (1 if sign == "*" else -1)
-    return _times(number, whole.scale, whole.pi_power)
+    return _times(number, whole.scale, whole.pi_power, text, "SI units")
 
 
 def _is_readable(unit: str) -> bool:

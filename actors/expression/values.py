@@ -98,7 +98,9 @@ def check_result(value: object) -> None:
         item = stack.pop()
         if isinstance(item, float) and math.isnan(item):
             raise ValueError("the result is not a number (NaN)")
-        if isinstance(item, int):
+        if isinstance(item, Quantity):
+            item.si  # noqa: B018  raises what would be raised wherever it counts in SI units
+        elif isinstance(item, int):
             _checked(item)
         elif isinstance(item, (list, tuple, dict)):
             stack += item.values() if isinstance(item, dict) else item

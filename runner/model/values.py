@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Container
 from typing import Any
 
-from epicycle.actors import MAX_DEPTH, Parameter, ParameterError, Quantity, is_too_deep
+from epicycle.actors import MAX_DEPTH, Parameter, ParameterError, Quantity, UnitError, is_too_deep
 from epicycle.actors.expression import Budget, BudgetError, ExpressionError, check_names, interpolate, names_in
 
 from .declarations import ParameterText
@@ -106,7 +106,7 @@ class Values:
             return self.missing
         try:
             return self._convert(parameter, value)
-        except ParameterError as error:
+        except (ParameterError, UnitError) as error:
             self.problems.add(f"{full}: {error}", position, scope=scope)
         return self.missing
 
@@ -136,7 +136,11 @@ class Values:
         bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}
         if parameter.unit:
             number = Parameter(float, unit=parameter.unit, **bounds).convert(value)
-            return number if number is None or parameter.unit == "1" else Quantity(number, parameter.unit)
+            if number is None or parameter.unit == "1":
+                return number
+            value = Quantity(number, parameter.unit)
+            value.si  # noqa: B018  raises what would be raised wherever it counts in SI units
+            return value
         if isinstance(default, bool):
             return Parameter(bool).convert(value)
         if isinstance(default, int):
