@@ -25,10 +25,10 @@ class Values:
 
     missing = _Missing()
 
-    def __init__(self, problems: Problems) -> None:
+    def __init__(self, problems: Problems, budget: Budget | None = None) -> None:
         self.problems = problems
+        self.budget = budget or Budget(MAX_STEPS, "the values of the model take")
         self.outside: dict[str, object] = {}  # the names that a value knows which is set from outside: none
-        self._budget = Budget(MAX_STEPS, "the values of the model take")
         self.of_model: Container[str] = ()  # the model's own parameters, which composites do not see
 
     def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Collection[str] = ()) -> Any:
@@ -68,12 +68,12 @@ class Values:
                     scope=scope,
                 )
                 return self.missing
-            value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self._budget)
+            value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self.budget)
         except ExpressionError as error:
             self.problems.add(
                 f"{label}: {error.message}", _inside(node, error), *self._unseen(node.value, names), scope=scope
             )
-            if self._budget.is_spent:
+            if self.budget.is_spent:
                 self.problems.raise_if_any()
             return self.missing
         if isinstance(value, (list, dict)):
@@ -83,7 +83,7 @@ class Values:
     def _pay(self, node: Node, steps: int, label: str, scope: str) -> None:
         """Take steps off what all values may cost together; when that is spent, there is no going on."""
         try:
-            self._budget.spend(steps)
+            self.budget.spend(steps)
         except BudgetError as error:
             self.problems.add(f"{label}: {error}", node.position, scope=scope)
             self.problems.raise_if_any()
