@@ -42,6 +42,7 @@ class _Required:
 
 
 REQUIRED: Any = _Required()
+_EXACT = 2**53  # up to which all whole numbers are floats
 _WORDS: dict[Any, str] = {
     float: "number",
     int | float: "number",
@@ -236,11 +237,23 @@ class Parameter(Generic[T]):
 
     def _array(self, value: object) -> NDArray[np.float64]:
         assert self.shape is not None
-        array = np.array(self._rows(value, self.shape, value), dtype=float)
+        rows = value if self._is_plain_row(value) else self._rows(value, self.shape, value)
+        array = np.array(rows, dtype=float)
         if array.size == 0:
             array = array.reshape([0 if size is None else size for size in self.shape])
         array.flags.writeable = False
         return array
+
+    def _is_plain_row(self, value: object) -> bool:
+        """Whether this is a list of plain numbers within bounds: there may be very many, of which most lists are."""
+        if self.shape != (None,) or self.type is not float or not isinstance(value, (list, tuple)):
+            return False
+        if not value or not {float, int}.issuperset(map(type, value)):
+            return False
+        if any(isinstance(each, int) and abs(each) > _EXACT for each in value) or any(map(math.isnan, value)):
+            return False
+        low, high = min(value), max(value)
+        return (self.min is None or low >= self.min) and (self.max is None or high <= self.max)
 
     def _rows(self, value: object, shape: tuple[int | None, ...], whole: object) -> object:
         if not shape:

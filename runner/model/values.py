@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Container
+from collections.abc import Callable, Collection, Container
 from typing import Any
 
 from epicycle.actors import MAX_DEPTH, Parameter, ParameterError, Quantity, UnitError, is_too_deep
@@ -77,7 +77,7 @@ class Values:
                 self.problems.raise_if_any()
             return self.missing
         if isinstance(value, (list, dict)):
-            self._pay(node, len(value) // 3, label, scope)
+            self._pay(node, len(value), label, scope)
         return value
 
     def _pay(self, node: Node, steps: int, label: str, scope: str) -> None:
@@ -117,37 +117,47 @@ class Values:
             if not isinstance(value, kind):
                 missing = f"a value is missing, expected a {word}"
                 raise ParameterError(missing if value is None else f"{value!r} is not a {word}")
-            return self._each(parameter, None, value)
+            return _each(self._reader(parameter, None), value)
         literal = None if default is None else default.value
         if value is None and default is not None and literal is None:
             return None  # a parameter that may be left empty
         if isinstance(literal, (int, float)):
-            return self._scalar(parameter, literal, value)
-        return self._each(parameter, literal, value)
+            return self._reader(parameter, literal)(value)
+        return _each(self._reader(parameter, literal), value)
 
-    def _each(self, parameter: ParameterText, default: object, value: Any) -> Any:
-        if isinstance(value, list):
-            return [self._each(parameter, default, item) for item in value]
-        return self._scalar(parameter, default, value)
-
-    def _scalar(self, parameter: ParameterText, default: object, value: Any) -> Any:
+    def _reader(self, parameter: ParameterText, default: object) -> Callable[[Any], Any]:
+        """What makes a value, or each one in a list, what the parameter holds."""
         if parameter.choices:
-            return Parameter(str, choices=parameter.choices).convert(value)
+            return Parameter(str, choices=parameter.choices).convert
         bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}
         if parameter.unit:
-            number = Parameter(float, unit=parameter.unit, **bounds).convert(value)
-            if number is None or parameter.unit == "1":
-                return number
-            value = Quantity(number, parameter.unit)
-            value.si  # noqa: B018  raises what would be raised wherever it counts in SI units
-            return value
+            number, unit = Parameter(float, unit=parameter.unit, **bounds), parameter.unit
+            return number.convert if unit == "1" else lambda value: _quantity(number.convert(value), unit)
         if isinstance(default, bool):
-            return Parameter(bool).convert(value)
+            return Parameter(bool).convert
         if isinstance(default, int):
-            return Parameter(int, unit="1", **bounds).convert(value)
+            return Parameter(int, unit="1", **bounds).convert
         if isinstance(default, float) or parameter.min is not None or parameter.max is not None:
-            return Parameter(float, unit="1", **bounds).convert(value)
-        return value
+            return Parameter(float, unit="1", **bounds).convert
+        return _as_it_is
+
+
+def _each(read: Callable[[Any], Any], value: Any) -> Any:
+    if isinstance(value, list):
+        return value if read is _as_it_is else [_each(read, item) for item in value]
+    return read(value)
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+def _quantity(number: float | None, unit: str) -> Quantity | None:
+    if number is None:
+        return None
+    made = Quantity(number, unit)
+    made.si  # noqa: B018  raises what would be raised wherever it counts in SI units
+    return made
 
 
 def _inside(node: Scalar, error: ExpressionError) -> Position:
