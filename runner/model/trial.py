@@ -13,7 +13,6 @@ from .limits import RAISE_IT
 from .settings import Settings
 from .values import Values
 
-MAX_INSTANCES = 10_000  # of one class; what is wrong shows in the first ones
 _OVERHEAD = 3  # what a class takes beside what is in it, as many actors
 
 
@@ -39,17 +38,17 @@ def try_classes(composites: Mapping[str, CompositeText], model: Elaborator, brok
         if left > 0:
             trial = _Trial(ModelText(composites[name]), dict(composites), Settings(), problems, model.catalogue, broken)
             trial.values = Values(problems, model.values.budget)
-            trial.most = min(left, MAX_INSTANCES)
+            trial.most = left
             is_whole = trial.unfold(composites[name])
             left -= trial.cost
             tried |= trial.made
         if not is_whole:
             untried.append(name)
     if untried:
-        others = f" and {counted(len(untried) - 1, 'other')}" if len(untried) > 1 else ""
+        names = f"{untried[0]} is" if len(untried) == 1 else f"{untried[0]} and {counted(len(untried) - 1, 'other')} are"
         problems.warn(
-            f"{untried[0]}{others} were not checked in full: the model has no instance of them, and to check all such "
-            f"classes takes more than {limits.actors:,} actors and composites",
+            f"{names} not checked in full: the model has no instance of such a class, and to try all that it has none "
+            f"of takes more than {limits.actors:,} actors and composites",
             composites[untried[0]].position,
             RAISE_IT,
         )
@@ -58,7 +57,7 @@ def try_classes(composites: Mapping[str, CompositeText], model: Elaborator, brok
 class _Trial(Elaborator):
     """Unfolds one instance of a class, called as the class is, with nothing around it."""
 
-    most = MAX_INSTANCES
+    most = 0
 
     @property
     def cost(self) -> int:
