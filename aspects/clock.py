@@ -58,8 +58,8 @@ class ClockOffset(ClockAspect):
     after some time is not affected; what it does at a time is, and what it says of the time.
     """
 
-    offset = Parameter(float, 0.0, unit="s", doc="how far the clock is ahead; below 0 it is late")
-    deviation = Parameter(float, 0.0, min=0.0, unit="s", doc="standard deviation of that from clock to clock")
+    offset = Parameter(float, 0.0, unit="s", min=-1e9, max=1e9, doc="how far the clock is ahead; below 0 it is late")
+    deviation = Parameter(float, 0.0, min=0.0, max=1e8, unit="s", doc="standard deviation of that from clock to clock")
 
     def error(self, random: Stream) -> tuple[int, Fraction]:
         return to_nanoseconds(self.offset + self.deviation * random.standard_normal()), Fraction(1)

@@ -19,7 +19,7 @@ from .parameter import (
 from .port_parameter import PortParameter
 from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
-from .quantity import Quantity, counted_in_si, plain
+from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
@@ -27,6 +27,7 @@ from .visible import readable, shortened, visible, visible_character, visible_li
 from .words import counted
 
 __all__ = [
+    "MAX_DEPTH",
     "NANOSECONDS_PER_SECOND",
     "REQUIRED",
     "Actor",
@@ -57,6 +58,7 @@ __all__ = [
     "did_you_mean",
     "has_own_ports",
     "irregular",
+    "is_too_deep",
     "nearest",
     "open_regular",
     "parse_unit",

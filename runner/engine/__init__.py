@@ -4,13 +4,14 @@ from .director import ActorError, Director, LoopError
 from .encoding import canonical, plain, scalars
 from .log import EventLog, LogError, Record, check_log_path, write_log
 from .log_filter import LogFilter
-from .pace import Pace
+from .pace import SLOWEST, Pace
 from .results import Results
 from .signal import Signal, SignalError
 from .simulation import Simulation
 from .trace import Arrival, Firing, Tracer
 
 __all__ = [
+    "SLOWEST",
     "ActorError",
     "Arrival",
     "Director",

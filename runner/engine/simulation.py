@@ -174,7 +174,9 @@ class Simulation:
     def _call(self, actor: Actor, method: str) -> None:
         try:
             getattr(actor, method)()
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             raise ActorError(actor.path, self.director.tag, f"{method}()", describe(error)) from error
 
     def _placed(self, error: ActorError) -> ActorError:

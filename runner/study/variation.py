@@ -134,7 +134,20 @@ class DimensionReader(NodeReader):
         if size > MAX_LEVELS:
             self.problems.add(f"the range of {name!r} has more than {MAX_LEVELS:,} values", at)
             return None
-        return Ranged(name, position, start, step, size, next(iter(units)), node.position)
+        found = Ranged(name, position, start, step, size, next(iter(units)), node.position)
+        try:
+            is_distinct = found.is_distinct()
+        except UnitError as error:
+            self.problems.add(f"the range of {name!r}: {error}", at)
+            return None
+        if not is_distinct:
+            self.problems.add(
+                f"the range of {name!r} has values that cannot be told apart as floats: "
+                f"from {start} to {end} in steps of {step}",
+                at,
+            )
+            return None
+        return found
 
     def quantity(self, node: Node, what: str) -> tuple[Decimal, str] | None:
         """A number, perhaps with a unit."""
