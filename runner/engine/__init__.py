@@ -1,7 +1,7 @@
 """From a model to its results: director, event log, simulation."""
 
 from .director import ActorError, Director, LoopError
-from .encoding import canonical, plain, scalars
+from .encoding import canonical, cell, leaves, plain
 from .log import EventLog, LogError, Record, check_log_path, write_log
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
@@ -28,8 +28,9 @@ __all__ = [
     "Simulation",
     "Tracer",
     "canonical",
+    "cell",
     "check_log_path",
+    "leaves",
     "plain",
-    "scalars",
     "write_log",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, to_seconds
@@ -11,13 +12,16 @@ from epicycle.actors import counted, to_seconds
 from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
 from .batches import Interval
-from .encoding import scalars
+from .encoding import cell, leaves
 from .log import EventLog
 from .measurement import Outcome
 from .signal import Signal, SignalError
 
 if TYPE_CHECKING:
     import pandas
+
+
+COLUMNS = ("time", "time_ns", "microstep", "signal", "field", "type", "value", "text")  # of recorded signals
 
 
 @dataclass(repr=False)
@@ -74,20 +78,26 @@ class Results:
         return name in self.signals
 
     def table(self) -> dict[str, list[Any]]:
-        """All recorded numbers in long form, the columns of ``signals.parquet``."""
-        table: dict[str, list[Any]] = {"time": [], "microstep": [], "signal": [], "field": [], "value": []}
-        for name, signal in self.signals.items():
-            for tag, token in zip(signal.tags, signal.tokens, strict=True):
-                for place, value in scalars(token):
-                    table["time"].append(to_seconds(tag.time))
-                    table["microstep"].append(tag.microstep)
-                    table["signal"].append(name)
-                    table["field"].append(place)
-                    table["value"].append(value)
+        """All that was recorded in long form, the columns of ``signals.parquet``: a row for each leaf of each token.
+
+        ``time`` is in s, ``time_ns`` the same as an integer, ``field`` the place in the token, and ``type`` says what
+        was there.  ``value`` is a number, or 0 or 1 for false or true; ``text`` is anything else, and the digits of an
+        int that no float is.
+        """
+        rows = (
+            (to_seconds(tag.time), *tag, name, place, *(("float", leaf, None) if type(leaf) is float else cell(leaf)))
+            for name, signal in self.signals.items()
+            for tag, token in zip(signal.tags, signal.tokens, strict=True)
+            for place, leaf in leaves(token)
+        )
+        table: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+        while some := list(islice(rows, 10_000)):
+            for column, values in zip(table.values(), zip(*some, strict=True), strict=True):
+                column.extend(values)
         return table
 
     def to_pandas(self) -> pandas.DataFrame:
-        """All recorded numbers in long form: ``time`` (s), ``microstep``, ``signal``, ``field``, ``value``."""
+        """All that was recorded in long form, as ``table`` has it."""
         frame: pandas.DataFrame = pandas_module().DataFrame(self.table())
         return frame
 
