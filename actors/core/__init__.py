@@ -2,6 +2,7 @@
 
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .errors import EpicycleError
+from .files import irregular, open_regular, read_regular, read_table
 from .mapping import MappingParameter
 from .nearest import did_you_mean, nearest
 from .parameter import (
@@ -53,10 +54,14 @@ __all__ = [
     "declared_ports",
     "did_you_mean",
     "has_own_ports",
+    "irregular",
     "nearest",
+    "open_regular",
     "parse_unit",
     "plain",
     "random_stream",
+    "read_regular",
+    "read_table",
     "shaped",
     "texts_parameter",
     "to_nanoseconds",

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from epicycle.actors import irregular
+
 from ..collection import without_collection
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
@@ -163,8 +165,8 @@ def included_composites(
             if not exists:
                 names = [str(path.relative_to(where.parent)) for path in _beside(target, where)]
                 kind = f"does not exist{did_you_mean(include.text, names)}"
-                if target.is_dir():
-                    kind = "is a folder"
+                if target.exists():
+                    kind = f"is {irregular(target)}"
                 problems.add(f"the included file {include.text!r} {kind}", include.position)
                 continue
             node = read(target, problems, str(where.parent / include.text))

@@ -8,7 +8,7 @@ from inspect import isabstract
 from pathlib import Path
 from types import ModuleType
 
-from epicycle.actors import Actor, EpicycleError
+from epicycle.actors import Actor, EpicycleError, irregular
 from epicycle.aspects import Aspect
 
 
@@ -40,7 +40,8 @@ def _imported(path: Path) -> ModuleType:
     if path.suffix != ".py" or not path.stem.isidentifier():
         raise TypesError(f"--types {path}: expected a Python file such as my_actors.py")
     if not path.is_file():
-        raise TypesError(f"--types {path}: there is no such file")
+        what = f"this is {irregular(path)}" if path.exists() else "there is no such file"
+        raise TypesError(f"--types {path}: {what}")
     file, name = path.resolve(), path.stem
     known = sys.modules.get(name)
     if known is not None:
