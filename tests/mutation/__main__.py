@@ -242,7 +242,7 @@ def main() -> int:
     mutants = [
         each for each in mutants_module.session(ROOT, CACHE / "session.sqlite") if each.file.startswith(given.only)
     ]
-    chosen = mutants_module.sample(mutants, given.count, given.seed)
+    chosen = mutants_module.sample(ROOT, mutants, given.count, given.seed)
     print(f"{len(mutants):,} mutants, of which {len(chosen)} are tried", flush=True)
     trial.preload()
     scratch = Path(tempfile.mkdtemp(prefix="epicycle-mutants-"))

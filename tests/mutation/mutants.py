@@ -62,7 +62,7 @@ def session(root: Path, file: Path) -> Iterator[Mutant]:
                 yield found
 
 
-def sample(mutants: list[Mutant], count: int, seed: int) -> list[Mutant]:
+def sample(root: Path, mutants: list[Mutant], count: int, seed: int) -> list[Mutant]:
     """So many mutants, at places that are spread evenly over all files; at each place one of those there are."""
     places: dict[tuple[str, int, int], list[Mutant]] = {}
     for mutant in sorted(mutants):
@@ -72,17 +72,46 @@ def sample(mutants: list[Mutant], count: int, seed: int) -> list[Mutant]:
     start = chance.uniform(0.0, step)
     order = list(places.values())
     chosen = [order[int(start + step * number)] for number in range(min(count, len(order)))]
-    return [chance.choice(each) for each in chosen]
+    found = []
+    for each in chosen:
+        chance.shuffle(each)
+        found += [mutant for mutant in each if _is_python(root / mutant.file, mutant)][:1]
+    return found
+
+
+def _is_python(path: Path, mutant: Mutant) -> bool:
+    try:
+        compile(mutant.source(path.read_text(encoding="utf-8")) or "", str(path), "exec")
+    except SyntaxError:
+        return False
+    return True
 
 
 def _says_nothing(path: Path, mutant: Mutant) -> bool:
-    """Whether it changes what is never run (annotations), or a tolerance."""
+    """Whether it changes what is never run (annotations) or a tolerance, or fails or is the same wherever it is run."""
+    if _is_no_mistake_to_make(mutant.operator):
+        return True
     text, ranges = _annotations(path)
     tolerances = TOLERANCES.get(mutant.file)
     if tolerances is not None and tolerances.search(text.splitlines()[mutant.line - 1]):
         return True
     at = (mutant.line, mutant.column)
     return any(first <= at < last for first, last in ranges)
+
+
+def _is_no_mistake_to_make(operator: str) -> bool:
+    """Shifts and bits of numbers fail at once, which would flatter the score; ``is`` and ``==`` agree on None."""
+    kind, _, change = operator.partition("/")[2].partition("_")
+    before, _, after = change.partition("_")
+    if kind in ("ReplaceBinaryOperator", "ReplaceUnaryOperator"):
+        return (before in _BITS) != (after in _BITS)
+    if kind == "ReplaceComparisonOperator":
+        return (before in _SAME) != (after in _SAME)
+    return False
+
+
+_BITS = {"RShift", "LShift", "BitOr", "BitAnd", "BitXor", "Invert"}
+_SAME = {"Is", "IsNot"}
 
 
 @cache

@@ -31,7 +31,7 @@ class Recorder:
         self.failed: list[str] = []
         self._passed: dict[str, float] = {}
         include = [str(self.root / folder / "*") for folder in GUARDED]
-        self._coverage = coverage.Coverage(data_file=None, include=include, config_file=False, core="ctrace")
+        self._coverage = coverage.Coverage(data_file=None, include=include, config_file=False)
 
     def pytest_sessionstart(self) -> None:
         self._coverage.start()
