@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from itertools import combinations
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core.elementary import distance
 from .messages import BodyState
 
 
@@ -29,12 +29,12 @@ class GoalMonitor(Actor):
     def fire(self) -> None:
         position: list[float] = self.state.value.position.tolist()
         if self._last is not None:
-            self._length += math.dist(position, self._last)
+            self._length += distance(position, self._last)
         self._last = position
-        distance = math.dist(position, self.goal.tolist())
+        left = distance(position, self.goal.tolist())
         self.path_length.send(self._length)
-        self.distance.send(distance)
-        if distance <= self.tolerance and not self._has_arrived:
+        self.distance.send(left)
+        if left <= self.tolerance and not self._has_arrived:
             self._has_arrived = True
             self.time.send(self.now)
             self.arrived.send(True)
@@ -49,7 +49,7 @@ class DistanceMonitor(Actor):
 
     def fire(self) -> None:
         if self.a.present and self.b.present:
-            self.distance.send(math.dist(self.a.value.position.tolist(), self.b.value.position.tolist()))
+            self.distance.send(distance(self.a.value.position.tolist(), self.b.value.position.tolist()))
 
 
 class SeparationMonitor(Actor):
@@ -62,4 +62,4 @@ class SeparationMonitor(Actor):
         # One state of each body: a state that was duplicated on its way is not two bodies at one place.
         positions = [states[-1].position.tolist() for states in self.bodies.by_channel() if states]
         if len(positions) >= 2:
-            self.distance.send(min(math.dist(a, b) for a, b in combinations(positions, 2)))
+            self.distance.send(min(distance(a, b) for a, b in combinations(positions, 2)))

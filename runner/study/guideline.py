@@ -156,10 +156,13 @@ def _confidence(numbers: list[dict[int, float]], sign: float) -> list[float]:
 
     values = sign * np.array([[each[replication] for replication in common] for each in numbers])
     draws = np.random.default_rng(SEED).multinomial(len(common), [1 / len(common)] * len(common), RESAMPLES)
-    means = np.round(draws @ values.T / len(common), 12)
+    sums = np.zeros((RESAMPLES, len(numbers)))
+    for drawn, value in zip(draws.T, values.T, strict=True):  # in this order, whatever the processor
+        sums += drawn[:, np.newaxis] * value
+    means = np.round(sums / len(common), 12)
     is_best = means == means.min(axis=1, keepdims=True)
-    shares = (is_best / is_best.sum(axis=1, keepdims=True)).mean(axis=0)
-    return [float(share) for share in shares]
+    shares = is_best / np.count_nonzero(is_best, axis=1, keepdims=True)
+    return [math.fsum(share) / RESAMPLES for share in shares.T.tolist()]
 
 
 def _finite(value: Any) -> Any:

@@ -39,7 +39,7 @@ def standard_error(values: Sequence[float]) -> float:
     if count < 2:
         return math.nan
     mean = math.fsum(values) / count
-    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1) / count)
+    return math.sqrt(math.fsum((value - mean) * (value - mean) for value in values) / (count - 1) / count)
 
 
 def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
@@ -102,7 +102,7 @@ def paired_difference(first: dict[int, float], second: dict[int, float], level: 
     if len(gaps) < 2:
         return Difference(estimate, math.nan)
     if min(gaps) == max(gaps):
-        return Difference(estimate, 1.0 if gaps[0] == 0 else 2.0 ** (1 - len(gaps)))
+        return Difference(estimate, 1.0 if gaps[0] == 0 else math.ldexp(2.0, -len(gaps)))
     from scipy.stats import t
 
     return Difference(estimate, float(2 * t.sf(abs(estimate.value) / estimate.error, len(gaps) - 1)))
@@ -112,7 +112,7 @@ def without_rounding(values: Iterable[float], scale: float) -> list[float]:
     """Differences of numbers of some size, without what rounding has left: 4.8 - 4.7 and 5.0 - 4.9 are the same."""
     if not scale:
         return list(values)
-    quantum = 2.0 ** (math.frexp(scale)[1] - 42)
+    quantum = math.ldexp(1.0, math.frexp(scale)[1] - 42)
     return [round(value / quantum) * quantum for value in values]
 
 
