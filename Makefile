@@ -13,7 +13,7 @@ help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
 	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
-	@echo "make lint   ruff, formatting and types"
+	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, and types"
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
@@ -47,6 +47,7 @@ robust: $(DEV)
 lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m tests.arithmetic
 	$(BIN)/mypy
 
 reference: $(DEV)
