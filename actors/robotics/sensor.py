@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from ..core import Actor, InputPort, OutputPort, Parameter
+from ..core.elementary import hypot
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, enclosing
 
 
@@ -45,7 +44,7 @@ class Sensor(Actor):
         target = self.target.value
         (tx, ty), (x, y) = target.position.tolist(), position.tolist()
         dx, dy = tx - x, ty - y
-        distance = math.hypot(dx, dy)
+        distance = hypot(dx, dy)
         if self.max_range is not None and distance > self.max_range:
             return
         along, across = self.along * error_along, self.across * error_across
