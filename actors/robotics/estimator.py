@@ -173,7 +173,12 @@ def _order(measurement: Measurement) -> Any:
 
 
 class UnscentedEstimator(_Estimator):
-    """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once."""
+    """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once.
+
+    The estimate is of the time of the trigger, and each measurement is fused at its own time.  For one that comes later
+    the filter goes back to that time and runs again from there, so that from then on nothing tells that it was late;
+    what comes more than ``max_delay`` after it was made is not fused, and counted at ``too_late``.
+    """
 
     def initialize(self) -> None:
         from .numerics import ukf

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epicycle.actors import Configurable, Parameter, array_parameter, texts_parameter
+from epicycle.aspects import STAMP
 
 from ..engine import Results, Signal
 from ..engine.encoding import scalars
@@ -204,10 +205,12 @@ def _selected(patterns: tuple[str, ...], results: Results) -> list[str]:
 
 
 def _numbers(signal: Signal) -> dict[str, tuple[list[float], list[float]]]:
-    """Times and values of each number inside the tokens, by its place."""
+    """Times and values of each number inside the tokens, by its place, but those that say of when a token is."""
     found: dict[str, tuple[list[float], list[float]]] = {}
     for tag, token in zip(signal.tags, signal.tokens, strict=True):
         for place, value in scalars(token):
+            if place.rpartition(".")[2] == STAMP:
+                continue
             times, values = found.setdefault(place, ([], []))
             times.append(tag.seconds)
             values.append(value)
