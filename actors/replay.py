@@ -8,7 +8,16 @@ from bisect import bisect_left
 from pathlib import Path
 from typing import Any, ClassVar
 
-from .core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, texts_parameter, to_nanoseconds
+from .core import (
+    Actor,
+    EpicycleError,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    read_table,
+    texts_parameter,
+    to_nanoseconds,
+)
 
 
 class ReplayError(EpicycleError):
@@ -77,16 +86,10 @@ class Replay(Actor):
         return times, [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
 
     def _table(self) -> Any:
-        # Heavy, and needed by this actor alone.
-        import pyarrow as arrow
-        from pyarrow import csv, parquet
-
         try:
-            if self.file.suffix.lower() == ".csv":
-                return csv.read_csv(self.file)
-            return parquet.read_table(self.file)
-        except (OSError, arrow.ArrowException) as error:
-            raise self._error(" ".join(str(error).split())) from None
+            return read_table(self.file)
+        except OSError as error:
+            raise self._error(str(error.strerror)) from None
 
     def _check_times(self, times: list[Any]) -> list[int]:
         result: list[int] = []

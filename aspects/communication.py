@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Parameter, texts_parameter
+from epicycle.actors import Parameter, Stream, texts_parameter
 
 from .core import CommunicationAspect, JoinPoint
 from .loss import is_bad, loses
@@ -168,7 +168,7 @@ class Corrupt(CommunicationAspect):
         point.forward(new)
 
 
-def _flip(numbers: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
+def _flip(numbers: NDArray[np.float64], random: Stream) -> NDArray[np.float64]:
     """Each number with one bit of its IEEE 754 form turned."""
     bits = np.left_shift(np.uint64(1), random.integers(0, 64, numbers.shape, dtype=np.uint64))
     return (numbers.view(np.uint64) ^ bits).view(np.float64)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-import numpy as np
-
 from epicycle.actors import (
     REQUIRED,
     Configurable,
@@ -14,6 +12,7 @@ from epicycle.actors import (
     MappingParameter,
     Parameter,
     ParameterError,
+    Stream,
 )
 
 from .execution import Job
@@ -44,7 +43,7 @@ class DurationParameter(Parameter[Duration]):
         return super().convert(value)
 
 
-def drawn(duration: Duration, random: np.random.Generator) -> float:
+def drawn(duration: Duration, random: Stream) -> float:
     """A time in seconds; a number is drawn only from a distribution, and counts as 0 where it is negative."""
     return max(0.0, float(duration.draw(random))) if isinstance(duration, Distribution) else duration
 
@@ -75,7 +74,7 @@ class FiringTimeParameter(DurationParameter):
         return super().convert(value)
 
 
-def time_needed(time: FiringTime, job: Job, random: np.random.Generator) -> float | None:
+def time_needed(time: FiringTime, job: Job, random: Stream) -> float | None:
     """How long a firing takes (s); None: there is nothing to do in it that would take time."""
     if not isinstance(time, Mapping):
         return drawn(time, random) if job.is_triggered else None

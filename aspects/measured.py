@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, did_you_mean
+from epicycle.actors import EpicycleError, did_you_mean, read_table
 
 
 class MeasuredTimes:
@@ -49,14 +49,10 @@ class MeasuredTimes:
         return found
 
     def _table(self) -> Any:
-        # Heavy, and needed here alone.
-        import pyarrow as arrow
-        from pyarrow import csv, parquet
-
         try:
-            return (csv.read_csv if self.file.suffix.lower() == ".csv" else parquet.read_table)(self.file)
-        except (OSError, arrow.ArrowException) as error:
-            raise self._error(" ".join(str(error).split())) from None
+            return read_table(self.file)
+        except OSError as error:
+            raise self._error(str(error.strerror)) from None
 
     def _error(self, reason: str) -> EpicycleError:
         return EpicycleError(f"the execution times in {self.file} cannot be used: {reason}")

@@ -2,6 +2,7 @@
 
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .errors import EpicycleError
+from .files import irregular, open_regular, read_regular, read_table
 from .mapping import MappingParameter
 from .nearest import did_you_mean, nearest
 from .parameter import (
@@ -18,13 +19,15 @@ from .parameter import (
 from .port_parameter import PortParameter
 from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
-from .quantity import Quantity, counted_in_si, plain
-from .random import random_stream
+from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
+from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
+from .visible import readable, shortened, visible, visible_character, visible_lines
 from .words import counted
 
 __all__ = [
+    "MAX_DEPTH",
     "NANOSECONDS_PER_SECOND",
     "REQUIRED",
     "Actor",
@@ -41,6 +44,7 @@ __all__ = [
     "PortParameter",
     "Process",
     "Quantity",
+    "Stream",
     "Tag",
     "UnitError",
     "Wake",
@@ -53,15 +57,25 @@ __all__ = [
     "declared_ports",
     "did_you_mean",
     "has_own_ports",
+    "irregular",
+    "is_too_deep",
     "nearest",
+    "open_regular",
     "parse_unit",
     "plain",
     "random_stream",
+    "read_regular",
+    "read_table",
+    "readable",
     "shaped",
+    "shortened",
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
     "type_name",
     "unknown_parameter",
     "variants",
+    "visible",
+    "visible_character",
+    "visible_lines",
 ]

@@ -6,8 +6,9 @@ import re
 from collections.abc import Collection
 from pathlib import Path
 
-from epicycle.actors import Configurable, ParameterError, declared_parameters, unknown_parameter
+from epicycle.actors import Configurable, EpicycleError, ParameterError, declared_parameters, unknown_parameter
 
+from .culprit import describe, raised_at
 from .declarations import CompositeText
 from .document import Entry, Mapping, Node
 from .files import data_file
@@ -150,7 +151,19 @@ class Configurator:
                 self.problems.add(
                     f"{label}.{name}: {error}", place_of(node, error.keys, of_key=error.of_key), scope=composite
                 )
+            except Exception as error:  # of a class of a user's
+                self._blame(f"{label}.{name}", error, node.position, composite)
         return result if complete and len(self.problems) == before else None
+
+    def _blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
+        """Tell what the code of a class has against its values, or how it failed."""
+        if isinstance(error, EpicycleError):
+            self.problems.add(f"{label}: {error}", position, scope=scope)
+            return
+        told = str(error) if isinstance(error, ValueError) else ""
+        self.problems.add(
+            f"{label}: {told or describe(error)}", position, scope=scope, raised=raised_at(error), cause=error
+        )
 
     def _add_unused(self, setting: Setting) -> None:
         """A setting that no parameter took, unless it is meant for an array that is empty now."""

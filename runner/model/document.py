@@ -23,11 +23,12 @@ from yaml.events import (
     ScalarEvent,
 )
 
+from epicycle.actors import MAX_DEPTH, irregular, open_regular
+
 from .files import note_file
 from .problems import Position, Problems, did_you_mean
 
 MAX_BYTES = 10_000_000
-MAX_DEPTH = 100
 MAX_NODES = 200_000  # with each alias counted as often as it is used
 _MAX_DIGITS = 1_000
 
@@ -80,11 +81,10 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
         if not path.exists():
             _add_missing(path, name, problems)
             return None
-        if not path.is_file():
-            kind = "a folder, not a file" if path.is_dir() else "not a regular file"
+        if kind := irregular(path):
             problems.add(f"{name} is {kind}")
             return None
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         problems.add(f"cannot read {name}: {getattr(error, 'strerror', None) or error}")

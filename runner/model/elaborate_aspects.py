@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 
-from epicycle.actors import Actor, EpicycleError, Parameter, ParameterError
+from epicycle.actors import Actor, Parameter, ParameterError
 from epicycle.aspects import (
     Aspect,
     CompositeAspect,
@@ -28,6 +28,7 @@ from .weave import Weaving
 from .woven import WovenAspect
 
 MAX_SHOWN = 12  # types in one message
+OF_YOUR_OWN = "one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]"
 
 
 class AspectElaborator(Configurator):
@@ -87,8 +88,8 @@ class AspectElaborator(Configurator):
         is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)
-        except (EpicycleError, ValueError) as error:
-            self.problems.add(f"aspect {name}: {error}", part.position, scope=scope)
+        except Exception as error:  # whatever an aspect's own __init__ does
+            self._blame(f"aspect {name}", error, part.position, scope)
             aspect = None
         if aspect is None:
             weaving.select(part.at)  # for what is wrong with it
@@ -141,7 +142,7 @@ class AspectElaborator(Configurator):
             self.problems.add(
                 f"aspect {name}: there is no aspect type {wanted!r}{did_you_mean(wanted, [*known, *self.composites])}",
                 part.type.position,
-                self._valid_types("aspect", wanted),
+                *self._valid_types("aspect", wanted),
                 scope=scope,
             )
             return None
@@ -180,19 +181,21 @@ class AspectElaborator(Configurator):
             self.problems.add(f"{label}: {error}", part.enabled.position, scope=scope)
             return True
 
-    def _valid_types(self, kind: str, asked: str) -> str:
-        """Which types there are: their names, or how to see them if they are too many for a message."""
+    def _valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
+        """Which types there are: their names, or how to see them if they are too many; and how there can be more."""
         is_actor = kind == "actor"
         types: Collection[str] = self.catalogue.actors if is_actor else self.catalogue.aspects
         others: Collection[str] = self.catalogue.aspects if is_actor else self.catalogue.actors
         if asked in others:
             other = "aspect" if is_actor else "actor"
-            return f"{asked} is an {other}: it belongs under '{other}s'"
+            return (f"{asked} is an {other}: it belongs under '{other}s'",)
         composites = sorted(self.composites) if is_actor else []
         if len(composites) + len(types) <= MAX_SHOWN:
-            return f"valid types: {', '.join(sorted([*composites, *types]))}"
-        own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
-        return f"valid types: {f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+            valid = ", ".join(sorted([*composites, *types]))
+        else:
+            own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
+            valid = f"{f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+        return f"valid types: {valid}", OF_YOUR_OWN
 
 
 def _position(part: PartText, name: str, *keys: str) -> Position | None:

@@ -9,7 +9,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from epicycle.actors import ParameterError
+from epicycle.actors import ParameterError, irregular, read_regular
 
 from .problems import Position, did_you_mean
 
@@ -66,10 +66,10 @@ def data_file(name: Path, position: Position) -> Path:
             )
         if target.is_file():
             if _noted.get() is not None:
-                note_file(target, target.read_bytes())
+                note_file(target, read_regular(target))
             return target
-        if target.is_dir():
-            raise ParameterError(f"{str(name)!r} is a folder, not a file")
+        if target.exists():
+            raise ParameterError(f"{str(name)!r} is {irregular(target)}")
         beside = (
             sorted(str(name.parent / each.name) for each in target.parent.iterdir()) if target.parent.is_dir() else []
         )

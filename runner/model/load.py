@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from epicycle.actors import irregular
+
 from ..collection import without_collection
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
@@ -58,7 +60,7 @@ def load_model(
     model may name beside the installed ones.  ``max_actors`` is how many actors and composites are not taken for a
     mistake, and a fifth of how many connections.  What is odd but not wrong is in ``Model.warnings``.
     """
-    problems = Problems()
+    problems, limits = Problems(), Limits(max_actors)
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += _settings(set, problems)
     with without_collection():
@@ -66,7 +68,7 @@ def load_model(
         declared = included_composites(text, path, reader, problems)
         catalogue = installed().with_types(types)
         disturbances = load_disturbances(map(str, _several(disturb)), declared, problems)
-        composites, broken = inherit(declared, catalogue.actors, problems)
+        composites, broken = inherit(declared, catalogue.actors, problems, limits)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What disturbances set comes first, for the last one wins.
         settings = add_disturbances(text, disturbances, problems) + settings
@@ -74,10 +76,15 @@ def load_model(
             without(text, change, problems)
         for change in aspects:
             change_aspect(text, change, problems)
-        elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken, Limits(max_actors))
+        elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken, limits)
         model = elaborator.model()
-        try_classes(composites, elaborator.made, problems, catalogue, broken)
+        try_classes(composites, elaborator, broken)
+        if model.figures:
+            from ..show import figures_of  # here, for what is shown stands on what is run, and this on models
+
+            figures_of(model, problems)
         problems.raise_if_any()
+        model.warnings = problems.warnings
         model.is_checked = True
         return model
 
@@ -163,8 +170,8 @@ def included_composites(
             if not exists:
                 names = [str(path.relative_to(where.parent)) for path in _beside(target, where)]
                 kind = f"does not exist{did_you_mean(include.text, names)}"
-                if target.is_dir():
-                    kind = "is a folder"
+                if target.exists():
+                    kind = f"is {irregular(target)}"
                 problems.add(f"the included file {include.text!r} {kind}", include.position)
                 continue
             node = read(target, problems, str(where.parent / include.text))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import isabstract
 from pathlib import Path
 from types import ModuleType
 
-from epicycle.actors import Actor, EpicycleError
+from epicycle.actors import Actor, EpicycleError, irregular
 from epicycle.aspects import Aspect
 
 
@@ -40,7 +41,8 @@ def _imported(path: Path) -> ModuleType:
     if path.suffix != ".py" or not path.stem.isidentifier():
         raise TypesError(f"--types {path}: expected a Python file such as my_actors.py")
     if not path.is_file():
-        raise TypesError(f"--types {path}: there is no such file")
+        what = f"this is {irregular(path)}" if path.exists() else "there is no such file"
+        raise TypesError(f"--types {path}: {what}")
     file, name = path.resolve(), path.stem
     known = sys.modules.get(name)
     if known is not None:
@@ -56,11 +58,14 @@ def _imported(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # whatever the user's module does
-        del sys.modules[name]
+    except BaseException as error:  # whatever the user's module does
+        sys.modules.pop(name, None)
+        if type(error) is KeyboardInterrupt:  # Ctrl-C
+            raise
         raise TypesError(f"--types {path}: {type(error).__name__}: {error}{_line(error, file)}") from error
     finally:
-        sys.path.remove(str(file.parent))
+        with suppress(ValueError):
+            sys.path.remove(str(file.parent))
     return module
 
 

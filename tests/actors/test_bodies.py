@@ -7,7 +7,6 @@ import textwrap
 
 import numpy as np
 import pytest
-from harness import Harness
 
 from epicycle.actors import (
     BodyState,
@@ -19,6 +18,7 @@ from epicycle.actors import (
     SeparationMonitor,
     Vehicle,
 )
+from tests.actors.harness import Harness
 
 
 def body(x: float, y: float, time: float = 0.0, velocity: tuple[float, float] = (0.0, 0.0)) -> BodyState:

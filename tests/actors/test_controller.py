@@ -1,13 +1,14 @@
 """The controller: timing, memory, and that nothing makes it fail."""
 
+import functools
 import logging
 import math
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
-from harness import Harness
-from scenario import _Recorder, play
 
 from epicycle.actors import (
     BodyState,
@@ -22,6 +23,11 @@ from epicycle.actors import (
     RobustController,
     UnscentedEstimator,
 )
+from epicycle.actors.robotics.numerics import warm_up
+from tests.actors.harness import Harness
+from tests.actors.scenario import _Recorder, play
+
+COMPILING = "compiling the numeric kernels (once, about 20 s) ..."
 
 
 def state(x: float = 30.0, y: float = 0.0, vx: float = 0.0, vy: float = 0.0, *, time: float = 0.0) -> BodyState:
@@ -362,10 +368,26 @@ def test_parts_can_be_given_as_mappings() -> None:
         RobustController("c", horizon=2)
 
 
-def test_compiling_is_announced_only_if_it_takes_long(caplog: pytest.LogCaptureFixture) -> None:
-    from epicycle.actors.robotics.numerics.warm_up import compile_kernels
-
+@pytest.mark.parametrize(("patience", "said"), [(0.001, [COMPILING]), (60.0, [])])
+def test_compiling_is_announced_only_if_it_takes_long(
+    patience: float, said: list[str], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     caplog.set_level(logging.INFO, "epicycle")
-    compile_kernels()  # done already in this process, or quick from the cache
-    compile_kernels()
-    assert len(caplog.records) <= 1
+    calls = []
+
+    def work() -> None:
+        calls.append(1)
+        deadline = time.monotonic() + 10.0
+        while patience < 1.0 and not caplog.messages and time.monotonic() < deadline:
+            time.sleep(0.001)
+
+    monkeypatch.setattr(warm_up, "_call_every_kernel", work)
+    monkeypatch.setattr(warm_up, "_PATIENCE", patience)
+    before = threading.active_count()
+    compile_once = functools.cache(warm_up.compile_kernels.__wrapped__)
+    compile_once()
+    compile_once()  # is done
+    assert (calls, caplog.messages) == ([1], said)
+    while threading.active_count() > before:  # nobody is left who would speak later
+        time.sleep(0.001)
+    assert caplog.messages == said

@@ -6,7 +6,6 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from harness import Harness
 from scipy.stats import chi2
 
 from epicycle.actors import (
@@ -20,6 +19,7 @@ from epicycle.actors import (
     Sensor,
     UnscentedEstimator,
 )
+from tests.actors.harness import Harness
 
 FILTERS = (
     "KalmanFilter",

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +13,7 @@ from epicycle.actors import PoissonClock, Sequence
 from epicycle.aspects import ExecutionTime, Processor
 from epicycle.runner import Model, ModelError, Simulation
 from epicycle.runner.engine import Results
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import Scale, Ticker, load, simulate
+from tests.engine.engine_parts import Scale, Ticker, load, simulate
 
 Task = tuple[int, int]  # period and execution time in ms
 

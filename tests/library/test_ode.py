@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +12,7 @@ import scipy.integrate
 
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.model import ModelError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from feeding import feed, load, model_of, tokens
+from tests.library.feeding import feed, load, model_of, tokens
 
 GRAVITY = 9.81
 BALL: dict[str, Any] = {

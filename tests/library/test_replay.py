@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import os
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,7 @@ from pyarrow import parquet
 
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.model import ModelError, load_model
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "engine"))
-from engine_parts import sends
+from tests.engine.engine_parts import sends
 
 
 def replay(folder: Path, table: str | dict[str, list[Any]], options: str = "") -> list[Any]:
@@ -83,3 +81,16 @@ def test_wrong_files(tmp_path: Path) -> None:
     assert [problem.message for problem in caught.value.problems] == [
         "it: file: 't.txt' ends neither in .csv nor in .parquet"
     ]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_a_pipe_does_not_hold_us_up(tmp_path: Path) -> None:
+    """A file may have become another one since the model was checked."""
+    (tmp_path / "t.csv").write_text("time,x\n0,1\n")
+    (tmp_path / "m.yaml").write_text("model: m\nactors: {it: {type: Replay, file: t.csv}}\n")
+    model = load_model(tmp_path / "m.yaml")
+    (tmp_path / "t.csv").unlink()
+    os.mkfifo(tmp_path / "t.csv")
+    with pytest.raises(ActorError) as caught:
+        Simulation(model).run()
+    assert caught.value.reason == (f"{tmp_path / 't.csv'} cannot be replayed: it is a named pipe, not a regular file")

@@ -333,7 +333,8 @@ def test_read_what_is_not_there(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
 def test_read_a_pipe(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    assert read_faults(tmp_path / "pipe") == "error: m.yaml is not a regular file"
+    assert read_faults(tmp_path / "pipe") == "error: m.yaml is a named pipe, not a regular file"
+    assert read_faults(Path("/dev/zero")) == "error: m.yaml is a device, not a regular file"
 
 
 def test_read_an_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -342,7 +343,7 @@ def test_read_an_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     path = tmp_path / "m.yaml"
     path.write_text("a: 1")
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr("builtins.open", refuse)
     assert read_faults(path) == "error: cannot read m.yaml: Permission denied"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ def folder(tmp_path: Path) -> Path:
     (inner / "data").mkdir(parents=True)
     (inner / "data" / "a.csv").write_text("1")
     (tmp_path / "secret.csv").write_text("2")
+    os.mkfifo(inner / "pipe")
     (inner / "link.csv").symlink_to(tmp_path / "secret.csv")
     return inner
 
@@ -53,6 +55,7 @@ OUTSIDE = "cannot be read: a file named in a model lies in or below the folder o
         ("link.csv", f"'link.csv' {OUTSIDE}"),
         ("/etc/passwd", f"'/etc/passwd' {OUTSIDE}"),
         ("data", "'data' is a folder, not a file"),
+        ("pipe", "'pipe' is a named pipe, not a regular file"),
         ("data/b.csv", "there is no file 'data/b.csv', did you mean 'data/a.csv'?"),
         ("a" * 300, f"{'a' * 300!r} cannot be read: File name too long"),
     ],

@@ -373,12 +373,14 @@ def test_what_is_left_out_no_plan_can_break(random: np.random.Generator) -> None
 
 
 def test_who_is_out_of_reach_changes_no_bit(random: np.random.Generator) -> None:
+    alone = 0
     for _ in range(30):
         problem = crowded_problem(random)
-        row, _, kept_row, _ = kept_and_all(*problem)
+        _, _, kept_row, _ = kept_and_all(*problem)
         near = [peer for peer in range(6) if 2 + peer in set(kept_row)]
         fewer = problem._replace(
             peer_mean=problem.peer_mean[near].copy(), peer_distance=problem.peer_distance[near].copy()
         )
         assert solve(problem).controls.tobytes() == solve(fewer).controls.tobytes()
-        assert len(near) < 6 or len(row) > len(kept_row)
+        alone += 6 - len(near)
+    assert alone > 30

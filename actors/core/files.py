@@ -1,0 +1,67 @@
+"""Files that others name are read only if they are regular ones: a pipe may never answer, and a device never end."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder, not a file"),
+    (stat.S_ISFIFO, "a named pipe, not a regular file"),
+    (stat.S_ISSOCK, "a socket, not a regular file"),
+)
+
+
+def irregular(path: str | Path) -> str:
+    """What there is in place of a regular file, such as ``a folder, not a file``; empty if there is one.
+
+    Raises ``OSError``, as for a file that is not there.
+    """
+    return _kind(os.stat(path).st_mode)
+
+
+@contextmanager
+def open_regular(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a file to read its bytes, without ever waiting for somebody else.
+
+    Raises ``OSError``; if there is something else than a regular file, its ``strerror`` says what.
+    """
+    _check(os.stat(path), path)
+    # It may be another one by now.
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
+        _check(os.fstat(file.fileno()), path)
+        yield file
+
+
+def read_regular(path: str | Path) -> bytes:
+    """The contents of a regular file; raises ``OSError`` as ``open_regular`` does."""
+    with open_regular(path) as file:
+        return file.read()
+
+
+def read_table(path: Path) -> Any:
+    """The Arrow table of a CSV file, or else of a Parquet file; raises ``OSError``."""
+    import pyarrow as arrow  # heavy, and needed by few models
+    from pyarrow import csv, parquet
+
+    with open_regular(path) as file:
+        try:
+            return (csv.read_csv if path.suffix.lower() == ".csv" else parquet.read_table)(file)
+        except arrow.ArrowException as error:
+            raise OSError(errno.EINVAL, " ".join(str(error).split()), str(path)) from None
+
+
+def _kind(mode: int) -> str:
+    if stat.S_ISREG(mode):
+        return ""
+    return next((kind for is_that, kind in _KINDS if is_that(mode)), "a device, not a regular file")
+
+
+def _check(found: os.stat_result, path: str | Path) -> None:
+    if kind := _kind(found.st_mode):
+        raise OSError(errno.EINVAL, f"it is {kind}", str(path))
