@@ -24,6 +24,8 @@ class FilterError(EpicycleError):
 class FilterPyEstimator(_Estimator):
     """A filter of FilterPy with the model of ``UnscentedEstimator``; fuses one measurement after another.
 
+    Late measurements are fused at their own time, as there.
+
     ``KalmanFilter`` and ``SquareRootKalmanFilter`` are linear and take relative positions only.
     """
 
