@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from ..quantiles import student_quantile
+from ..student import student_quantile
 
 BATCHES = 20  # more of them gain next to nothing (Schmeiser 1982)
 MOST = 1024  # that are kept

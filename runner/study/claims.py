@@ -249,7 +249,7 @@ def _finding(contrast: _Contrast, samples: Samples, level: float) -> Finding:
     terms = [[weight * numbers[place][each] for place, weight in contrast.weights.items()] for each in pairs]
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
     found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
-    student, bootstrap = found.estimate, bootstrap_mean(values, level, number=RESAMPLES)
+    student, bootstrap = found.estimate, bootstrap_mean(values, level, resamples=RESAMPLES)
     return Finding(
         metric=contrast.metric,
         where=contrast.where,

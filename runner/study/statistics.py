@@ -7,17 +7,17 @@ Source: A. M. Law, *Simulation Modeling and Analysis*, chapters 4, 9 and 10.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from ..quantiles import normal_quantile, normal_tail, student_quantile, student_tail
+from epicycle.actors import random_stream
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+from ..student import student_quantile, student_tail
 
 LEVEL = 0.95
 
@@ -59,40 +59,28 @@ def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
     return Estimate(value, standard_error(values), value - half, value + half, count)
 
 
-def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, number: int = 9_999) -> Estimate:
-    """The mean with the bias-corrected and accelerated bootstrap interval, which may lie unevenly around it.
-
-    Source: B. Efron and R. J. Tibshirani, *An Introduction to the Bootstrap* (1993), 14.3.
-    """
+def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, seed: int = 0, resamples: int = 9_999) -> Estimate:
+    """The mean with the bias-corrected and accelerated bootstrap interval, which may lie unevenly around it."""
     if len(values) < 2 or min(values) == max(values):
         return mean(values, level)
-    count = len(values)
-    centre = math.fsum(values) / count
-    means = sorted((resampled_sums(values, resamples(count, number)) / count).tolist())
-    gaps = [value - centre for value in values]
-    squares = math.fsum(gap * gap for gap in gaps)
-    skew = math.fsum(gap * gap * gap for gap in gaps) / (6.0 * squares * math.sqrt(squares))
-    rounding = 1e-12 * max(map(abs, values))  # a resample with each value once has the same mean, but for that
-    below = (bisect_left(means, centre - rounding) + bisect_right(means, centre + rounding)) / (2 * number)
-    bias = normal_quantile(min(max(below, 0.5 / number), 1.0 - 0.5 / number))
-    ends = []
-    for z in (normal_quantile((1 - level) / 2), normal_quantile((1 + level) / 2)):
-        place = normal_tail(-(bias + (bias + z) / (1.0 - skew * (bias + z)))) * (number - 1)
-        at = min(int(place), number - 2)
-        ends.append(means[at] + (place - at) * (means[at + 1] - means[at]))
-    return Estimate(centre, standard_error(means) * math.sqrt(number), ends[0], ends[1], count)
-
-
-@lru_cache(maxsize=4)
-def resamples(count: int, number: int) -> NDArray[np.int64]:
-    """Which of ``count`` values each of a number of bootstrap samples takes: (number, count); always the same ones.
-
-    They come from the bits of the generator alone, as those of a random stream do, but all at once.
-    """
     import numpy as np
+    from scipy.stats import bootstrap
 
-    words = np.random.PCG64(0).random_raw((number, count)) >> np.uint64(32)
-    return ((words * np.uint64(count)) >> np.uint64(32)).astype(np.int64)
+    found = bootstrap(
+        (np.asarray(values, dtype=float),),
+        np.mean,
+        confidence_level=level,
+        n_resamples=resamples,
+        batch=max(1, 1_000_000 // len(values)),
+        random_state=np.random.default_rng(seed),
+    )
+    low, high = found.confidence_interval
+    return Estimate(math.fsum(values) / len(values), float(found.standard_error), float(low), float(high), len(values))
+
+
+def resamples(count: int, number: int) -> NDArray[np.int64]:
+    """Which of ``count`` values each of a number of bootstrap samples takes: (number, count)."""
+    return random_stream(0, "resampling").integers(count, size=(number, count))
 
 
 def resampled_sums(values: Sequence[float], draws: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -109,13 +97,11 @@ def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
     """A share with Wilson's interval, which holds for rare events and few runs, too."""
     if count == 0:
         return Estimate(math.nan, math.nan, 0.0, 1.0, 0)
-    share, z = successes / count, normal_quantile((1 + level) / 2)
-    scale = 1.0 + z * z / count
-    middle = (share + z * z / (2 * count)) / scale
-    half = z * math.sqrt(share * (1 - share) / count + z * z / (4 * count * count)) / scale
-    low = 0.0 if successes == 0 else middle - half
-    high = 1.0 if successes == count else middle + half
-    return Estimate(share, math.sqrt(share * (1 - share) / count), low, high, count)
+    from scipy.stats import binomtest
+
+    found = binomtest(successes, count).proportion_ci(level, method="wilson")
+    share = successes / count
+    return Estimate(share, math.sqrt(share * (1 - share) / count), float(found.low), float(found.high), count)
 
 
 @dataclass(frozen=True)

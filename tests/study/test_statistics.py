@@ -8,17 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epicycle.runner.quantiles import normal_quantile, normal_tail, student_quantile, student_tail
-from epicycle.runner.study.statistics import (
-    bootstrap_mean,
-    half_width,
-    holm,
-    mean,
-    paired_difference,
-    rate,
-    resampled_sums,
-    resamples,
-)
+from epicycle.runner.student import student_quantile, student_tail
+from epicycle.runner.study.statistics import bootstrap_mean, half_width, holm, mean, paired_difference, rate
 
 RUNS = 3000
 
@@ -132,48 +123,6 @@ def test_students_t_at_its_ends() -> None:
     for p, freedom in ((0.0, 3), (1.0, 3), (math.nan, 3), (0.5, 0)):
         with pytest.raises(ValueError, match="there is no quantile"):
             student_quantile(p, freedom)
-
-
-def test_normal_distribution_is_scipys() -> None:
-    for p in (1e-9, 0.001, 0.025, 0.3, 0.5, 0.6, 0.9, 0.975, 0.995, 0.99999):
-        assert normal_quantile(p) == pytest.approx(stats.norm.ppf(p), rel=1e-13)
-    for number in (0.0, 1e-9, 0.3, 1.0, 2.0, 2.999, 3.0, 5.0, 20.0, -1.5, -8.0):
-        assert normal_tail(number) == pytest.approx(stats.norm.sf(number), rel=1e-13)
-    assert (normal_tail(math.inf), normal_tail(-math.inf)) == (0.0, 1.0)
-    assert math.isnan(normal_tail(math.nan))
-    with pytest.raises(ValueError, match="there is no quantile"):
-        normal_quantile(1.0)
-
-
-def test_wilsons_interval_is_scipys() -> None:
-    for successes, count in ((0, 7), (3, 7), (7, 7), (120, 4000)):
-        expected = stats.binomtest(successes, count).proportion_ci(0.9, method="wilson")
-        found = rate(successes, count, 0.9)
-        assert (found.low, found.high) == (
-            pytest.approx(expected.low, abs=1e-15),
-            pytest.approx(expected.high, rel=1e-13),
-        )
-
-
-@pytest.mark.parametrize("count", [8, 40, 400])
-def test_bootstrap_is_scipys_but_for_chance(count: int) -> None:
-    values = np.random.default_rng(count).exponential(1.0, count)
-    expected = stats.bootstrap((values,), np.mean, confidence_level=0.9, n_resamples=9_999, rng=0)
-    found = bootstrap_mean(values.tolist(), 0.9)
-    width = expected.confidence_interval.high - expected.confidence_interval.low
-    assert found.low == pytest.approx(expected.confidence_interval.low, abs=0.04 * width)
-    assert found.high == pytest.approx(expected.confidence_interval.high, abs=0.04 * width)
-    assert found.error == pytest.approx(expected.standard_error, rel=0.04)
-
-
-def test_resamples_draw_each_value_as_often() -> None:
-    draws = resamples(3, 30_000)
-    first, second = resampled_sums([1.0, 0.0, 0.0], draws), resampled_sums([0.0, 10.0, 0.0], draws)
-    assert (first.mean(), second.mean()) == (pytest.approx(1.0, rel=0.02), pytest.approx(10.0, rel=0.02))
-    # Of three draws, the number of ones is binomial.
-    shares = [float((first == number).mean()) for number in range(4)]
-    assert shares == pytest.approx([8 / 27, 12 / 27, 6 / 27, 1 / 27], abs=0.01)
-    assert (first + second / 10 <= 3).all()
 
 
 def test_students_t_has_these_bits() -> None:

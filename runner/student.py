@@ -1,19 +1,15 @@
-"""Student's t and the normal distribution, the same in every bit on every machine: + - * /, square roots, our own exp.
+"""Student's t distribution, the same in every bit on every machine: nothing but + - * / and square roots.
 
-Student's tail is the incomplete beta function I_x(n/2, 1/2) at x = n / (n + t^2), by its continued fraction (Abramowitz
-and Stegun 26.5.8, 26.7.1); a quantile is where the tail crosses what is asked for.
+The tail is the incomplete beta function I_x(n/2, 1/2) at x = n / (n + t^2), by its continued fraction (Abramowitz and
+Stegun 26.5.8, 26.7.1); a quantile is where the tail crosses what is asked for.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 
-from epicycle.actors.core.elementary import exp
-
 _SQRT_PI = 1.7724538509055160273
-_SQRT_TWO_PI = 2.5066282746310005024
 _RECURSIVE = 200  # degrees of freedom up to which the gamma functions' ratio is multiplied up
 
 
@@ -42,51 +38,17 @@ def student_quantile(p: float, freedom: int) -> float:
     """The number below which Student's variable lies with the probability ``p``, between 0 and 1."""
     if not 0.0 < p < 1.0 or freedom < 1:
         raise ValueError(f"there is no quantile {p} for {freedom} degrees of freedom")
-    return _where(lambda t: student_tail(t, freedom), p)
-
-
-def normal_tail(z: float) -> float:
-    """The probability that a standard normal variable is greater than ``z``."""
-    if math.isnan(z):
-        return math.nan
-    if z < 0.0:
-        return 1.0 - normal_tail(-z)
-    if z > 40.0:
-        return 0.0
-    density = exp(-0.5 * z * z) / _SQRT_TWO_PI
-    if z < 3.0:  # Abramowitz and Stegun 26.2.11
-        term = total = z
-        for k in range(3, 200, 2):
-            term *= z * z / k
-            total += term
-        return 0.5 - density * total
-    found = z  # 26.2.14
-    for k in range(80, 0, -1):
-        found = z + k / found
-    return density / found
-
-
-@lru_cache(maxsize=64)
-def normal_quantile(p: float) -> float:
-    """The number below which a standard normal variable lies with the probability ``p``, between 0 and 1."""
-    if not 0.0 < p < 1.0:
-        raise ValueError(f"there is no quantile {p}")
-    return _where(normal_tail, p)
-
-
-def _where(tail: Callable[[float], float], p: float) -> float:
-    """The quantile of a symmetric distribution whose tail falls: by halving, to the last bit."""
     if p == 0.5:
         return 0.0
-    wanted = min(p, 1.0 - p)
+    tail = min(p, 1.0 - p)
     low, high = 0.0, 1.0
-    while tail(high) > wanted and high < 1e150:
+    while student_tail(high, freedom) > tail and high < 1e150:
         low, high = high, 2.0 * high
     while True:
         middle = low + 0.5 * (high - low)
         if not low < middle < high:
             break
-        if tail(middle) > wanted:
+        if student_tail(middle, freedom) > tail:
             low = middle
         else:
             high = middle
