@@ -3,6 +3,7 @@
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
+from .laws import normal_quantile, normal_share
 from .mapping import MappingParameter
 from .nearest import did_you_mean, nearest
 from .parameter import (
@@ -60,6 +61,8 @@ __all__ = [
     "irregular",
     "is_too_deep",
     "nearest",
+    "normal_quantile",
+    "normal_share",
     "open_regular",
     "parse_unit",
     "plain",

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from .dimensions import Factor
 from .questions import Guideline
 from .samples import MISSING, Place, Samples
-from .statistics import LEVEL, Estimate, mean, paired_difference, resampled_sums, resamples
+from .statistics import LEVEL, Estimate, mean, paired_difference, resampled_sums
 
 if TYPE_CHECKING:
     from .results import StudyResults
@@ -153,8 +153,8 @@ def _confidence(numbers: list[dict[int, float]], sign: float) -> list[float]:
         return [0.0] * len(numbers)
     import numpy as np
 
-    draws = resamples(len(common), RESAMPLES)
-    sums = np.array([resampled_sums([sign * each[replication] for replication in common], draws) for each in numbers])
+    values = ([sign * each[replication] for replication in common] for each in numbers)
+    sums = np.array([resampled_sums(each, RESAMPLES) for each in values])
     means = np.round(sums / len(common), 12)
     is_best = means == means.min(axis=0)
     ties = np.count_nonzero(is_best, axis=0)
