@@ -54,10 +54,10 @@ def summary_table(model: Model, results: Results) -> Group:
         f"  seed {results.seed}, {results.end:g} s of model time, ended by {visible(results.stopped)}",
     )
     table = Table(box=None, pad_edge=False, header_style="dim")
-    table.add_column("metric")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    table.add_column("", style="dim")
+    table.add_column("metric", overflow="fold")
+    table.add_column("value", justify="right", overflow="fold")
+    table.add_column("unit", overflow="fold")
+    table.add_column("", style="dim", overflow="fold")
     for metric in model.metrics:
         table.add_row(*map(_cell, (metric.name, shown(results.metrics[metric.name]), metric.unit, metric.doc)))
     for name, figures in results.aspects.items():

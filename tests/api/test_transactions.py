@@ -20,7 +20,10 @@ composites:
     inputs: [request, other]
     outputs: [response]
     actors: {scale: {type: Scale, factor: "${factor}", count: 2}, last: {type: Recorder}}
-    connections: ['request -> scale[0].input', 'scale[0].output -> scale[1].input', 'scale[1].output -> response', 'scale[0].output -> last.input']
+    connections:
+      - request -> scale[0].input
+      - scale[0].output -> scale[1].input, last.input
+      - scale[1].output -> response
     aspects: {lossy: {type: PacketLoss, probability: 0.5, at: "scale[*].input"}}
 """
 MODEL = """
