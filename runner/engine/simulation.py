@@ -117,14 +117,14 @@ class Simulation:
         stop = self.model.stop_time if until is None else to_nanoseconds(until)
         actors = list(self.model.graph.actors.values())
         director = self.director
-        for actor in actors:
-            actor.enter(self._wiring.context_of(actor.path))
-            for port in actor.inputs.values():
-                port.clear()  # of what a failed run has left there
-        self._started = time.perf_counter()
         begun: list[Actor] = []
         self.model.is_running = True
         try:
+            for actor in actors:
+                actor.enter(self._wiring.context_of(actor.path))
+                for port in actor.inputs.values():
+                    port.clear()  # of what a failed run has left there
+            self._started = time.perf_counter()
             for actor in actors:
                 self._call(actor, "initialize")
                 begun.append(actor)
