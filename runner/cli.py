@@ -9,13 +9,16 @@ from collections.abc import Callable, Sequence
 from .collection import seldom_collecting
 from .commands import COMMANDS
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
+from .leaving import leave
 from .printing import complain, complain_traceback, open_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input."""
+    if arguments is None:  # as a program, not called by one
+        return leave(main(sys.argv[1:]))
     open_streams()
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    given = list(arguments)
     options = parser().parse_args(given)
     command: Callable[[argparse.Namespace, list[str]], int] = options.command
     from epicycle.actors import EpicycleError

@@ -23,9 +23,10 @@ def test_packaged_model_runs(name: str) -> None:
 def test_scenario_runs_for_any_number_of_observers(observers: int) -> None:
     model = load_model("collision_avoidance", set=[f"observers={observers}", "disturbance=0.5"])
     results = Simulation(model, seed=3).run(until=1.0)
-    for name, signal in results.signals.items():
-        if name.endswith(".state"):
-            assert all(math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity))
+    states = [signal for name, signal in results.signals.items() if name.endswith(".state")]
+    assert [len(signal.tokens) for signal in states] == [11] * (observers + 2)
+    for signal in states:
+        assert all(math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity))
 
 
 def test_scenario_parameters_reach_every_robot() -> None:

@@ -58,13 +58,17 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def factor(text: str) -> float:
     """How many seconds of model time pass in a second."""
+    from ..engine import SLOWEST
+
     try:
         number = float(text)
     except ValueError:
         number = math.nan
-    if not 0.0 < number < math.inf:
+    if not SLOWEST <= number < math.inf:
         # The model, perhaps, which stands behind the option.
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number greater than 0 (write MODEL before --realtime)")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a number from {SLOWEST:g} on (write MODEL before --realtime)"
+        )
     return number
 
 

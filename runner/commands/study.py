@@ -12,7 +12,7 @@ from ..printing import complain, complain_traceback, tell
 from .options import DONE, FAILED, INTERRUPTED, add_types
 
 if TYPE_CHECKING:
-    from ..study import Plan
+    from ..study import Plan, StudyResults
 
 DESCRIPTION = "Make all runs of a study that are not in its results folder yet."
 SHOWN = 5  # failed runs that are told one by one
@@ -106,6 +106,22 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     return session(plan, options.out or Path("results") / study.name, options)
 
 
+def about_others(results: StudyResults) -> list[str]:
+    """What is to be said of runs that the study as it is now does not ask for."""
+    from epicycle.actors import counted
+
+    told = []
+    if beyond := results.beyond():
+        asked = counted(results.plan.replications, "replication")
+        told.append(f"{results.folder} has {counted(beyond, 'run')} beyond the {asked} asked for: the table keeps them")
+    if left_out := results.left_out:
+        told.append(
+            f"{results.folder} has {counted(left_out, 'run')} of another version of the study, its model or Epicycle, "
+            "which the table leaves out"
+        )
+    return told
+
+
 def check_session(options: argparse.Namespace) -> None:
     """Raise ``EpicycleError`` for options that do not go together."""
     from epicycle.actors import EpicycleError
@@ -149,10 +165,13 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
         f"{outcome.there:,} there before" + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
     )
+    results = open_study(folder)
+    for said in about_others(results):
+        complain(said)
     tell(f"wrote {outcome.table}")
     if outcome.is_good:
         return DONE
-    failures = open_study(folder).failures()
+    failures = results.failures()
     for row in failures[:SHOWN]:
         complain(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
     if len(failures) > SHOWN:

@@ -294,9 +294,9 @@ class Director:
             port.hold()
         try:
             turn.actor.fire()
-        except ActorError:  # of an aspect on the way of a token
+        except (ActorError, LoopError, KeyboardInterrupt):  # of an aspect on the way of a token, of the user
             raise
-        except Exception as error:
+        except BaseException as error:  # whatever an actor raises, sys.exit() too, is its failure
             doing = "run()" if isinstance(turn.actor, Process) else "fire()"
             raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
         finally:
@@ -341,9 +341,9 @@ class Director:
                     environment.step()
                 else:
                     self._handle(heappop(times))
-            except (ActorError, LoopError):
+            except (ActorError, LoopError, KeyboardInterrupt):
                 raise
-            except Exception as error:
+            except BaseException as error:
                 found, cause = self._of_process(error, actors)
                 raise found from cause
             if self._stop_after is not None and self.last >= self._stop_after:
@@ -357,7 +357,7 @@ class Director:
                 progress(now / 1e9)
         return self._reason
 
-    def _of_process(self, error: Exception, actors: list[Actor]) -> tuple[ActorError, BaseException | None]:
+    def _of_process(self, error: BaseException, actors: list[Actor]) -> tuple[ActorError, BaseException | None]:
         """The error of a process that SimPy resumed, and its cause: from there, no firing says whose it was."""
         for actor in actors:
             failure = actor.failure if isinstance(actor, Process) else None

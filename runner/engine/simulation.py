@@ -10,13 +10,14 @@ from typing import Any
 from epicycle.actors import Actor, EpicycleError, to_nanoseconds, to_seconds
 
 from ..collection import without_collection
-from ..model import Metric, Model, WovenAspect, describe, raised_at
+from ..model import Model, WovenAspect, describe, raised_at
 from .director import ActorError, Director
 from .local import Deliver
 from .log import EventLog
 from .log_filter import LogFilter
+from .measurement import Measurement
 from .pace import Pace
-from .results import Reduction, Results
+from .results import Results
 from .signal import Signal
 from .trace import Tracer, TracingDirector, TracingLog
 from .wiring import Wiring
@@ -55,9 +56,10 @@ class Simulation:
         self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
         self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
         self.signals = {name: Signal(name) for name in model.recorded}
-        self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
+        self._measurements = {metric.name: Measurement(metric) for metric in model.metrics}
         self._has_run = False
         self._started = 0.0
+        self._stop: int | None = None
         self._unreported: ActorError | None = None
         try:
             with without_collection():
@@ -72,9 +74,9 @@ class Simulation:
         found: dict[str, list[Deliver]] = {}
         for name, signal in self.signals.items():
             found.setdefault(name, []).append(partial(self._record, signal))
-        for metric, reduction in self._reductions:
+        for metric in self.model.metrics:
             for path in metric.ports:
-                found.setdefault(path, []).append(partial(self._measure, metric, reduction, path))
+                found.setdefault(path, []).append(partial(self._measure, self._measurements[metric.name], path))
         for path in self.model.stop_ports:
             found.setdefault(path, []).append(partial(self._ask_to_stop, path))
         return found
@@ -82,12 +84,8 @@ class Simulation:
     def _record(self, signal: Signal, token: Any) -> None:
         signal.add(self.director.tag, token)
 
-    def _measure(self, metric: Metric, reduction: Reduction, path: str, token: Any) -> None:
-        try:
-            reduction.add(token)
-        except Exception as error:
-            doing = f"taking the {metric.take} of {path}"
-            raise ActorError(f"metric {metric.name}", self.director.tag, doing, describe(error)) from error
+    def _measure(self, measurement: Measurement, path: str, token: Any) -> None:
+        measurement.add(path, self.director.tag.time, token)
 
     def _ask_to_stop(self, path: str, token: Any) -> None:
         try:
@@ -114,7 +112,7 @@ class Simulation:
             raise RuntimeError("a Simulation runs once: make another one for another run")
         _refuse_running(self.model)
         self._has_run = True
-        stop = self.model.stop_time if until is None else to_nanoseconds(until)
+        stop = self._stop = self.model.stop_time if until is None else to_nanoseconds(until)
         actors = list(self.model.graph.actors.values())
         director = self.director
         begun: list[Actor] = []
@@ -150,11 +148,14 @@ class Simulation:
 
     def results(self, stopped: str) -> Results:
         """What has come of the run so far; ``stopped`` says why it is over."""
+        # What stood at the last event stands until the stop time, if that is what ended the run.
+        end = self._stop if stopped == "stop time" and self._stop is not None else self.director.last.time
+        outcomes = {name: each.outcome(end) for name, each in self._measurements.items()}
         return Results(
             model=self.model.name,
             seed=self.seed,
             parameters=dict(self.model.parameters),
-            metrics={metric.name: reduction.value for metric, reduction in self._reductions},
+            metrics={name: each.value for name, each in outcomes.items()},
             aspects=self._figures(),
             signals=self.signals,
             log=self.log,
@@ -163,6 +164,7 @@ class Simulation:
             firings=self.director.firings,
             wall_time=time.perf_counter() - self._started,
             units={metric.name: metric.unit for metric in self.model.metrics},
+            outcomes=outcomes,
         )
 
     def _wrap_up(self, actors: list[Actor]) -> ActorError | None:
@@ -178,7 +180,9 @@ class Simulation:
     def _call(self, actor: Actor, method: str) -> None:
         try:
             getattr(actor, method)()
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             raise ActorError(actor.path, self.director.tag, f"{method}()", describe(error)) from error
 
     def _placed(self, error: ActorError) -> ActorError:

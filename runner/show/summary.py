@@ -25,6 +25,7 @@ def summary_object(results: Results) -> dict[str, Any]:
             "seed": results.seed,
             "parameters": {name: plain(value) for name, value in results.parameters.items()},
             "metrics": {name: plain(value) for name, value in results.metrics.items()},
+            "outcomes": {name: said for name, each in results.outcomes.items() if (said := each.plain())},
             "aspects": results.aspects,
             "stopped": results.stopped,
             "end": results.end,
@@ -59,7 +60,10 @@ def summary_table(model: Model, results: Results) -> Group:
     table.add_column("unit", overflow="fold")
     table.add_column("", style="dim", overflow="fold")
     for metric in model.metrics:
-        table.add_row(*map(_cell, (metric.name, shown(results.metrics[metric.name]), metric.unit, metric.doc)))
+        found = results.outcomes[metric.name]
+        said = "; ".join([metric.measure.doc, *found.remarks] if metric.measure.doc else found.remarks)
+        unit = "" if metric.unit == "1" else metric.unit
+        table.add_row(*map(_cell, (metric.name, found.shown(shown), unit, said)))
     for name, figures in results.aspects.items():
         woven = next(each for each in model.aspects if each.name == name)
         for what, figure in figures.items():
