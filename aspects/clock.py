@@ -60,9 +60,7 @@ class ClockOffset(ClockAspect):
     after some time is not affected; what it does at a time is, and what it says of the time.
     """
 
-    offset = Parameter(
-        float, 0.0, unit="s", min=-1e9, max=1e9, doc="how far the clock is ahead; below 0 it is late"
-    )
+    offset = Parameter(float, 0.0, unit="s", min=-1e9, max=1e9, doc="how far the clock is ahead; below 0 it is late")
     deviation = Parameter(float, 0.0, min=0.0, max=1e8, unit="s", doc="standard deviation of that from clock to clock")
 
     def error(self, random: np.random.Generator) -> tuple[int, Fraction]:

@@ -68,7 +68,9 @@ def factor(text: str) -> float:
         number = math.nan
     if not SLOWEST <= number < math.inf:
         # The model, perhaps, which stands behind the option.
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number from {SLOWEST:g} on (write MODEL before --realtime)")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a number from {SLOWEST:g} on (write MODEL before --realtime)"
+        )
     return number
 
 

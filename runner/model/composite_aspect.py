@@ -19,7 +19,7 @@ from .declarations import PartText, PointcutText
 from .graph import Detour, ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect
 
 BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
@@ -39,7 +39,7 @@ class ModelWeaving(Weaving):
     def __init__(
         self,
         graph: ModelGraph,
-        ports: PathIndex,
+        paths: Paths,
         name: str,
         path: str,
         scope: str,
@@ -47,7 +47,7 @@ class ModelWeaving(Weaving):
         position: Position,
         cls: type[Aspect] = CompositeAspect,
     ) -> None:
-        super().__init__(graph, ports, name, cls, scope, problems)
+        super().__init__(graph, paths, name, cls, scope, problems)
         self.path = path
         self.position = position
         self.model = AspectModel(path, graph.composites[path], "", {})

@@ -45,7 +45,9 @@ def try_classes(composites: Mapping[str, CompositeText], model: Elaborator, brok
         if not is_whole:
             untried.append(name)
     if untried:
-        names = f"{untried[0]} is" if len(untried) == 1 else f"{untried[0]} and {counted(len(untried) - 1, 'other')} are"
+        names = (
+            f"{untried[0]} is" if len(untried) == 1 else f"{untried[0]} and {counted(len(untried) - 1, 'other')} are"
+        )
         problems.warn(
             f"{names} not checked in full: the model has no instance of such a class, and to try all that it has none "
             f"of takes more than {limits.actors:,} actors and composites",
