@@ -20,9 +20,10 @@ from .port_parameter import PortParameter
 from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
-from .random import random_stream
+from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
+from .visible import readable, shortened, visible, visible_character, visible_lines
 from .words import counted
 
 __all__ = [
@@ -43,6 +44,7 @@ __all__ = [
     "PortParameter",
     "Process",
     "Quantity",
+    "Stream",
     "Tag",
     "UnitError",
     "Wake",
@@ -64,11 +66,16 @@ __all__ = [
     "random_stream",
     "read_regular",
     "read_table",
+    "readable",
     "shaped",
+    "shortened",
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
     "type_name",
     "unknown_parameter",
     "variants",
+    "visible",
+    "visible_character",
+    "visible_lines",
 ]

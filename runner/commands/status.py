@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections import Counter
 from pathlib import Path
 
+from ..printing import tell, tell_json
 from .options import DONE
 
 DESCRIPTION = "Say how far a study is, also while it is running."
@@ -32,11 +32,11 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     failures = results.failures()
     if options.json:
         found = {"study": plan.study.name, "runs": plan.size, "conditions": plan.conditions, "statuses": dict(counts)}
-        print(json.dumps({**found, "running": is_running(options.folder), "failures": failures}))
+        tell_json({**found, "running": is_running(options.folder), "failures": failures})
         return DONE
     about = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"
     most = "" if plan.study.until is None else "at most "
-    print(
+    tell(
         f"{plan.study.name}: {len(statuses):,} of {most}{plan.size:,} runs are over ({about})"
         + ("; it is running" if is_running(options.folder) else "")
     )
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
             done = ", ".join(
                 f"{number:,} {status}" for (at, status), number in sorted(by_condition.items()) if at == index
             )
-            print(f"{index} ({values}): {done} of {plan.replications:,}")
+            tell(f"{index} ({values}): {done} of {plan.replications:,}")
     for row in failures:
-        print(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
+        tell(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
     return DONE

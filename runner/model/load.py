@@ -79,6 +79,10 @@ def load_model(
         elaborator = Elaborator(text, composites, Settings(settings, limits), problems, catalogue, broken, limits)
         model = elaborator.model()
         try_classes(composites, elaborator, broken)
+        if model.figures:
+            from ..show import figures_of  # here, for what is shown stands on what is run, and this on models
+
+            figures_of(model, problems)
         problems.raise_if_any()
         model.warnings = problems.warnings
         model.is_checked = True

@@ -127,7 +127,8 @@ class Plan:
             manifest["replications"],
             None if (lender := manifest.get("lender")) is None else (lender[0], lender[1]),
         )
-        metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
+        said = {(metric.name, metric.source): metric for metric in study.metrics or ()}
+        metrics = [said.get(each) or StudyMetric(*each) for each in manifest["metrics"].items()]
         extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
         columns = {name: Column(**said) for name, said in manifest["columns"].items()}
         return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
@@ -184,7 +185,10 @@ class Plan:
             "sources": sorted(sources.items()),
             "set": [[setting.path, plain(setting.node)] for setting in settings],
             "disturb": [Path(name).name for name in disturb],
-            "metrics": [[metric.name, metric.source] for metric in self.metrics],
+            "metrics": [
+                [metric.name, metric.source, *([metric.unit, metric.to] if metric.to else [])]
+                for metric in self.metrics
+            ],
         }
         values = {name: value for level in levels for name, value in level.values.items()}
         return Condition(index, settings, disturb, values, _hash(identity))

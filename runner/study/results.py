@@ -91,7 +91,18 @@ class StudyResults:
                 for name in ("condition", "replication")
             )
             table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
-        return table.drop_columns(["_rank"]).combine_chunks().replace_schema_metadata(None)
+        return self._described(table.drop_columns(["_rank"]).combine_chunks())
+
+    def _described(self, table: pa.Table) -> pa.Table:
+        """The table with the unit and the doc of each column as metadata of its field."""
+        import pyarrow as pa
+
+        about = self.plan.columns
+        fields = []
+        for each in table.schema:
+            said = {} if (column := about.get(each.name)) is None else {"unit": column.unit, "doc": column.doc}
+            fields.append(each.with_metadata({key: text for key, text in said.items() if text}))
+        return table.cast(pa.schema(fields))
 
     def _order(self, table: pa.Table) -> dict[str, int]:
         """The numbers of the plan's conditions by their keys; a plan may be too large to be gone through."""

@@ -9,6 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from epicycle.actors import random_stream
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+from ..student import student_quantile, student_tail
 
 LEVEL = 0.95
 
@@ -28,9 +37,7 @@ def half_width(values: Sequence[float], level: float = LEVEL) -> float:
     """Half the width of Student's confidence interval of the mean; infinite for fewer than two values."""
     if len(values) < 2:
         return math.inf
-    from scipy.stats import t
-
-    return float(t.ppf((1 + level) / 2, len(values) - 1)) * standard_error(values)
+    return student_quantile((1 + level) / 2, len(values) - 1) * standard_error(values)
 
 
 def standard_error(values: Sequence[float]) -> float:
@@ -39,7 +46,8 @@ def standard_error(values: Sequence[float]) -> float:
     if count < 2:
         return math.nan
     mean = math.fsum(values) / count
-    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1) / count)
+    gaps = [value - mean for value in values]
+    return math.sqrt(math.fsum(gap * gap for gap in gaps) / (count - 1) / count)
 
 
 def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
@@ -68,6 +76,21 @@ def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, seed: int =
     )
     low, high = found.confidence_interval
     return Estimate(math.fsum(values) / len(values), float(found.standard_error), float(low), float(high), len(values))
+
+
+def resamples(count: int, number: int) -> NDArray[np.int64]:
+    """Which of ``count`` values each of a number of bootstrap samples takes: (number, count)."""
+    return random_stream(0, "resampling").integers(count, size=(number, count))
+
+
+def resampled_sums(values: Sequence[float], draws: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The sum of the values that each bootstrap sample takes, added in its order on every machine."""
+    import numpy as np
+
+    known, sums = np.asarray(values, float), np.zeros(len(draws))
+    for column in draws.T:
+        sums += known[column]
+    return sums
 
 
 def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
@@ -103,9 +126,7 @@ def paired_difference(first: dict[int, float], second: dict[int, float], level: 
         return Difference(estimate, math.nan)
     if min(gaps) == max(gaps):
         return Difference(estimate, 1.0 if gaps[0] == 0 else 2.0 ** (1 - len(gaps)))
-    from scipy.stats import t
-
-    return Difference(estimate, float(2 * t.sf(abs(estimate.value) / estimate.error, len(gaps) - 1)))
+    return Difference(estimate, 2.0 * student_tail(abs(estimate.value) / estimate.error, len(gaps) - 1))
 
 
 def without_rounding(values: Iterable[float], scale: float) -> list[float]:
