@@ -36,6 +36,16 @@ class Limits:
         return 250 * self.actors
 
     @property
+    def tokens(self) -> int:
+        """How many tokens and acts of aspects one tag may hold in a run."""
+        return 10 * self.actors
+
+    @property
+    def times(self) -> int:
+        """At how many times something may still be to come in a run."""
+        return 50 * self.actors
+
+    @property
     def inherited(self) -> int:
         """How many actors, aspects, connections, ports and parameters classes may take over from others."""
         return 5 * self.actors
