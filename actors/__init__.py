@@ -4,6 +4,7 @@ from .accumulation import Accumulator, Counter, Difference, Integrator
 from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
 from .continuous import ODE
 from .core import (
+    MAX_DEPTH,
     NANOSECONDS_PER_SECOND,
     REQUIRED,
     Actor,
@@ -20,6 +21,7 @@ from .core import (
     PortParameter,
     Process,
     Quantity,
+    Stream,
     Tag,
     UnitError,
     Wake,
@@ -33,6 +35,7 @@ from .core import (
     did_you_mean,
     has_own_ports,
     irregular,
+    is_too_deep,
     nearest,
     open_regular,
     parse_unit,
@@ -40,13 +43,18 @@ from .core import (
     random_stream,
     read_regular,
     read_table,
+    readable,
     shaped,
+    shortened,
     texts_parameter,
     to_nanoseconds,
     to_seconds,
     type_name,
     unknown_parameter,
     variants,
+    visible,
+    visible_character,
+    visible_lines,
 )
 from .distributions import (
     Bernoulli,
@@ -100,6 +108,7 @@ from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
 from .triggered import Const, CurrentMicrostep, CurrentTime, Ramp, Sequence
 
 __all__ = [
+    "MAX_DEPTH",
     "NANOSECONDS_PER_SECOND",
     "ODE",
     "REQUIRED",
@@ -188,6 +197,7 @@ __all__ = [
     "Solver",
     "Station",
     "Stop",
+    "Stream",
     "Switch",
     "Synchronizer",
     "Tag",
@@ -211,6 +221,7 @@ __all__ = [
     "did_you_mean",
     "has_own_ports",
     "irregular",
+    "is_too_deep",
     "nearest",
     "open_regular",
     "parse_unit",
@@ -218,11 +229,16 @@ __all__ = [
     "random_stream",
     "read_regular",
     "read_table",
+    "readable",
     "shaped",
+    "shortened",
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
     "type_name",
     "unknown_parameter",
     "variants",
+    "visible",
+    "visible_character",
+    "visible_lines",
 ]

@@ -15,6 +15,7 @@ from .core import (
 )
 from .crash import CrashRestart
 from .decoration import Decoration, class_decorations, decorations
+from .duration import Duration, DurationParameter, FiringTime, FiringTimeParameter, needed
 from .execution import ActorPoint, ExecutionAspect, Job, Unit
 from .firing import ExecutionTime, SkipFiring
 from .measurement import (
@@ -57,10 +58,14 @@ __all__ = [
     "Decoration",
     "Drift",
     "Duplicate",
+    "Duration",
+    "DurationParameter",
     "ExecutionAspect",
     "ExecutionTime",
     "FieldError",
     "FiringRequest",
+    "FiringTime",
+    "FiringTimeParameter",
     "GilbertElliott",
     "GroupsParameter",
     "InvariantError",
@@ -98,4 +103,5 @@ __all__ = [
     "Weaver",
     "class_decorations",
     "decorations",
+    "needed",
 ]

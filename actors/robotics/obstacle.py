@@ -27,7 +27,8 @@ class CircularMotion(Actor):
         self._began = self.now
 
     def fire(self) -> None:
-        elapsed = self.now - self._began
+        now = self.now
+        elapsed = now - self._began
         turned = self.turn_rate * elapsed
         # The chord of the arc travelled: right for any turn rate, 0 included.
         chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
@@ -35,7 +36,7 @@ class CircularMotion(Actor):
         x, y = self.start.tolist()
         position = x + chord * math.cos(direction), y + chord * math.sin(direction)
         velocity = self.speed * math.cos(heading), self.speed * math.sin(heading)
-        self.state.send(BodyState(position, velocity))
+        self.state.send(BodyState(position, velocity, now))
 
 
 def _sinc(x: float) -> float:

@@ -13,7 +13,7 @@ class Sensor(Actor):
 
     The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both
     of its components are drawn at every firing, whether used or not, so that neither ``kind`` nor
-    ``max_range`` moves the noise of later measurements.
+    ``max_range`` moves the noise of later measurements.  A measurement is of the time of the target's state.
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
@@ -42,7 +42,8 @@ class Sensor(Actor):
         position = self.robot.value.position
         believed = self.location.value.position if self.location.present else position
         # Floats: arithmetic on arrays of two takes ten times as long.
-        (tx, ty), (x, y) = self.target.value.position.tolist(), position.tolist()
+        target = self.target.value
+        (tx, ty), (x, y) = target.position.tolist(), position.tolist()
         dx, dy = tx - x, ty - y
         distance = math.hypot(dx, dy)
         if self.max_range is not None and distance > self.max_range:
@@ -53,4 +54,4 @@ class Sensor(Actor):
         else:
             nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
             value = [dx + along * nx - across * ny, dy + along * ny + across * nx]
-        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across))
+        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, target.time))

@@ -29,9 +29,10 @@ from functools import partial
 from heapq import heappop, heappush
 from typing import Any
 
-from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake
+from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake, readable
 from epicycle.aspects import Job
 
+from ..model import Position, describe, told_raised
 from .agenda import Environment, Instant, Turn
 from .pace import Pace
 
@@ -41,19 +42,27 @@ _START = 0
 
 
 class ActorError(EpicycleError):
-    """An actor raised an exception: names it and the tag; the exception itself is the cause."""
+    """An actor raised an exception: names it and the tag; the exception itself is the cause.
 
-    def __init__(self, path: str, tag: Tag, doing: str, reason: str, where: str = "") -> None:
-        super().__init__(path, tag, doing, reason, where)
+    ``where`` is where the actor is declared, ``raised`` the line of a user's program from which the exception comes.
+    """
+
+    def __init__(
+        self, path: str, tag: Tag, doing: str, reason: str, where: str = "", raised: Position | None = None
+    ) -> None:
+        super().__init__(path, tag, doing, reason, where, raised)
         self.path = path
         self.tag = tag
         self.doing = doing
         self.reason = reason
         self.where = where
+        self.raised = raised
 
     def __str__(self) -> str:
-        at = f"\n   declared at {self.where}" if self.where else ""
-        return f"{self.path} failed in {self.doing} at {self.tag}: {self.reason}{at}"
+        lines = [readable(f"{self.path} failed in {self.doing} at {self.tag}: {self.reason}")]
+        lines += told_raised(self.raised) if self.raised is not None else []
+        lines += [f"   declared at {self.where}"] if self.where else []
+        return "\n".join(lines)
 
 
 class LoopError(EpicycleError):
@@ -285,9 +294,9 @@ class Director:
             port.hold()
         try:
             turn.actor.fire()
-        except ActorError:  # of an aspect on the way of a token
+        except (ActorError, LoopError, KeyboardInterrupt):  # of an aspect on the way of a token, of the user
             raise
-        except Exception as error:
+        except BaseException as error:  # whatever an actor raises, sys.exit() too, is its failure
             doing = "run()" if isinstance(turn.actor, Process) else "fire()"
             raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
         finally:
@@ -332,10 +341,11 @@ class Director:
                     environment.step()
                 else:
                     self._handle(heappop(times))
-            except (ActorError, LoopError):
+            except (ActorError, LoopError, KeyboardInterrupt):
                 raise
-            except Exception as error:
-                raise self._of_process(error, actors) from error
+            except BaseException as error:
+                found, cause = self._of_process(error, actors)
+                raise found from cause
             if self._stop_after is not None and self.last >= self._stop_after:
                 break
             here = here + 1 if upcoming == now else 0
@@ -347,20 +357,13 @@ class Director:
                 progress(now / 1e9)
         return self._reason
 
-    def _of_process(self, error: Exception, actors: list[Actor]) -> ActorError:
-        """The error of a process that SimPy resumed: from there, no firing says whose it was."""
+    def _of_process(self, error: BaseException, actors: list[Actor]) -> tuple[ActorError, BaseException | None]:
+        """The error of a process that SimPy resumed, and its cause: from there, no firing says whose it was."""
         for actor in actors:
             failure = actor.failure if isinstance(actor, Process) else None
             if isinstance(failure, ActorError):  # of an aspect or a metric, to which the process has sent
-                return failure
+                return failure, failure.__cause__
             if failure is not None:
-                return ActorError(actor.path, self.tag, "run()", describe(failure))
-        return ActorError("a SimPy process", self.tag, "its generator", describe(error.__cause__ or error))
-
-
-def describe(error: BaseException) -> str:
-    """An exception in one line; our own explain themselves without their type."""
-    text = str(error).strip()
-    if isinstance(error, EpicycleError):
-        return text
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+                return ActorError(actor.path, self.tag, "run()", describe(failure)), failure
+        cause = error.__cause__ or error  # SimPy raises a copy of it
+        return ActorError("a SimPy process", self.tag, "its generator", describe(cause)), cause

@@ -15,7 +15,9 @@ import networkx as nx
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, Request
 
+from .configuration import place_of
 from .declarations import PartText, PointcutText
+from .firing_times import without_port
 from .graph import Detour, ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
@@ -108,7 +110,12 @@ class ModelWeaving(Weaving):
         outside = [path for path in found if path != self.path and not self._is_inside(path)]
         self._ask(pointcut, outside, found)
         if not pointcut.exclude:
-            self.model.times.update(dict.fromkeys(outside, pointcut.seconds))
+            self.model.times.update(dict.fromkeys(outside, pointcut.firing_time))
+            inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
+            for message, keys, advice in without_port(("time",), pointcut.firing_time, inside, self.graph):
+                time = pointcut.time
+                where = pointcut.position if time is None else place_of(time, keys[1:], of_key=True)
+                self._problem(message, where, advice)
         return outside
 
     def _of(self, pointcut: PointcutText) -> list[str]:

@@ -60,9 +60,10 @@ def _weave(
     index = PathIndex(port.path for port in own.values())
     pointcuts = [PointcutText.of(Text(each, position)) for each in at_parameter]
     weaving = Weaving(graph, index, name, type(aspect), actor.path, problems)
-    woven = weaving.weave(aspect, pointcuts, lambda _: position)
+    woven = weaving.weave(aspect, pointcuts, lambda *_: position)
     woven.ports = [own[port].path for port in decoration.ports if port in own]
     woven.actors = {} if decoration.ports else {actor.path: actor.path}
+    weaving.check_times(woven, lambda *_: position)
     woven.comes_with_actor = True
     graph.positions.setdefault(f"aspect {name}", position)
     return woven

@@ -26,6 +26,11 @@ class Limits:
         return 10 * self.actors
 
     @property
+    def inherited(self) -> int:
+        """How many actors, aspects, connections, ports and parameters classes may take over from others."""
+        return 5 * self.actors
+
+    @property
     def places(self) -> int:
         """At how many ports and actors aspects may stand."""
         return 5 * self.actors

@@ -11,12 +11,12 @@ from ..collection import without_collection
 from ..tables import Table, as_html, as_text, short
 from .checks import check
 from .composite_aspect import check_nesting, detours
-from .declarations import REDUCTIONS, MetricText
 from .decorated import arranged
 from .ends import Port
 from .graph import ModelGraph
+from .measure import take_problem
 from .observation import Metric, Observation, checked_seed, nanoseconds
-from .problems import Position, Problem, Problems, did_you_mean
+from .problems import Position, Problem, Problems
 from .reading import NAME, Text, within
 from .schedule import firing_order
 from .scope import Composite, Scope
@@ -111,25 +111,22 @@ class Model(Scope):
         """End the run, after the tag in question, when one of these output ports sends something true."""
         self._watch(ports, lambda observation, text: observation.stop_when(text))
 
-    def metric(self, name: str, *, of: str | Port, take: str = "last", unit: str = "", doc: str = "") -> None:
-        """A number in the results: ``take`` is last, first, min, max, sum, mean or count."""
+    def metric(self, name: str, *, of: str | Port, take: str = "last", **options: object) -> None:
+        """A number in the results; what can be taken, and with which options, is in docs/language.md.
+
+        >>> model.metric("in_queue", of="server.size", take="time_mean", initial=0, after="100 s", interval=0.95)
+        """
         position = call_site()
         problems = Problems()
         if not NAME.match(name):
             problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
         if any(metric.name == name for metric in self.metrics):
             problems.add(f"there is a metric {name!r} already", position, "give this another name")
-        if take not in REDUCTIONS:
-            problems.add(
-                f"metric {name!r} cannot take {take!r}{did_you_mean(take, REDUCTIONS)}",
-                position,
-                f"valid reductions: {', '.join(REDUCTIONS)}",
-            )
+        if problem := take_problem(name, take):
+            problems.add(problem[0], position, problem[1])
         problems.raise_if_any()
-        self._watch(
-            [of],
-            lambda observation, text: observation.metric(MetricText(name, text, take, unit, doc, position)),
-        )
+        values = {"take": take, **options}
+        self._watch([of], lambda observation, text: observation.metric(name, text, values, position))
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[Observation, Text], None]) -> None:
         """Let an ``Observation`` do what it does for a model file; if something is wrong, nothing has changed."""

@@ -12,13 +12,24 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
-from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect
+from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
 from .composite_aspect import ModelWeaving, check_nesting
 from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
 from .decorated import weave_decorations
 from .document import Scalar
-from .ends import CompositePort, Ends, Instance, Places, check_aspect, clock_of, each_of, mistake, raising, seconds_of
+from .ends import (
+    CompositePort,
+    Ends,
+    Instance,
+    Places,
+    check_aspect,
+    clock_of,
+    each_of,
+    firing_time_of,
+    mistake,
+    raising,
+)
 from .graph import Hop
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
@@ -368,14 +379,15 @@ class Scope:
         aspect: Aspect | Composite | Instance,
         *,
         at: Places | Mapping[str, Places],
-        time: float | str | None = None,
+        time: FiringTime | str | None = None,
     ) -> WovenAspect:
         """Let an aspect stand at ports or actors, given as such or as patterns over those that are there now.
 
         Aspects at one port or actor apply in the order in which they are woven.  An aspect may be a model: a composite
         of this model, or an instance of a composite class, which is added.  If it has several request ports, ``at``
-        says what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  With a ``time`` (s, or a text with a
-        unit) such an aspect stands at actors, whose firings take so long.  Raises ``ModelError``.
+        says what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  With a ``time`` (s, a text with a
+        unit, a distribution, or these by input port) such an aspect stands at actors, whose firings take so long.
+        Raises ``ModelError``.
         """
         position = call_site()
         full = self._full(name)
@@ -385,25 +397,25 @@ class Scope:
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
             check_aspect(aspect, (Aspect, Composite, Instance), position, problems)
-            seconds = seconds_of(time, aspect, position, problems)
+            firing_time = firing_time_of(time, aspect, position, problems)
         if isinstance(aspect, Aspect):
             with raising() as problems:
                 pointcuts = self._pointcuts(at, type(aspect), position, problems)
                 weaving = Weaving(self._model.graph, self._ports, full, type(aspect), self.path, problems)
-                woven = weaving.weave(aspect, pointcuts, lambda _: position)
+                woven = weaving.weave(aspect, pointcuts, lambda *_: position)
             self._model.enlist([woven])
             return woven
-        model, kind = self._model, CompositeAspect if seconds is None else CompositeExecutionAspect
+        model, kind = self._model, CompositeAspect if firing_time is None else CompositeExecutionAspect
         composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
         try:
             with raising() as problems:
                 pointcuts = self._pointcuts(at, kind, position, problems)
                 for pointcut in pointcuts:
-                    pointcut.seconds = seconds or 0.0
+                    pointcut.firing_time = firing_time or 0.0
                 detour = ModelWeaving(
                     model.graph, self._ports, full, composite.path, self.path, problems, position, kind
                 )
-                woven = detour.weave(kind(), pointcuts, lambda _: position)
+                woven = detour.weave(kind(), pointcuts, lambda *_: position)
                 detour.check(woven)
                 check_nesting([*model.aspects, woven], model.graph, problems)
         except Exception:

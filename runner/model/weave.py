@@ -22,6 +22,7 @@ from epicycle.aspects import (
 )
 
 from .declarations import PointcutText
+from .firing_times import unknown_inputs
 from .graph import ModelGraph
 from .patterns import PathIndex, PatternError, matches
 from .problems import Position, Problems, did_you_mean, nearest
@@ -51,11 +52,11 @@ class Weaving:
         return self.cls.__name__
 
     def weave(
-        self, aspect: Aspect, pointcuts: list[PointcutText], position_of: Callable[[str], Position | None]
+        self, aspect: Aspect, pointcuts: list[PointcutText], position_of: Callable[..., Position | None]
     ) -> WovenAspect:
         """The aspect with its places and all that it looks at; a pointcut that selects nothing is a problem.
 
-        ``position_of`` tells where a parameter is set in the model file.
+        ``position_of`` tells where a parameter, or a key in it, is set in the model file.
         """
         before = len(self.problems)
         woven = WovenAspect(self.name, aspect, *self.select(pointcuts))
@@ -78,9 +79,15 @@ class Weaving:
                 woven.readings[formula] = [self._reading(name, each, position) for each in formula.references]
                 for reference, fields in formula.given_fields:
                     self._check_given(name, reference, fields, woven.ports, position)
+        self.check_times(woven, position_of)
         chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
         woven.reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return woven
+
+    def check_times(self, woven: WovenAspect, position_of: Callable[..., Position | None]) -> None:
+        """See that execution times by input port name ports that the actors have."""
+        for message, keys, advice in unknown_inputs(woven, self.graph):
+            self._problem(message, position_of(*keys), advice)
 
     def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         """The ports, connections and actors that the pointcuts select."""
