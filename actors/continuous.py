@@ -20,8 +20,8 @@ from .core import (
     did_you_mean,
 )
 from .expression import Formula, FormulaParameter, operand
-from .expression.enclosure import Bounds, bounds_of
-from .integration import STEPPERS, State
+from .expression.enclosure import bounds_of
+from .integration import STEPPERS, Bounds, State
 from .segment import Crossing, Equations, Guard, Segment, sign_of
 
 _MAX_STEPS = 10_000
