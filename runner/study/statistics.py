@@ -12,8 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from epicycle.actors import random_stream
-from epicycle.actors.core import normal_quantile, normal_share
+from epicycle.actors import normal_quantile, normal_share, random_stream
 
 from ..student import student_quantile, student_tail
 
