@@ -26,9 +26,10 @@ def _pairs(numbers: list[int], bits: int = 100) -> tuple[tuple[float, ...], tupl
 def _series(numerator: int, denominator: int, sign: int, one: int = _ONE) -> int:
     """artanh (``sign`` 1) or arctan (-1) of a small ratio, by its power series."""
     power, total, odd = one * numerator // denominator, 0, 1
-    while power:
-        total += power // odd if sign > 0 or odd % 4 == 1 else -(power // odd)
-        power = power * numerator * numerator // (denominator * denominator)
+    above, below = sign * numerator * numerator, denominator * denominator
+    while power not in (0, -1):  # -1 is what is left of a negative one
+        total += power // odd
+        power = power * above // below
         odd += 2
     return total
 
