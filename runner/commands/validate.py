@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import DONE, add_model, load
+from .options import DONE, add_model, complain, load
 
 DESCRIPTION = "Check a model, or a study with all that it varies, without running it."
 
@@ -21,6 +21,13 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     if is_study(options.model):
         return check_study(options)
     model, _ = load(options, strict=options.strict)
+    if model.endless:
+        told = f"warning: {model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
+        if options.strict:
+            from epicycle.actors import EpicycleError
+
+            raise EpicycleError(told.removeprefix("warning: "))
+        complain(told)
     print(f"{options.model} is valid: {model.extent}")
     return DONE
 

@@ -13,7 +13,7 @@ from ..collection import without_collection
 from ..model import Metric, Model
 from .director import ActorError, Director, describe
 from .local import Deliver
-from .log import EventLog
+from .log import EventLog, Record
 from .log_filter import LogFilter
 from .pace import Pace
 from .results import Reduction, Results
@@ -26,7 +26,7 @@ class Simulation:
     """One run of a model, which is checked first and may not be changed between this and ``run``.
 
     A model can be run any number of times, each time by a Simulation of its own.  ``keep_log`` keeps the records of the
-    event log, all or those that a ``LogFilter`` lets pass.
+    event log, all or those that a ``LogFilter`` lets pass; ``log_to`` is given them instead, as by a ``LogFile``.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
@@ -37,6 +37,7 @@ class Simulation:
         *,
         seed: int | None = None,
         keep_log: bool | LogFilter = False,
+        log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
     ) -> None:
         model.check()
@@ -51,7 +52,7 @@ class Simulation:
         self._tracer = tracer
         order = model.order()
         keeps = keep_log.keeps if keep_log else None
-        self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
+        self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
         self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
         self.signals = {name: Signal(name) for name in model.recorded}
         self._reductions = [(metric, Reduction(metric.take)) for metric in model.metrics]
