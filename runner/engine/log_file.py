@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import logging
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -18,6 +19,7 @@ from ..columns import numbers, texts
 from .log import COLUMNS, LogError, Record
 
 FORMATS = (".parquet", ".csv", ".jsonl")
+_LOGGER = logging.getLogger("epicycle")
 _ROWS = 10_000  # that are written together
 _Row = tuple[Any, ...]
 
@@ -50,26 +52,28 @@ class LogFile:
         """Append a record."""
         self._rows.append(record.row())
         if len(self._rows) >= _ROWS:
-            self._flush()
+            with _undisturbed():
+                self._flush()
 
     def __exit__(self, *raised: object) -> None:
-        self._flush()
-        try:
-            with _undisturbed():
+        with _undisturbed():
+            self._flush()
+            try:
                 self._close()
-        except OSError as error:
-            self._failure = self._failure or error
-        if self._failure is not None and raised[0] is None:
-            raise self._error(self._failure) from self._failure
+            except OSError as error:
+                self._failure = self._failure or error
+        if self._failure is not None:
+            if raised[0] is None:
+                raise self._error(self._failure) from self._failure
+            _LOGGER.warning("error: %s", self._error(self._failure))
 
     def _flush(self) -> None:
-        with _undisturbed():
-            rows, self._rows = self._rows, []
-            if self._failure is None and rows:
-                try:
-                    self._write(rows)
-                except OSError as error:
-                    self._failure = error
+        rows, self._rows = self._rows, []
+        if self._failure is None and rows:
+            try:
+                self._write(rows)
+            except OSError as error:
+                self._failure = error
 
     def _error(self, error: OSError) -> LogError:
         return LogError(f"{self.path} cannot be written: {error.strerror or error}")
