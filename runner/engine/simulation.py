@@ -13,7 +13,7 @@ from ..collection import without_collection
 from ..model import Model, WovenAspect, describe, raised_at
 from .director import ActorError, Director
 from .local import Deliver
-from .log import EventLog
+from .log import EventLog, Record
 from .log_filter import LogFilter
 from .measurement import Measurement
 from .pace import Pace
@@ -27,7 +27,8 @@ class Simulation:
     """One run of a model, which is checked first and may not be changed between this and ``run``.
 
     A model can be run any number of times, one after the other, each time by a Simulation of its own.  ``keep_log``
-    keeps the records of the event log, all or those that a ``LogFilter`` lets pass.
+    keeps the records of the event log, all or those that a ``LogFilter`` lets pass; ``log_to`` is given them instead,
+    as by a ``LogFile``.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
@@ -38,6 +39,7 @@ class Simulation:
         *,
         seed: int | None = None,
         keep_log: bool | LogFilter = False,
+        log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
     ) -> None:
         _refuse_running(model)
@@ -53,7 +55,7 @@ class Simulation:
         self._tracer = tracer
         order = model.order()
         keeps = keep_log.keeps if keep_log else None
-        self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
+        self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
         limits = model.graph.limits
         self.director = (
             Director(order, self.seed, limits) if tracer is None else TracingDirector(order, self.seed, tracer, limits)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from epicycle.actors import Tag, counted, declared_parameters
+from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..collection import without_collection
 from ..tables import Table, as_html, as_text, short
@@ -80,6 +80,17 @@ class Model(Scope):
     @stop.setter
     def stop(self, stop: float | str | None) -> None:
         self.stop_time = None if stop is None else nanoseconds(stop)
+
+    @property
+    def endless(self) -> str:
+        """Why a run goes on for ever unless somebody ends it, in words; empty if that is not known."""
+        if self.stop_time is not None or self.stop_ports:
+            return ""
+        actors = self.graph.actors.values()
+        clock = next((actor.path for actor in actors if actor.is_endless), "")
+        if not clock or any(isinstance(actor, Stop) for actor in actors):
+            return ""
+        return f"{self.name} has no end: {clock} ticks for ever, and the model says neither stop nor stop_when"
 
     def local_tag(self, actor: str, tag: Tag) -> Tag:
         """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
