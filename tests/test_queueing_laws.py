@@ -44,7 +44,7 @@ SERVICES = {  # with E[S^2], of which Pollaczek and Khinchine make the number in
 
 def queue(tmp_path: Path, service: str, until: float | None = None) -> Results:
     path = tmp_path / "queue.yaml"
-    path.write_text(QUEUE.format(service=service, seed=1), encoding="utf-8")
+    path.write_text(QUEUE.format(service=service, seed=5), encoding="utf-8")
     return Simulation(load_model(path)).run(until=until)
 
 
