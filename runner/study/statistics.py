@@ -73,7 +73,9 @@ def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: 
     gaps = [value - plain.value for value in values]
     squares = math.fsum(gap * gap for gap in gaps)
     acceleration = math.fsum(gap * gap * gap for gap in gaps) / (6.0 * squares * math.sqrt(squares))
-    below = (bisect_left(means, plain.value) + bisect_right(means, plain.value)) / (2.0 * resamples)
+    rounding = 1e-12 * max(map(abs, values))  # of few values, many a resample has each of them once: the same mean
+    at_or_below = bisect_left(means, plain.value - rounding) + bisect_right(means, plain.value + rounding)
+    below = at_or_below / (2.0 * resamples)
     bias = normal_quantile(min(max(below, 0.5 / resamples), 1.0 - 0.5 / resamples))
     ends = []
     for share in ((1.0 - level) / 2.0, (1.0 + level) / 2.0):
