@@ -54,7 +54,11 @@ class Simulation:
         order = model.order()
         keeps = keep_log.keeps if keep_log else None
         self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
-        self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
+        limits = model.graph.limits
+        self.director = (
+            Director(order, self.seed, limits) if tracer is None else TracingDirector(order, self.seed, tracer, limits)
+        )
+        self.log.crowd = self.director.crowd
         self.signals = {name: Signal(name) for name in model.recorded}
         self._measurements = {metric.name: Measurement(metric) for metric in model.metrics}
         self._has_run = False

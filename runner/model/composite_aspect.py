@@ -21,7 +21,7 @@ from .firing_times import without_port
 from .graph import Detour, ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect
 
 BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
@@ -41,7 +41,7 @@ class ModelWeaving(Weaving):
     def __init__(
         self,
         graph: ModelGraph,
-        ports: PathIndex,
+        paths: Paths,
         name: str,
         path: str,
         scope: str,
@@ -49,7 +49,7 @@ class ModelWeaving(Weaving):
         position: Position,
         cls: type[Aspect] = CompositeAspect,
     ) -> None:
-        super().__init__(graph, ports, name, cls, scope, problems)
+        super().__init__(graph, paths, name, cls, scope, problems)
         self.path = path
         self.position = position
         self.model = AspectModel(path, graph.composites[path], "", {})

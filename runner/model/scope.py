@@ -31,13 +31,12 @@ from .ends import (
     raising,
 )
 from .graph import Hop
-from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
 from .reading import NAME, Text, within
 from .site import call_site, node_of
 from .transaction import all_or_nothing
 from .values import Values
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .wiring import Child, Wiring
 from .woven import WovenAspect
 
@@ -402,7 +401,7 @@ class Scope:
         if isinstance(aspect, Aspect):
             with raising() as problems:
                 pointcuts = self._pointcuts(at, type(aspect), position, problems)
-                weaving = Weaving(self._model.graph, self._ports, full, type(aspect), self.path, problems)
+                weaving = Weaving(self._model.graph, self._paths, full, type(aspect), self.path, problems)
                 woven = weaving.weave(aspect, pointcuts, lambda *_: position)
             self._model.enlist([woven])
             return woven
@@ -412,7 +411,7 @@ class Scope:
             pointcuts = self._pointcuts(at, kind, position, problems)
             for pointcut in pointcuts:
                 pointcut.firing_time = firing_time or 0.0
-            detour = ModelWeaving(model.graph, self._ports, full, composite.path, self.path, problems, position, kind)
+            detour = ModelWeaving(model.graph, self._paths, full, composite.path, self.path, problems, position, kind)
             woven = detour.weave(kind(), pointcuts, lambda *_: position)
             detour.check(woven)
             check_nesting([*model.aspects, woven], model.graph, problems)
@@ -423,8 +422,8 @@ class Scope:
         return woven
 
     @property
-    def _ports(self) -> PathIndex:
-        return PathIndex(self._model.graph.ports.nodes)
+    def _paths(self) -> Paths:
+        return Paths(self._model.graph)
 
     def _pointcuts(
         self, at: Places | Mapping[str, Places], cls: type[Aspect], position: Position, problems: Problems

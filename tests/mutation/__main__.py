@@ -32,12 +32,16 @@ from tests.mutation.mutants import Mutant
 
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".mutants"
-KERNELS = "actors/robotics/numerics/"
+# What numba compiles, and Python runs to the same bits.
+KERNELS = ("actors/robotics/numerics/", "actors/core/elementary/")
+# What has to do with compiling is tried with numba, and everything is compiled anew.
+COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_numba.py"}
+COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
     "tests/actors", "tests/api", "tests/aspects", "tests/cli", "tests/conformance", "tests/core", "tests/engine",
     "tests/library", "tests/model", "tests/numerics", "tests/test_demo_models.py", "tests/test_disturbances.py",
-    "tests/test_models.py",
+    "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
 TESTS_OF_KERNELS = ("tests/numerics", "tests/actors", "tests/core")
 LONGEST = {True: 8.0, False: 12.0}  # s; a test that takes longer, compiled or not, is not asked
@@ -103,6 +107,11 @@ def maps(trees: Sequence[Path], jobs: int) -> dict[bool, dict[str, Any]]:
 # --- one mutant ----------------------------------------------------------------------------------------
 
 
+def is_compiled(mutant: Mutant) -> bool:
+    """Whether a mutant is tried with kernels compiled."""
+    return not mutant.file.startswith(KERNELS) or mutant.file in COMPILERS
+
+
 def stages(tests: Sequence[str], seconds: dict[str, float]) -> Iterator[tuple[list[str], float]]:
     """The tests in heaps, with the time of each heap."""
     at = 0
@@ -121,16 +130,17 @@ def attempt(mutant: Mutant, tree: Path, by_kind: dict[bool, recorder.Map], but: 
     path = tree / mutant.file
     original = path.read_text(encoding="utf-8")
     stat = path.stat()
-    compiled = not mutant.file.startswith(KERNELS)
+    compiled = is_compiled(mutant)
+    patience = 8.0 + COMPILING * (mutant.file in COMPILERS)
     known = by_kind[compiled]
     tests = [test for test in known.tests(mutant.file, original, mutant.line) if test not in but]
     before, after = mutant.lines(original)
     asked, spent, verdict = 0, 0.0, trial.Verdict(True, "", 0.0)
-    path.write_text(mutant.source(original) or original, encoding="utf-8")
+    path.write_text(mutant.text, encoding="utf-8")
     try:
         for heap, total in stages(tests, known.seconds):
             asked += len(heap)
-            verdict = trial.run_tests(tree, heap, compiled, 3.0 * total + 8.0)
+            verdict = trial.run_tests(tree, heap, compiled, 3.0 * total + patience)
             spent += verdict.seconds
             if not verdict.passed:
                 break
@@ -168,7 +178,7 @@ def unreliable(results: Iterable[Result], tree: Path) -> set[tuple[bool, str]]:
     killers: dict[tuple[bool, str], list[str]] = defaultdict(list)
     for result in results:
         if "::" in result.by:
-            compiled = not result.mutant.file.startswith(KERNELS)
+            compiled = is_compiled(result.mutant)
             killers[compiled, result.by.partition("::")[0]].append(result.by)
     found = set()
     for (compiled, _), tests in killers.items():
@@ -254,6 +264,7 @@ def main() -> int:
             found = maps(trees, given.jobs)
             if given.map is not None:
                 recorder.save(given.map, found)
+        trial.share_bytecode(trees)
         by_kind = {compiled: recorder.Map(each) for compiled, each in found.items()}
         print(f"{len(found[True])} tests, {len(found[False])} of kernels; {time.monotonic() - began:.0f} s", flush=True)
         results: dict[str, Result] = {}

@@ -14,10 +14,14 @@ import coverage
 import pytest
 
 from tests.mutation.mutants import GUARDED
+from tests.mutation.trial import OPTIONS
 
 
 def _ring(*_: object) -> None:
     pytest.fail("it takes too long")
+
+
+REFERENCE, FEW = "tests/test_reference.py::", 60
 
 
 class Recorder:
@@ -82,12 +86,18 @@ class Map:
                     self._tests[file, line].append(test)
 
     def tests(self, file: str, source: str, line: int) -> list[str]:
-        """The tests of a line; of a line that runs at import, those of its class or else of its file."""
+        """The tests of a line; of a line that runs at import, those of its class or else of its file.
+
+        What is declared there is in the reference, too, which is made in a process of its own.
+        """
+        reference: list[str] = []
         for lines in self._neighbourhoods(source, line):
             found = {test for each in lines for test in self._tests.get((file, each), ())}
             if found:
-                return sorted(found, key=lambda test: (self.seconds[test] > 1.0, self._cost(test, file), test))
-        return []
+                own = sorted(found, key=lambda test: (self.seconds[test] > 1.0, self._cost(test, file), test))
+                return own[:FEW] + reference + own[FEW:]
+            reference = [test for test in self.seconds if test.startswith(REFERENCE)]
+        return reference
 
     def _cost(self, test: str, file: str) -> float:
         """Small for what is quick and about this file."""
@@ -127,5 +137,5 @@ def load(path: Path) -> dict[bool, dict[str, Any]]:
 def run_and_record(root: Path, files: list[str], limit: float, compiled: bool) -> tuple[dict[str, Any], list[str]]:
     """Run tests in this process; what they run, and which failed."""
     watcher = Recorder(root, limit, compiled)
-    pytest.main(["-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", *files], plugins=[watcher])
+    pytest.main([*OPTIONS, *files], plugins=[watcher])
     return watcher.found, watcher.failed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib
 import json
 import os
@@ -25,6 +26,10 @@ HEAVY = (
     "pyarrow.csv", "simpy", "networkx", "yaml", "filterpy.kalman", "rich.table", "rich.console", "hypothesis",
     "jsonschema", "pandas", "matplotlib.figure", "casadi", "pytest", "pytest_asyncio", "doctest", "mpmath",
 )  # fmt: skip
+OPTIONS = (
+    "-q", "--tb=no", "--no-header", "-W", "ignore",
+    "-p", "no:cacheprovider", "-p", "no:unraisableexception", "-p", "no:threadexception",
+)  # fmt: skip
 MEMORY = 16_000_000_000  # address space of a process, in bytes
 
 
@@ -34,6 +39,9 @@ def preload() -> None:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
     assert "epicycle" not in sys.modules
+    sys.dont_write_bytecode = False  # whatever the environment says
+    gc.collect()
+    gc.freeze()  # none of it is looked at again in a fork
 
 
 def copy_project(root: Path, to: Path) -> Path:
@@ -49,6 +57,19 @@ def copy_project(root: Path, to: Path) -> Path:
     for folder in ("actors", "aspects", "models", "runner"):
         (to / "epicycle" / folder).symlink_to(to / folder)
     return to
+
+
+def share_bytecode(trees: Sequence[Path]) -> None:
+    """What was compiled in one copy is so in the others: their sources have the same times."""
+    for tree in trees:
+        for folder in tree.rglob("__pycache__"):
+            for other in trees:
+                if other != tree and not folder.is_symlink():
+                    to = other / folder.relative_to(tree)
+                    to.mkdir(exist_ok=True)
+                    for file in folder.glob("*.pyc"):
+                        if not (to / file.name).exists():
+                            shutil.copy2(file, to)
 
 
 class Verdict(NamedTuple):
@@ -118,7 +139,12 @@ def _settle(tree: Path, compiled: bool, limit: float) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, int(limit) + 3))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    os.environ.update(PYTHONPATH=str(tree), PYTHONDONTWRITEBYTECODE="1", NUMBA_DISABLE_JIT=str(int(not compiled)))
+    os.environ.update(
+        PYTHONPATH=str(tree),
+        PYTHONDONTWRITEBYTECODE="1",
+        PYTEST_DISABLE_PLUGIN_AUTOLOAD="1",
+        NUMBA_DISABLE_JIT=str(int(not compiled)),
+    )
     numba.config.DISABLE_JIT = int(not compiled)
     sys.path[:] = [str(tree), *(each for each in sys.path if each and Path(each).resolve() != Path.cwd())]
     for name in [name for name in sys.modules if name.partition(".")[0] == "tests"]:
@@ -136,8 +162,7 @@ def run_tests(tree: Path, tests: Sequence[str], compiled: bool, limit: float) ->
     def work() -> tuple[int, str]:
         sys.dont_write_bytecode = True
         chosen = _Chosen(ordered)
-        options = ["-x", "-q", "-p", "no:cacheprovider", "--tb=no", "--no-header", "-W", "ignore", "-m", ""]
-        return int(pytest.main([*options, *files], plugins=[chosen])), chosen.failed
+        return int(pytest.main([*OPTIONS, "-x", *files], plugins=[chosen])), chosen.failed
 
     answer, status, seconds = in_child(tree, compiled, limit, work)
     if answer is None:

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 PREFIX = "epicycle.actors.robotics.numerics."
+constraints = importlib.import_module(PREFIX + "constraints")
 barrier = importlib.import_module(PREFIX + "barrier")
 horizon = importlib.import_module(PREFIX + "horizon")
 information = importlib.import_module(PREFIX + "mutual_information")
@@ -126,11 +127,14 @@ def posed(**changes: Any) -> Any:
     return horizon.HorizonProblem(**{**fields, "position": np.array(fields["position"], dtype=float)})
 
 
+def starts() -> np.ndarray:
+    """A push, and none."""
+    return np.concatenate([np.full((1, STEPS, 2), [3.0, -2.0]), np.zeros((1, STEPS, 2))])
+
+
 def answer(name: str) -> dict[str, Any]:
-    """What the solver says, from a start that pushes and from rest."""
-    starts = np.zeros((2, STEPS, 2))
-    starts[0] = [3.0, -2.0]
-    found = barrier.solve(posed(**PROBLEMS[name]), starts)
+    """What the solver says."""
+    found = barrier.solve(posed(**PROBLEMS[name]), starts())
     return {
         "controls": found.controls.tolist(),
         "violation": found.violation,
@@ -146,6 +150,28 @@ def test_answer(name: str) -> None:
     assert found["violation"] == pytest.approx(expected["violation"], rel=1e-8, abs=1e-9)
     assert found["objective"] == pytest.approx(expected["objective"], rel=1e-8, abs=1e-9)
     assert np.array(found["controls"]) == pytest.approx(np.array(expected["controls"]), rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", [name for name in PROBLEMS if "too fast" not in name and "crowd" not in name])
+def test_ipopt_says_the_same(name: str) -> None:
+    """To what the barriers leave; crowds are solved roughly, and who is too fast just brakes."""
+    ipopt = importlib.import_module("epicycle.actors.robotics.casadi_solver")
+    problem, ours = posed(**PROBLEMS[name]), answer(name)
+    theirs = ipopt.solve(problem, starts())
+    assert theirs.violation == pytest.approx(ours["violation"], abs=2e-5)
+    assert theirs.objective == pytest.approx(ours["objective"], rel=2e-5, abs=2e-6)
+    assert np.hypot(*theirs.controls.T).max() <= problem.max_acceleration
+    worst = max(0.0, float(constraints.violations(problem, theirs.controls).max()))
+    assert theirs.violation == pytest.approx(worst, abs=1e-6)
+    assert theirs.iterations > 5
+
+
+def test_ipopt_stops_a_runaway_as_far_as_it_can() -> None:
+    ipopt = importlib.import_module("epicycle.actors.robotics.casadi_solver")
+    problem = posed(**PROBLEMS["much too fast"])
+    theirs = ipopt.solve(problem, starts())
+    assert theirs.violation == pytest.approx(float(constraints.violations(problem, theirs.controls).max()))
+    assert np.isfinite(theirs.controls).all()
 
 
 def test_all_kinds_of_answers_are_there() -> None:

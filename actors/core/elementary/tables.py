@@ -28,7 +28,7 @@ def _series(numerator: int, denominator: int, sign: int, one: int = _ONE) -> int
     power, total, odd = one * numerator // denominator, 0, 1
     while power:
         total += power // odd if sign > 0 or odd % 4 == 1 else -(power // odd)
-        power = power * numerator**2 // denominator**2
+        power = power * numerator * numerator // (denominator * denominator)
         odd += 2
     return total
 
