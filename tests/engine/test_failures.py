@@ -244,7 +244,7 @@ def test_an_actor_of_an_installed_package(tmp_path: Path) -> None:
             Simulation(model).run()
         head, at, line, carets, declared = str(caught.value).splitlines()
         assert head == f"{name} failed in initialize() at (0 s, 1): {reason}"
-        assert at == f"   raised at {home / 'actors.py'}:10:{9 if name == 'first' else 77}"
+        assert at == f"   raised at {home / 'actors.py'}:10:{9 if name == 'first' else 70}"
         assert line[carets.index("^") :].startswith("np.linalg.inv(" if name == "first" else "json_of(self)")
         assert declared.startswith("   declared at ")
 
