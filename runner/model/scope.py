@@ -407,21 +407,14 @@ class Scope:
             return woven
         model, kind = self._model, CompositeAspect if firing_time is None else CompositeExecutionAspect
         composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
-        try:
-            with raising() as problems:
-                pointcuts = self._pointcuts(at, kind, position, problems)
-                for pointcut in pointcuts:
-                    pointcut.firing_time = firing_time or 0.0
-                detour = ModelWeaving(
-                    model.graph, self._paths, full, composite.path, self.path, problems, position, kind
-                )
-                woven = detour.weave(kind(), pointcuts, lambda *_: position)
-                detour.check(woven)
-                check_nesting([*model.aspects, woven], model.graph, problems)
-        except Exception:
-            if composite is not aspect:
-                self.remove(composite.path.removeprefix(self._full("")))
-            raise
+        with raising() as problems:
+            pointcuts = self._pointcuts(at, kind, position, problems)
+            for pointcut in pointcuts:
+                pointcut.firing_time = firing_time or 0.0
+            detour = ModelWeaving(model.graph, self._paths, full, composite.path, self.path, problems, position, kind)
+            woven = detour.weave(kind(), pointcuts, lambda *_: position)
+            detour.check(woven)
+            check_nesting([*model.aspects, woven], model.graph, problems)
         detour.connect(woven)
         model.graph.positions.setdefault(f"aspect {full}", position)
         model.enlist([woven])

@@ -52,21 +52,20 @@ def transaction(model: Model) -> Iterator[None]:
 
 
 class _Before:
-    """What there was, the graph apart: lists that are made anew as such, others by their length."""
+    """What there was: the graph, what is made anew at each change, and lists, which are that or grow."""
 
     def __init__(self, model: Model) -> None:
         self.graph: Any = model.graph.size()
-        self._attributes = {
-            name: getattr(model, name) for name in ("aspects", "recorded", "warnings", "is_checked", "_order")
-        }
-        self._lengths = len(model.stop_ports), len(model.metrics)
+        self._attributes = {name: getattr(model, name) for name in ("aspects", "warnings", "is_checked", "_order")}
+        self._lists = {name: getattr(model, name) for name in ("recorded", "stop_ports", "metrics")}
+        self._lengths = list(map(len, self._lists.values()))
         self._stop_when = model.graph.positions.get("stop_when")
 
     def restore(self, model: Model) -> None:
         """Let it be as it was."""
-        for name, value in self._attributes.items():
+        for watched, length in zip(self._lists.values(), self._lengths, strict=True):
+            del watched[length:]
+        for name, value in (*self._attributes.items(), *self._lists.items()):
             setattr(model, name, value)
-        stop_ports, metrics = self._lengths
-        del model.stop_ports[stop_ports:], model.metrics[metrics:]
         if self._stop_when is not None:
             model.graph.positions["stop_when"] = self._stop_when

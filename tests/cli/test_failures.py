@@ -288,8 +288,10 @@ def test_a_backend_that_there_is_not() -> None:
         f"{clock}figures: {{f: {{type: TimeSeries, signals: [clock.output]}}}}\n", encoding="utf-8"
     )
     environment = {**os.environ, "MPLBACKEND": "nonsense"}
-    for arguments in (["run", "m.yaml", "--out", "out"], ["graph", "m.yaml", "-o", "out/g.svg"]):
-        words = [sys.executable, "-m", "epicycle.runner.cli", *arguments]
-        done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
-        assert (done.returncode, done.stderr) == (0, "")
-    assert {"f.png", "g.svg"} <= {each.name for each in Path("out").iterdir()}
+    program = "from epicycle.runner.cli import main; main(['graph', 'm.yaml', '-o', 'g.svg'])"
+    program += "; main(['run', 'm.yaml', '--out', 'out'])"
+    words = [sys.executable, "-c", program]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert Path("g.svg").is_file()
+    assert Path("out/f.png").is_file()
