@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -157,8 +158,8 @@ class TimeSeries(Figure):
         for index, (name, (times, values)) in enumerate(lines.items()):
             if self.style == "steps" and times:
                 # What is over at the moment at which it comes is not seen; the last value holds to the run's end.
-                latest = {**dict(zip(times, values, strict=True)), max(results.end, times[-1]): values[-1]}
-                times, values = list(latest), list(latest.values())
+                latest = dict(zip(times, values, strict=True)) | {max(results.end, times[-1]): values[-1]}
+                times, values = array("d", latest), array("d", latest.values())
             colour = COLOURS[index % len(COLOURS)]
             axes.plot(times, values, color=colour, linewidth=1.2, markersize=4, label=name, **look[self.style])
         axes.set_xlabel("time (s)")
@@ -181,17 +182,21 @@ class Histogram(Figure):
 
     def draw(self, results: Results, path: Path) -> None:
         columns = {
-            f"{name}.{place}" if place else name: [value for value in values if np.isfinite(value)]
+            f"{name}.{place}" if place else name: np.array(values)
             for name in _selected(self.signals, results)
             for place, (_, values) in _numbers(results.signals[name]).items()
         }
         canvas, axes = _sheet(results, 6.0, 3.4)
-        everything = [value for values in columns.values() for value in values]
-        edges = np.histogram_bin_edges(everything or [0.0], self.bins)
+        columns = {name: values[np.isfinite(values)] for name, values in columns.items()}
+        ends = [end for values in columns.values() if len(values) for end in (values.min(), values.max())]
+        edges = np.histogram_bin_edges(ends or [0.0], self.bins)
         for index, (name, values) in enumerate(columns.items()):
-            label = f"{name}, mean {np.mean(values):.4g}" if values else f"{name}, no values"
+            label = f"{name}, mean {np.mean(values):.4g}" if len(values) else f"{name}, no values"
             colour = COLOURS[index % len(COLOURS)]
-            axes.hist(values, edges, density=bool(values), color=colour, alpha=0.55, label=label)
+            counts, _ = np.histogram(values, edges)
+            axes.hist(
+                edges[:-1], edges, weights=counts, density=bool(len(values)), color=colour, alpha=0.55, label=label
+            )
         axes.set_xlabel(self.label or (next(iter(columns)) if len(columns) == 1 else ""))
         axes.set_ylabel("share per unit")
         axes.legend(fontsize=8, frameon=False)
@@ -203,12 +208,12 @@ def _selected(patterns: tuple[str, ...], results: Results) -> list[str]:
     return list(dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals)))
 
 
-def _numbers(signal: Signal) -> dict[str, tuple[list[float], list[float]]]:
+def _numbers(signal: Signal) -> dict[str, tuple[array[float], array[float]]]:
     """Times and values of each number inside the tokens, by its place."""
-    found: dict[str, tuple[list[float], list[float]]] = {}
-    for tag, token in zip(signal.tags, signal.tokens, strict=True):
+    found: dict[str, tuple[array[float], array[float]]] = {}
+    for tag, token in signal:
         for place, value in scalars(token):
-            times, values = found.setdefault(place, ([], []))
+            times, values = found.setdefault(place, (array("d"), array("d")))  # 16 bytes a number, not 100
             times.append(tag.seconds)
             values.append(value)
     return found
