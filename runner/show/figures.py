@@ -9,12 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Configurable, Parameter, array_parameter, texts_parameter
+from epicycle.actors import Configurable, Parameter, array_parameter, shortened, texts_parameter
 
 from ..engine import Results, Signal
 from ..engine.encoding import scalars
 from ..model.patterns import select
 
+MAX_TEXT = 200  # characters of a label
 COLOURS = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")
 
 
@@ -236,7 +237,11 @@ def _sheet(results: Results, width: float, height: float) -> tuple[Any, Any]:
 def save(canvas: Any, path: Path) -> None:
     """Write a matplotlib figure so that the same one gives the same file."""
     import matplotlib
+    from matplotlib.text import Text
 
+    for text in canvas.findobj(Text):  # whatever a model is called: a sheet grows with the texts on it
+        if len(text.get_text()) > MAX_TEXT:
+            text.set_text(shortened(text.get_text(), MAX_TEXT))
     with matplotlib.rc_context({"svg.hashsalt": "epicycle"}):
         metadata = {"Date": None} if path.suffix == ".svg" else {}
         canvas.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)
