@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,13 +75,17 @@ class Signal:
         found: list[Any] = self._tokens if self._kind is None else self._tokens.tolist()
         return found
 
+    def __iter__(self) -> Iterator[tuple[Tag, Any]]:
+        """Each token with its tag, of which there may be more than fit into memory all at once."""
+        return zip(map(Tag, self._times, self._microsteps), self._tokens, strict=True)
+
     def __len__(self) -> int:
         return len(self._times)
 
     @property
     def times(self) -> NDArray[np.float64]:
         """The times in seconds."""
-        return np.array([to_seconds(time) for time in self._times], dtype=float)
+        return np.fromiter(map(to_seconds, self._times), dtype=float, count=len(self))
 
     @property
     def microsteps(self) -> NDArray[np.int64]:
