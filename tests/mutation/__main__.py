@@ -28,12 +28,10 @@ from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkResult
 
 from tests.mutation import mutants as mutants_module
 from tests.mutation import recorder, trial
-from tests.mutation.mutants import Mutant
+from tests.mutation.mutants import KERNELS, Mutant
 
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".mutants"
-# What numba compiles, and Python runs to the same bits.
-KERNELS = ("actors/robotics/numerics/", "actors/core/elementary/")
 # What has to do with compiling is tried with numba, and everything is compiled anew.
 COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_numba.py"}
 COMPILING = 120.0  # s, at most

@@ -143,6 +143,20 @@ def test_huge_prior_and_tiny_noise_are_positive_definite_strictly() -> None:
         assert np.linalg.eigvalsh(covariance)[0] > 0.0
 
 
+def test_noise_is_an_ellipse_along_the_line_of_sight() -> None:
+    """Seen from (1, 2), a target at (4, 6) lies along (0.6, 0.8)."""
+    rows = np.array([[ukf.RELATIVE_POSITION, 1.0, 2.0, 9.0, 9.0, 0.5, 2.0], [ukf.RANGE, 1.0, 2.0, 9.0, 9.0, 0.5, 2.0]])
+    noises = ukf.measurement_noise(np.array([[4.0, 6.0]]), np.ones(1), rows)
+    a, b = 0.25, 4.0
+    expected = [a * 0.36 + b * 0.64, (a - b) * 0.48, a * 0.64 + b * 0.36]
+    assert noises == pytest.approx(np.array([expected, [a, 0.0, 0.0]]))
+    # The mean over what is there with weights, one of them straight above; who stands on the target looks along x.
+    both = ukf.measurement_noise(np.array([[4.0, 6.0], [1.0, 7.0], [1.0, 2.0]]), np.array([0.5, 0.3, 0.2]), rows)
+    expected = 0.5 * np.array(expected) + 0.3 * np.array([b, 0.0, a]) + 0.2 * np.array([a, 0.0, b])
+    assert both[0] == pytest.approx(expected)
+    assert both[1].tolist() == [a, 0.0, 0.0]
+
+
 def test_no_measurement_changes_nothing() -> None:
     mean, covariance = ukf.update(*PRIOR, 0.0, np.empty((0, 7)), np.empty((0, 3)))
     assert (mean == PRIOR[0]).all()
