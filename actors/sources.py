@@ -130,7 +130,7 @@ class PoissonClock(_Ticking):
         self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
     def _interval(self) -> int:
-        return to_nanoseconds(float(self.random.exponential(self.mean_interval)))
+        return to_nanoseconds(self.random.exponential(self.mean_interval))
 
     def fire(self) -> None:
         self._send(self._tick)

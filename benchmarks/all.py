@@ -1,4 +1,4 @@
-"""All benchmarks that have a goal, into benchmarks/RESULTS.md: `python benchmarks/all.py [NAME ...]`, or `make bench`.
+"""All benchmarks that have a goal, into benchmarks/RESULTS.md: `python -m benchmarks.all [NAME ...]`, or `make bench`.
 
 Each part runs in a process of its own, one after the other, so that none warms or fills the other's memory.  Let the
 machine do nothing else meanwhile.
@@ -16,7 +16,7 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
-from measure import pace, table
+from benchmarks.measure import pace, table
 
 HERE = Path(__file__).parent
 PARTS = ("controllers", "studies", "events", "growth", "start")
@@ -41,7 +41,7 @@ def machine() -> str:
 
 def part(name: str) -> str:
     """The section of one part, measured now."""
-    module = importlib.import_module(name)
+    module = importlib.import_module(f"benchmarks.{name}")
     rows = []
     for row in module.rows():
         print(f"{name}: {row.work}, {row.peer}: {row.result}", file=sys.stderr, flush=True)
@@ -67,10 +67,15 @@ def main() -> None:
     sections, paces = [], [pace()]
     for name in given.names or PARTS:
         done = subprocess.run(
-            [sys.executable, __file__, "--part", name], stdout=subprocess.PIPE, text=True, check=False
+            [sys.executable, "-m", "benchmarks.all", "--part", name],
+            cwd=HERE.parent,
+            stdout=subprocess.PIPE,
+            text=True,
+            check=False,
         )
         text = done.stdout if done.returncode == 0 else f"This part failed (exit code {done.returncode}).\n"
-        title = (importlib.import_module(name).__doc__ or name).splitlines()[0].partition(": `")[0].rstrip(".")
+        about = importlib.import_module(f"benchmarks.{name}").__doc__ or name
+        title = about.splitlines()[0].partition(": `")[0].rstrip(".")
         sections.append(f"## {title}\n\n{text}")
         paces.append(pace())
     minutes = (time.perf_counter() - began) / 60

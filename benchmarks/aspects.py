@@ -1,4 +1,4 @@
-"""What aspects cost where they do nothing: `python benchmarks/aspects.py [--rounds 200]`.
+"""What aspects cost where they do nothing: `python -m benchmarks.aspects [--rounds 200]`.
 
 A chain of actors runs beside another part that carries one token.  Compared with the same model without aspects:
 
@@ -28,8 +28,7 @@ from statistics import median
 from types import FrameType
 from typing import Any
 
-from measure import interval
-
+from benchmarks.measure import interval
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.model import Model
 

@@ -1,4 +1,4 @@
-"""The controllers: `python benchmarks/controllers.py [--problems 1000]`.
+"""The controllers: `python -m benchmarks.controllers [--problems 1000]`.
 
 - The horizon problem of eqs. (2)-(5): problems that the solver was given in runs of collision_avoidance, without
   disturbance and at 50 %, with none to four observers, solved by ours and by the programs of ``programs.py``.
@@ -19,8 +19,8 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from measure import Row, compare, cpu_seconds, of_the_pace, pace, table, take_turns
 
+from benchmarks.measure import Row, compare, cpu_seconds, of_the_pace, pace, table, take_turns
 from epicycle.actors import Barrier
 from epicycle.actors.robotics.numerics import barrier, ukf
 from epicycle.runner import Results, Simulation, load_model
@@ -71,7 +71,7 @@ def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
 
 def horizon_problems(count: int) -> Iterator[Row]:
     """Ours and the peers take turns, problem by problem."""
-    from programs import PEERS, bounds_of, numbers_of, shape_of, worth
+    from benchmarks.programs import PEERS, bounds_of, numbers_of, shape_of, worth
 
     problems = record(count)
     how = (

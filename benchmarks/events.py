@@ -1,4 +1,4 @@
-"""The discrete-event core against SimPy, written by hand: `python benchmarks/events.py [--rounds 5]`.
+"""The discrete-event core against SimPy, written by hand: `python -m benchmarks.events [--rounds 5]`.
 
 Three pieces of work, each as a model of ours, as SimPy processes with a Store before each, and as bare callbacks on
 SimPy's events:
@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import simpy
-from measure import Row, compare, cpu_seconds, table, take_turns
 
+from benchmarks.measure import Row, compare, cpu_seconds, table, take_turns
 from epicycle.actors import Tag, random_stream
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.engine import EventLog

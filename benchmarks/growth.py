@@ -1,4 +1,4 @@
-"""How the cost of a run grows: `python benchmarks/growth.py [--rounds 3]`.
+"""How the cost of a run grows: `python -m benchmarks.growth [--rounds 3]`.
 
 - actors: a clock and a pipeline of 10 to 100,000 scales, through which as many tokens go that each model makes the same
   number of hops; the same of SimPy's processes with Stores, whose cost grows with the working set alone, too;
@@ -21,11 +21,12 @@ from statistics import median
 from typing import Any
 
 import simpy
-from measure import Row, cpu_seconds, table, take_turns
 
+from benchmarks.measure import Row, cpu_seconds, table, take_turns
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.model import Model
 
+ROOT = Path(__file__).parents[1]
 ACTORS = (10, 100, 1_000, 10_000, 100_000)
 HOPS = 200_000
 ROBOTS = (1, 4, 16, 64)
@@ -104,8 +105,8 @@ CONTENDERS = {"ours": seconds_of_ours, "SimPy": seconds_of_processes}
 
 def alone(contender: str, size: int) -> float:
     """What a contender takes in a process of its own; in a used one a model lies scattered in what others left."""
-    command = [sys.executable, __file__, "--contender", contender, "--size", str(size)]
-    return float(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+    command = [sys.executable, "-m", "benchmarks.growth", "--contender", contender, "--size", str(size)]
+    return float(subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout)
 
 
 def actors(rounds: int) -> Iterator[Row]:

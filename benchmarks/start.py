@@ -1,4 +1,4 @@
-"""How long it takes to start: `python benchmarks/start.py [--rounds 9]`.
+"""How long it takes to start: `python -m benchmarks.start [--rounds 9]`.
 
 A model of two actors and ten firings is validated and run in processes of their own, with warm caches; wall-clock time,
 as a person waits it, and CPU time.  What Python takes to start and import NumPy is told for comparison.
@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 
-from measure import Row, of_the_pace, pace, table
+from benchmarks.measure import Row, of_the_pace, pace, table
 
 TINY = """\
 model: tiny

@@ -1,4 +1,4 @@
-"""The paper's study: `python benchmarks/studies.py [--replications 20]`.
+"""The paper's study: `python -m benchmarks.studies [--replications 20]`.
 
 Runs of all 60 conditions of table_1 are made by `epicycle study`, in two processes and in one; wall-clock time, as a
 person waits it.
@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from measure import Row, of_the_pace, pace, table
+from benchmarks.measure import Row, of_the_pace, pace, table
 
 CONDITIONS, ALL = 60, 6_000
 REPLICATIONS, ALONE = 20, 5  # of each condition, in two processes and in one

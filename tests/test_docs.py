@@ -25,6 +25,7 @@ import pytest
 from epicycle.runner import ModelError, Simulation, load_model
 from epicycle.runner.cli import main
 from epicycle.runner.model.catalogue import built_in
+from epicycle.runner.model.measure import TAKES, TIME, TOKENS
 from epicycle.runner.study import Plan, read_study
 
 ROOT = Path(__file__).parent.parent
@@ -191,6 +192,17 @@ def test_every_aspect_is_in_the_table_of_families() -> None:
     assert set(re.findall(r"`([A-Z]\w+)`", families)) == set(built_in().aspects)
 
 
+def test_every_metric_counts_what_the_table_says() -> None:
+    document = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"^\| counts tokens .*\n\|-.*\n((?:\|.*\n)+)", document, re.M)
+    found: dict[str, set[str]] = {TOKENS: set(), TIME: set()}
+    for row in table.splitlines():
+        _, of_tokens, _, of_time, *_ = row.split("|")
+        found[TOKENS] |= set(re.findall(r"`(\w+)`", of_tokens)) - {"p", "when"}
+        found[TIME] |= set(re.findall(r"`(\w+)`", of_time)) - {"p", "when"}
+    assert found == {over: {name for name, each in TAKES.items() if each.over == over} for over in (TOKENS, TIME)}
+
+
 def refresh(path: Path) -> None:
     """Put what comes out now into a tutorial."""
     document, at, reader = path.read_text(encoding="utf-8"), 0, Reader()
@@ -210,7 +222,10 @@ if __name__ == "__main__":
     for tutorial in TUTORIALS:
         for module in [name for name, each in sys.modules.items() if "tutorial-" in str(getattr(each, "__file__", ""))]:
             del sys.modules[module]
-        with tempfile.TemporaryDirectory(prefix="tutorial-") as folder, contextlib.chdir(folder):
-            sys.path.insert(0, folder)
+        with (
+            tempfile.TemporaryDirectory(prefix="tutorial-") as folder,
+            contextlib.chdir(folder),
+            pytest.MonkeyPatch.context() as patch,
+        ):
+            patch.syspath_prepend(folder)
             refresh(tutorial)
-            sys.path.remove(folder)

@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import DONE, FAILED, INTERRUPTED, add_types, complain
+from ..printing import complain, complain_traceback, tell
+from .options import DONE, FAILED, INTERRUPTED, add_types
 
 if TYPE_CHECKING:
     from ..study import Plan, StudyResults
@@ -139,17 +140,18 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     from epicycle.actors import counted
 
     from ..study import WorkerError, WriteError, open_study, run_study
+    from ..study.one_run import again
     from ..study.progress import progress
 
     try:
-        with progress(plan.study.name) as tell:
+        with progress(plan.study.name) as told:
             outcome = run_study(
                 plan,
                 folder,
                 jobs=options.jobs,
                 timeout=options.run_timeout,
                 retry=options.retry,
-                tell=tell,
+                tell=told,
                 executor=options.executor,
                 scheduler=options.scheduler,
             )
@@ -159,14 +161,14 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     except (WorkerError, WriteError) as error:  # no fault of the study's
         complain(f"error: {error}")
         return FAILED
-    print(
+    tell(
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
         f"{outcome.there:,} there before" + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
     )
     results = open_study(folder)
-    for told in about_others(results):
-        complain(told)
-    print(f"wrote {outcome.table}")
+    for said in about_others(results):
+        complain(said)
+    tell(f"wrote {outcome.table}")
     if outcome.is_good:
         return DONE
     failures = results.failures()
@@ -174,5 +176,10 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
         complain(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
     if len(failures) > SHOWN:
         complain(f"... and {len(failures) - SHOWN:,} more: epicycle status {folder}")
+    if options.debug and failures:
+        *_, raised = again(plan, plan.condition(failures[0]["condition"]), failures[0]["seed"])
+        if raised is not None:
+            complain(f"the first of them, repeated: run {failures[0]['run'][:12]}")
+            complain_traceback(raised)
     complain(f"error: {counted(outcome.failed, 'run')} failed")
     return FAILED

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import DONE, add_model, complain, load
+from ..printing import complain, tell
+from .options import DONE, add_model, load
 
 DESCRIPTION = "Check a model, or a study with all that it varies, without running it."
 
@@ -20,7 +21,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Load the model, and say how large it is."""
     if is_study(options.model):
         return check_study(options)
-    model, _ = load(options, strict=options.strict)
+    model = load(options, strict=options.strict)
     if model.endless:
         told = f"warning: {model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
         if options.strict:
@@ -28,7 +29,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
             raise EpicycleError(told.removeprefix("warning: "))
         complain(told)
-    print(f"{options.model} is valid: {model.extent}")
+    tell(f"{options.model} is valid: {model.extent}")
     return DONE
 
 
@@ -55,7 +56,7 @@ def check_study(options: argparse.Namespace) -> int:
     types = [Path(file) for file in options.types]
     plan = Plan.made(read_study(options.model, set=options.set, types=types))
     check_figures(plan)
-    print(
+    tell(
         f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
         f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
     )

@@ -5,13 +5,14 @@ from .encoding import canonical, cell, leaves, plain
 from .log import EventLog, LogError, Record
 from .log_file import LogFile, check_log_path, write_log
 from .log_filter import LogFilter
-from .pace import Pace
+from .pace import SLOWEST, Pace
 from .results import Results
 from .signal import Signal, SignalError
 from .simulation import Simulation
 from .trace import Arrival, Firing, Tracer
 
 __all__ = [
+    "SLOWEST",
     "ActorError",
     "Arrival",
     "Director",

@@ -18,9 +18,12 @@ from .waiting import LARGE, WaitingTokens
 if TYPE_CHECKING:
     import pandas
 
+    from .director import Crowd
+
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
 _TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
-_PIECES = 3_000  # that are hashed together
+_PIECES = 3_000  # that are hashed together, when a tag is over
+_MOST_PIECES = 30_000
 
 Write = Callable[["Tag", Any], None]
 
@@ -90,6 +93,7 @@ class EventLog:
         self._hashed = 0  # records
         self._tag: Tag | None = None  # of the last record
         self._stamp = b""  # the same in bytes
+        self.crowd: Crowd | None = None  # is told of many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
@@ -112,7 +116,11 @@ class EventLog:
             if tag is not self._tag:
                 self._turn_to(tag)
             pieces.extend((self._stamp, head, kept))
-            if type(kept) is bytes and len(kept) > LARGE:
+            if len(pieces) > _MOST_PIECES:  # all of them at one tag, nearly
+                if self.crowd is not None:
+                    self.crowd.add(tag, f"{actor}.{port}", _MOST_PIECES // 3)
+                self._hash_pieces()
+            elif type(kept) is bytes and len(kept) > LARGE:
                 self._hash_pieces()
 
         if self._keeps is None or not self._keeps(event, actor, port, aspect):

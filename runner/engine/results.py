@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -12,8 +11,10 @@ from epicycle.actors import counted, to_seconds
 
 from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
+from .batches import Interval
 from .encoding import cell, leaves
 from .log import EventLog
+from .measurement import Outcome
 from .signal import Signal, SignalError
 
 if TYPE_CHECKING:
@@ -23,50 +24,10 @@ if TYPE_CHECKING:
 COLUMNS = ("time", "time_ns", "microstep", "signal", "field", "type", "value", "text")  # of recorded signals
 
 
-class Reduction:
-    """A number that is kept up to date over tokens: last, first, min, max, sum, mean or count."""
-
-    def __init__(self, take: str) -> None:
-        self.take = take
-        self.count = 0
-        self._value: Any = None
-        self._total: Any = 0
-
-    def add(self, token: Any) -> None:
-        """Take in a token."""
-        self.count += 1
-        if self.take in ("sum", "mean"):
-            self._total += token
-        elif self._value is None or self.take == "last":
-            self._value = token
-        elif self.take == "min":
-            self._value = _nan_or(min, self._value, token)
-        elif self.take == "max":
-            self._value = _nan_or(max, self._value, token)
-
-    @property
-    def value(self) -> Any:
-        """The number; None where no token came and there is nothing to say."""
-        if self.take == "count":
-            return self.count
-        if self.take == "sum":
-            return self._total
-        if self.count == 0:
-            return None
-        if self.take == "mean":
-            return self._total / self.count
-        return self._value
-
-
-def _nan_or(choose: Callable[..., Any], first: Any, second: Any) -> Any:
-    """The lesser or greater of two numbers; if one of them is NaN there is no such thing, whatever the order."""
-    return math.nan if math.isnan(first) or math.isnan(second) else choose(first, second)
-
-
 @dataclass(repr=False)
 class Results:
     """The outcome of one run: ``metrics``, recorded ``signals``, counts and figures of ``aspects``, the ``log``
-    and its ``digest``.
+    and its ``digest``.  ``outcomes`` say more of each metric: its interval, or why it has no value.
 
     >>> results = Simulation(model, seed=7).run()
     >>> results.metrics["mean_wait"], results["server.output"].values
@@ -84,6 +45,12 @@ class Results:
     firings: int
     wall_time: float  # s
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
+    outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
+
+    @property
+    def intervals(self) -> dict[str, Interval]:
+        """The confidence intervals of the metrics that have one."""
+        return {name: each.interval for name, each in self.outcomes.items() if each.interval is not None}
 
     @property
     def events(self) -> int:
@@ -167,10 +134,10 @@ class Results:
         ]
         return [
             Table(
-                ("metric", "value", "unit"),
+                ("metric", "value", "unit", ""),
                 [
-                    (name, "-" if value is None else short(value), self.units.get(name, ""))
-                    for name, value in self.metrics.items()
+                    (name, found.shown(short), self.units.get(name, ""), "; ".join(found.remarks))
+                    for name, found in self.outcomes.items()
                 ],
             ),
             Table(("aspect", "figure", "value"), figures),

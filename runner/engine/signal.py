@@ -120,11 +120,13 @@ class Signal:
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each token, indexed by time in s: ``microstep``, and a column for each number or text in a token.
 
-        The column of a plain number is ``value``; others are called by their place, such as ``position[0]``.
+        The column of a plain number is ``value``; others are called by their place, such as ``position[0]``.  A field
+        ``time`` or ``microstep`` of the token itself is ``token.time`` or ``token.microstep``.
         """
         frames = pandas_module()
         index = frames.Index(self.times, name="time")
-        rows = [{place or "value": leaf for place, leaf in leaves(token)} for token in self.tokens]
+        named = {"": "value", "time": "token.time", "microstep": "token.microstep"}
+        rows = [{named.get(place, place): leaf for place, leaf in leaves(token)} for token in self.tokens]
         columns = dict.fromkeys(place for row in rows for place in row)
         frame: pandas.DataFrame = frames.DataFrame(rows, index=index, columns=list(columns))
         frame.insert(0, "microstep", self.microsteps)

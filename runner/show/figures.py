@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epicycle.actors import Configurable, Parameter, array_parameter, texts_parameter
+from epicycle.aspects import STAMP
 
 from ..engine import Results, Signal, cell, leaves
 from ..model.patterns import select
@@ -268,12 +269,17 @@ def _selected(patterns: tuple[str, ...], results: Results) -> list[str]:
 
 
 def _places(patterns: tuple[str, ...], results: Results, read: Callable[[Any], Any]) -> Columns:
-    """Times, and what is read of each leaf, by signal and place in the tokens; places with nothing are left out."""
+    """Times, and what is read of each leaf, by signal and place in the tokens.
+
+    Places with nothing are left out, and those that say of when a token is.
+    """
     found: Columns = {}
     for name in _selected(patterns, results):
         signal = results.signals[name]
         for tag, token in zip(signal.tags, signal.tokens, strict=True):
             for place, leaf in leaves(token):
+                if place.rpartition(".")[2] == STAMP:
+                    continue
                 times, values = found.setdefault(f"{name}.{place}" if place else name, ([], []))
                 times.append(tag.seconds)
                 values.append(read(leaf))

@@ -15,6 +15,7 @@ from epicycle.actors import EpicycleError, read_regular
 from ..columns import categories, numbers, texts
 from ..engine import Results
 from ..provenance import versions
+from .drawing import FigureError, draw
 from .figures import Figure
 from .summary import summary_object
 
@@ -39,21 +40,13 @@ def check_folder(folder: Path, model: str, command: list[str]) -> str:
     return "" if before == command else f"replacing the results of '{shown}' in {folder}"
 
 
-def write_folder(
-    folder: Path, results: Results, figures: dict[str, Figure], command: Iterable[str], error: str = ""
-) -> list[Path]:
-    """Write ``manifest.json``, ``signals.parquet`` and a PNG for each figure; the files that were written.
+def write_folder(folder: Path, results: Results, command: Iterable[str], error: str = "") -> list[Path]:
+    """Write ``manifest.json`` and ``signals.parquet``; the files that were written.
 
     Each file is written aside and then moved into place, so a folder never holds half a file.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in figures.items():
-        written.append(folder / f"{name}.png")
-        aside = folder / f".{name}.png"
-        figure.draw(results, aside)
-        os.replace(aside, written[-1])
-    written.append(folder / "signals.parquet")
+    written = [folder / "signals.parquet"]
     write_signals(results, written[-1])
     written.append(folder / "manifest.json")
     manifest = {**summary_object(results), "command": list(command), "versions": versions()}
@@ -63,6 +56,22 @@ def write_folder(
     aside.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
     os.replace(aside, written[-1])
     return written
+
+
+def draw_figures(folder: Path, results: Results, figures: dict[str, Figure]) -> tuple[list[Path], list[FigureError]]:
+    """Draw a PNG for each figure, when all else is safe; the files that were written, and what could not be drawn."""
+    written, failed = [], []
+    for name, figure in figures.items():
+        aside = folder / f".{name}.png"
+        try:
+            draw(name, figure, results, aside)
+        except FigureError as error:
+            failed.append(error)
+            aside.unlink(missing_ok=True)
+        else:
+            written.append(folder / f"{name}.png")
+            os.replace(aside, written[-1])
+    return written, failed
 
 
 def write_signals(results: Results, path: Path) -> None:

@@ -84,7 +84,7 @@ def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:
     }
 
 
-def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, Simulation, Exception | None]:
+def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, Simulation, EpicycleError | None]:
     """A run once more, alone, with all that the model records and the whole event log; and what it raised."""
     model = plan.load(condition)
     simulation = Simulation(model, seed=seed, keep_log=LogFilter({}))

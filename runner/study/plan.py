@@ -145,7 +145,8 @@ class Plan:
             None if (lender := manifest.get("lender")) is None else (lender[0], lender[1]),
         )
         try:
-            metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
+            said = {(metric.name, metric.source): metric for metric in study.metrics or ()}
+            metrics = [said.get(each) or StudyMetric(*each) for each in manifest["metrics"].items()]
             extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
         except (ValueError, ExpressionError) as error:
             raise PlanError(f"the manifest of {study.name} is damaged: {error}") from error
@@ -216,7 +217,10 @@ class Plan:
             "sources": sorted(sources.items()),
             "set": [[setting.path, plain(setting.node)] for setting in settings],
             "disturb": [Path(name).name for name in disturb],
-            "metrics": [[metric.name, metric.source] for metric in self.metrics],
+            "metrics": [
+                [metric.name, metric.source, *([metric.unit, metric.to] if metric.to else [])]
+                for metric in self.metrics
+            ],
         }
         values = {name: value for level in levels for name, value in level.values.items()}
         return Condition(index, settings, disturb, values, _hash(identity))

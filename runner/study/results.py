@@ -96,7 +96,18 @@ class StudyResults:
             )
             table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
         self._left_out = runs - table.num_rows
-        return table.drop_columns(["_rank"]).combine_chunks().replace_schema_metadata(None)
+        return self._described(table.drop_columns(["_rank"]).combine_chunks())
+
+    def _described(self, table: pa.Table) -> pa.Table:
+        """The table with the unit and the doc of each column as metadata of its field."""
+        import pyarrow as pa
+
+        about = self.plan.columns
+        fields = []
+        for each in table.schema:
+            said = {} if (column := about.get(each.name)) is None else {"unit": column.unit, "doc": column.doc}
+            fields.append(each.with_metadata({key: text for key, text in said.items() if text}))
+        return table.cast(pa.schema(fields))
 
     def _replicated(self, table: pa.Table) -> pa.Table:
         """The rows whose seeds are the plan's, by the replications that these seeds have there."""
@@ -270,7 +281,7 @@ class StudyResults:
             file = pq.ParquetFile(pa.BufferReader(data))
             is_of_another = file.metadata.created_by != pq.read_metadata(buffer).created_by
             return is_of_another and bool(file.read().equals(self.table()))
-        except (OSError, pa.ArrowException):
+        except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it that is no UTF-8
             return False
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from harness import Harness
 
 from epicycle.actors import (
     Barrier,
@@ -18,6 +17,7 @@ from epicycle.actors import (
     UnscentedEstimator,
     Vehicle,
 )
+from tests.actors.harness import Harness
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
@@ -15,9 +13,7 @@ from epicycle.actors import random_stream
 from epicycle.aspects import Aspect, CommunicationAspect, JoinPoint
 from epicycle.runner.engine import ActorError, Results, Simulation
 from epicycle.runner.model import load_model
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import load, seen, sends, simulate
+from tests.engine.engine_parts import load, seen, sends, simulate
 
 PAIR = """
 actors: {{t: {{type: Ticker, period: 1 ms}}, a: {{type: Scale}}, b: {{type: Scale}}}}

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters
+from epicycle.actors import BodyState, EpicycleError, ParameterError, Plan
 from epicycle.aspects import (
     Aspect,
     Bias,
@@ -25,7 +20,6 @@ from epicycle.aspects import (
     Duplicate,
     FieldError,
     GilbertElliott,
-    JoinPoint,
     Latency,
     MeasurementFailure,
     Noise,
@@ -34,13 +28,11 @@ from epicycle.aspects import (
     Quantise,
     Reorder,
     Saturate,
-    SelectionParameter,
     StuckAt,
     Throttle,
 )
-
-sys.path.insert(0, str(Path(__file__).parent))
-from strengths import AT_WORK, AT_ZERO, at_ports, concrete_aspects
+from tests.aspects.bench import Bench
+from tests.aspects.strengths import AT_WORK, AT_ZERO, at_ports, concrete_aspects
 
 MILLISECOND = 1_000_000
 SURE = 0.999
@@ -53,75 +45,6 @@ class Reading:
     name: str
     value: Any
     valid: bool = True
-
-
-class Bench:
-    """Sends tokens through one join point and keeps what comes out: (time in ms, token).
-
-    ``world`` is what ports have sent last; patterns in parameters of the aspect select what they spell.
-    """
-
-    def __init__(self, aspect: Aspect, seed: int = 1, world: dict[str, Any] | None = None) -> None:
-        self.world = world
-        self.seed = seed
-        self.tag = Tag(0, 1)
-        self.out: list[tuple[float, Any]] = []
-        self.acts: list[tuple[str, Any]] = []
-        self._later: list[tuple[int, int, int, Callable[[Any], None], Any]] = []
-        self._count = itertools.count()
-        self.point = JoinPoint(
-            "it",
-            "a.port",
-            self,
-            lambda token: self.out.append((self.tag.time / MILLISECOND, token)),
-            source="b.port",
-            selections={
-                name: {each: [each] for each in parameter.patterns(getattr(aspect, name))}
-                for name, parameter in declared_parameters(type(aspect)).items()
-                if isinstance(parameter, SelectionParameter)
-            },
-        )
-        self.aspect = aspect
-
-    def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
-        at = (self.tag.time + delay, 1) if delay else (self.tag.time, self.tag.microstep + 1)
-        heapq.heappush(self._later, (*at, next(self._count), deliver, token))
-
-    def latest(self, port: str) -> Any:
-        assert self.world is not None, "nothing is read"
-        return self.world.get(port)
-
-    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
-        return partial(deliver, token)
-
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
-        self.acts.append((event, token))
-
-    def record(self, signal: str, token: Any) -> None:
-        raise AssertionError("nothing is recorded")
-
-    def stop(self, reason: str) -> None:
-        raise AssertionError("nothing ends the run")
-
-    def _until(self, time: float) -> None:
-        while self._later and self._later[0][0] <= time:
-            at, microstep, _, deliver, token = heapq.heappop(self._later)
-            self.tag = Tag(at, microstep)
-            deliver(token)
-
-    def play(self, tokens: Any, period: float = 1.0) -> Bench:
-        """One token a period (ms), then all that is still on its way."""
-        for index, token in enumerate(tokens):
-            at = round(index * period * MILLISECOND)
-            self._until(at)
-            self.tag = Tag(at, 1)
-            self.aspect.pass_token(token, self.point)
-        self._until(math.inf)
-        return self
-
-    @property
-    def tokens(self) -> list[Any]:
-        return [token for _, token in self.out]
 
 
 def runs(lost: np.ndarray) -> np.ndarray:
@@ -203,34 +126,32 @@ def test_first_tag_spared() -> None:
 def test_latency_follows_its_law(distribution: str, law: Any) -> None:
     aspect = Latency(delay="5 ms", jitter="2 ms", distribution=distribution, reordering=True)
     bench = Bench(aspect).play(range(5000), period=0.5)
-    delays = np.array([time - 0.5 * token for time, token in bench.out])
+    delays = np.array([time - 0.5 * token for time, token in bench.passed])
     if distribution == "normal":
         assert (delays >= 0).all()  # cut off there
         delays = delays[delays > 1e-3]
     assert stats.kstest(delays, law.cdf).pvalue > 1 - SURE
     assert bench.tokens != sorted(bench.tokens)
-    assert len(bench.acts) == sum(time != 0.5 * token for time, token in bench.out)
-    assert {act for act, _ in bench.acts} == {"delayed"}
-    token, delay = bench.acts[7][1]
-    assert (token, delay) == (
-        7,
-        pytest.approx(next(time for time, out in bench.out if out == 7) * 1e-3 - 3.5e-3, abs=1e-9),
-    )
+    assert len(bench.told) == sum(time != 0.5 * token for time, token in bench.passed)
+    assert {act for act, _ in bench.told} == {"delayed"}
+    arrivals = {token: time for time, token in bench.passed}
+    for _, (token, delay) in bench.told[:50]:
+        assert delay == pytest.approx((arrivals[token] - 0.5 * token) * 1e-3, abs=1e-9)
 
 
 def test_latency_in_order() -> None:
     bench = Bench(Latency(delay="5 ms", jitter="20 ms", distribution="exponential")).play(range(500))
     assert bench.tokens == list(range(500))
     free = Bench(Latency(delay="5 ms", jitter="20 ms", distribution="exponential", reordering=True)).play(range(500))
-    own = {token: time for time, token in free.out}
+    own = {token: time for time, token in free.passed}
     latest = 0.0
-    for time, token in bench.out:  # each at its own time, or together with the one before it
+    for time, token in bench.passed:  # each at its own time, or together with the one before it
         latest = max(latest, own[token])
         assert time == pytest.approx(latest, abs=1e-5)
 
 
 def test_constant_latency() -> None:
-    assert Bench(Latency(delay="5 ms")).play("ab").out == [(5.0, "a"), (6.0, "b")]
+    assert Bench(Latency(delay="5 ms")).play("ab").passed == [(5.0, "a"), (6.0, "b")]
 
 
 def test_duplicates() -> None:
@@ -240,14 +161,14 @@ def test_duplicates() -> None:
     low, high = stats.binom.interval(SURE, len(counts), 0.3)
     assert low <= (counts == 3).sum() <= high
     twice = int(np.argmax(counts == 3))
-    assert [time - twice for time, token in bench.out if token == twice] == pytest.approx([0, 0.25, 0.5])
-    assert bench.acts[0] == ("duplicated", [twice, 2])
+    assert [time - twice for time, token in bench.passed if token == twice] == pytest.approx([0, 0.25, 0.5])
+    assert bench.told[0] == ("duplicated", [twice, 2])
 
 
 def test_reordering() -> None:
     always = Bench(Reorder(probability=0.25, overtaken_by=2)).play(range(2000))
     places = {token: place for place, token in enumerate(always.tokens)}
-    held = [token for event, token in always.acts if event == "held"]
+    held = [token for event, token in always.told if event == "held"]
     low, high = stats.binom.interval(SURE, 2000, 0.25)
     assert low <= len(held) <= high
     for token in held:
@@ -262,13 +183,13 @@ def test_reordering() -> None:
 def test_throttle(excess: str) -> None:
     aspect = Throttle(rate=100, burst=5, excess=excess)
     bench = Bench(aspect).play(range(1000))  # 1,000 messages a second for a second
-    times = np.array([time for time, _ in bench.out])
+    times = np.array([time for time, _ in bench.passed])
     assert (times[:5] == np.arange(5)).all()
     for width in (100.0, 500.0):  # never more than burst + rate * time in any window
         inside = [np.count_nonzero((times >= start) & (times < start + width)) for start in times]
         assert max(inside) <= 5 + 0.1 * width
     if excess == "drop":
-        assert len(bench.out) == 5 + 99
+        assert len(bench.passed) == 5 + 99
         assert bench.tokens == sorted(bench.tokens)
     else:
         assert bench.tokens == list(range(1000))
@@ -277,8 +198,8 @@ def test_throttle(excess: str) -> None:
 
 def test_throttle_lets_what_is_on_time_pass() -> None:
     for excess in ("drop", "delay"):
-        assert len(Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).out) == 200
-        assert Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).acts == []
+        assert len(Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).passed) == 200
+        assert Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).told == []
 
 
 # -- errors -----------------------------------------------------------------------------------------------------------
@@ -338,6 +259,24 @@ def test_stuck() -> None:
     assert Bench(StuckAt(p=1)).play(range(4)).tokens == [0, 0, 0, 0]
 
 
+def test_when_a_token_is_of_is_no_number_to_be_altered() -> None:
+    """But for whoever names it.  A stuck sensor repeats what it saw, and does not know that this is old."""
+    plan = Plan("b", 1.5, BodyState([1.0, 2.0], [0.0, 0.0], 1.5), np.zeros((2, 2)))
+    biased, named = (Bench(Bias(by=1, fields=names)).play([plan]).tokens[0] for names in ((), ("time",)))
+    assert (biased.time, biased.state.time, biased.state.position.tolist()) == (1.5, 1.5, [2.0, 3.0])
+    assert (named.time, named.state.time, named.state.position.tolist()) == (2.5, 1.5, [1.0, 2.0])
+    assert Bench(Bias(by=1)).play([{"time": 1.0, "speed": 2.0}]).tokens == [{"time": 1.0, "speed": 3.0}]
+    states = [BodyState([float(n), 0.0], [0.0, 0.0], float(n)) for n in range(3)]
+    stuck = Bench(StuckAt(p=1)).play(states).tokens
+    assert [(each.position[0], each.time) for each in stuck] == [(0.0, 0.0), (0.0, 1.0), (0.0, 2.0)]
+    stamped = [{"time": 0.0, "x": 1.0}, {"time": 1.0, "x": 2.0}, {"x": 3.0}]
+    assert Bench(StuckAt(p=1)).play(stamped).tokens == [
+        {"time": 0.0, "x": 1.0},
+        {"time": 1.0, "x": 1.0},
+        {"time": 0.0, "x": 1.0},
+    ]
+
+
 @pytest.mark.parametrize("kind", ["gaussian", "bit_flip"])
 def test_corruption(kind: str) -> None:
     sent = [Reading(str(i), np.array([float(i), 2.0])) for i in range(4000)]
@@ -366,9 +305,9 @@ def test_strength_zero_hands_on_the_very_tokens_and_leaves_no_trace(aspect: Aspe
     bench = Bench(aspect, world={"a.at": [0.0, 0.0], "b.at": {"position": [3.0, 4.0]}}).play(sent, period=10)
     assert len(bench.tokens) == len(sent)
     assert all(out is token for out, token in zip(bench.tokens, sent, strict=True))
-    assert [time for time, _ in bench.out] == [10.0 * index for index in range(len(sent))]
-    assert bench.acts == []
-    assert bench.point.counts == {}
+    assert [time for time, _ in bench.passed] == [10.0 * index for index in range(len(sent))]
+    assert bench.told == []
+    assert bench.points["a.port"].counts == {}
 
 
 def test_every_aspect_has_strengths() -> None:
@@ -380,12 +319,12 @@ def test_whatever_is_done_to_a_token_is_told(aspect: Aspect) -> None:
     """A token without an act has passed as it came, when it came."""
     sent = [Reading(str(index), 10.0 + index) for index in range(200)]
     bench = Bench(aspect, world={"a.at": [0.0], "b.at": [4.0], "c.at": [2.0]}).play(sent)
-    told = {id(value[0] if isinstance(value, list) else value) for _, value in bench.acts}
-    passed = [(id(token), time) for time, token in bench.out]
+    told = {id(value[0] if isinstance(value, list) else value) for _, value in bench.told}
+    passed = [(id(token), time) for time, token in bench.passed]
     untouched = [(id(token), float(index)) for index, token in enumerate(sent) if id(token) not in told]
     assert [each for each in passed if each[0] not in told and each in untouched] == untouched
     assert told
-    assert {event for event, _ in bench.acts} <= set(aspect.events)
+    assert {event for event, _ in bench.told} <= set(aspect.events)
 
 
 def test_tokens_of_every_kind_keep_their_type() -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Generator
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,9 +15,7 @@ from epicycle.aspects import ClockAspect, ClockDrift, ClockOffset
 from epicycle.runner import ModelError, Simulation, load_model
 from epicycle.runner.engine import Results
 from epicycle.runner.model import packaged_models
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import Script, load, sends, simulate
+from tests.engine.engine_parts import Script, load, sends, simulate
 
 
 class Teller(Actor):

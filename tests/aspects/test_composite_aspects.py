@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,8 @@ from epicycle.runner import ActorError, ModelError, Simulation, load_composite, 
 from epicycle.runner.engine import Results
 from epicycle.runner.model import Model
 from epicycle.runner.show import aspects_at
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-import engine_parts
-from engine_parts import Join, Scale, Ticker
+from tests.engine import engine_parts
+from tests.engine.engine_parts import Join, Scale, Ticker
 
 
 class Negate(Actor):
@@ -430,7 +427,8 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
         (
             "net: {type: Desks, at: a.input}",
             """m.yaml:33:23: error: aspect net: there is no aspect type 'Desks', did you mean 'Desk'?
-   help: valid types: those that 'epicycle aspects' lists""",
+   help: valid types: those that 'epicycle aspects' lists
+   help: one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]""",
         ),
         (
             "net: {type: Crossing, at: a.input}",
@@ -461,7 +459,18 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
             "net: {type: Desk, at: {at: a.input, time: -1}}",
             """m.yaml:33:38: error: aspect net: Desk stands at actors, but a.input is a port
    help: write 'a', without the port
-m.yaml:33:53: error: aspect net: time: -1 is out of bounds, expected a number in s >= 0""",
+m.yaml:33:53: error: aspect net: time: -1 is out of bounds, expected a time in s >= 0, a distribution, \
+or these by input port""",
+        ),
+        (
+            "net: {type: Desk, at: {at: a, time: {inptu: 1, input: 1 m}}}",
+            "m.yaml:33:65: error: aspect net: time: input: '1 m' is a length, expected a time in s",
+        ),
+        (
+            "net: {type: Desk, at: {at: a, time: {inptu: 1}}}",
+            """m.yaml:33:48: error: aspect net: time: no actor that this is for has an input 'inptu', did you mean \
+'input'?
+   help: their inputs: input""",
         ),
         (
             "net: {type: PacketLoss, probability: 0, at: {at: a.input, time: 1}}",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,7 @@ from scipy import stats
 from epicycle.actors import Actor, InputPort, OutputPort, PortParameter
 from epicycle.runner import ActorError, Simulation
 from epicycle.runner.engine import Results, Tracer
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import Plan, Script, load, sends, simulate
+from tests.engine.engine_parts import Plan, Script, load, sends, simulate
 
 
 class Adder(Actor):

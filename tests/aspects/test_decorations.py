@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,7 @@ from epicycle.aspects import Bias, Drift, ExecutionTime, Latency, MeasurementFai
 from epicycle.runner import Model, ModelError, Simulation
 from epicycle.runner.cli import main
 from epicycle.runner.engine import Results
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import Scale, Ticker, load
+from tests.engine.engine_parts import Scale, Ticker, load
 
 
 @Noise(deviation=0.5).at("output")

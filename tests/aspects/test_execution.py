@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import sys
 from collections.abc import Generator
 from itertools import pairwise
 from pathlib import Path
@@ -18,11 +17,8 @@ from epicycle.aspects.execution import ActorPoint
 from epicycle.runner import ActorError, Model, ModelError, Simulation, load_model
 from epicycle.runner.engine import Results, Tracer
 from epicycle.runner.show.graph.outline import outline
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import TYPES, Plan, Scale, Script, load, seen, sends, simulate
-from strengths import AT_ZERO
+from tests.aspects.strengths import AT_ZERO
+from tests.engine.engine_parts import TYPES, Plan, Scale, Script, load, seen, sends, simulate
 
 CHAIN = """
 actors:
@@ -344,7 +340,7 @@ def test_measured_once_and_replayed(tmp_path: Path) -> None:
 
     from epicycle.runner.show import write_folder
 
-    write_folder(tmp_path, results, {}, [])
+    write_folder(tmp_path, results, [])
     model = text.format("type: ExecutionTime, times: signals.parquet, at: a")
     (tmp_path / "m.yaml").write_text(f"model: m\n{model}", encoding="utf-8")
     runs = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,9 +12,7 @@ from epicycle.runner import ActorError, Results, Simulation
 from epicycle.runner.engine import Firing, Tracer
 from epicycle.runner.model import load_model
 from epicycle.runner.show.summary import summary_object
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import TYPES, load, seen, simulate
+from tests.engine.engine_parts import TYPES, load, seen, simulate
 
 
 class Relay(Medium):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import heapq
 import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,74 +14,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from epicycle.actors import EpicycleError, Tag
-from epicycle.aspects import Bus, FieldError, JoinPoint, Medium, RadioMedium
+from epicycle.actors import EpicycleError
+from epicycle.aspects import Bus, FieldError, Medium, RadioMedium
+from tests.aspects.bench import SECOND, Bench
 
-SECOND = 1_000_000_000
 SURE = 0.999
-
-
-class Bench:
-    """Many ports before one medium: ``out`` and ``acts`` hold (time in s, port, token or act)."""
-
-    seed = 1
-
-    def __init__(self, **ports: Medium) -> None:
-        self.tag = Tag(0, 1)
-        self.ports = ports
-        self.out: list[tuple[float, str, Any]] = []
-        self.acts: list[tuple[float, str, str, Any]] = []
-        self._agenda: list[tuple[int, int, int, Callable[[Any], None], Any]] = []
-        self._count = itertools.count()
-        self._shared: dict[Any, Any] = {}
-        self._points: dict[str, JoinPoint] = {}
-
-    def play(self, tokens: Iterable[tuple[float, str, Any]]) -> Bench:
-        """Tokens that come at a time (s) to a port; a name with a dot ends with that of the medium."""
-        for time, port, token in tokens:
-            self._enter(round(time * SECOND), 1, self._pass, (port, token))
-        while self._agenda:
-            time, microstep, _, call, what = heapq.heappop(self._agenda)
-            self.tag = Tag(time, microstep)
-            call(what)
-        return self
-
-    def report(self) -> dict[str, float]:
-        reports = [medium.report(self._shared, self.tag.time) for medium in self.ports.values()]
-        assert all(report == reports[0] for report in reports)
-        return {name: math.nan if value is None else value for name, value in reports[0].items()}
-
-    def _enter(self, time: int, microstep: int, call: Callable[[Any], None], what: Any) -> None:
-        heapq.heappush(self._agenda, (time, microstep, next(self._count), call, what))
-
-    def _pass(self, what: tuple[str, Any]) -> None:
-        port, token = what
-        point = self._points.get(port)
-        if point is None:
-            point = self._points[port] = JoinPoint("it", port, self, self._put(port), self._shared)
-        self.ports[port.rpartition(".")[2]].pass_token(token, point)
-
-    def _put(self, port: str) -> Callable[[Any], None]:
-        return lambda token: self.out.append((self.tag.time / SECOND, port, token))
-
-    def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
-        now = self.tag
-        self._enter(now.time + delay, 1 if delay else now.microstep + 1, deliver, token)
-
-    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
-        return partial(deliver, token)
-
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
-        self.acts.append((self.tag.time / SECOND, port, event, token))
-
-    def latest(self, port: str) -> Any:
-        raise AssertionError("nothing is read")
-
-    def record(self, signal: str, token: Any) -> None:
-        raise AssertionError("nothing is recorded")
-
-    def stop(self, reason: str) -> None:
-        raise AssertionError("nothing is stopped")
 
 
 def poisson(rate: float, count: int, seed: int) -> NDArray[np.float64]:
@@ -99,10 +34,6 @@ def is_mean(values: NDArray[np.float64], mean: float, batches: int = 40) -> bool
     return bool(abs(means.mean() - mean) <= spread)
 
 
-def of(bench: Bench, event: str) -> list[Any]:
-    return [value for _, _, happened, value in bench.acts if happened == event]
-
-
 # -- the bus -----------------------------------------------------------------------------------------------------------
 
 
@@ -112,7 +43,7 @@ def test_bus_is_an_m_d_1_queue(load: float) -> None:
     times = poisson(load / service, count, seed=3)
     ports = np.random.default_rng(4).choice(["a", "b", "c"], count)
     bus = Bus(factor="0.5 ms", message_length=2)
-    bench = Bench(a=bus, b=bus, c=bus).play(zip(times, ports, range(count), strict=True))
+    bench = Bench(a=bus, b=bus, c=bus).play_at(zip(times, ports, range(count), strict=True))
     assert [(port, token) for _, port, token in bench.out] == list(zip(ports, range(count), strict=True))
     ends = np.array([time for time, _, _ in bench.out])
     free, expected = 0.0, []
@@ -127,14 +58,14 @@ def test_bus_is_an_m_d_1_queue(load: float) -> None:
     assert report["mean_queue"] == pytest.approx(waits.sum() / ends[-1])  # Little
     low, high = stats.poisson.interval(SURE, load / service * ends[-1])
     assert low * service <= report["utilisation"] * ends[-1] <= high * service
-    assert len(of(bench, "delayed")) == count
+    assert len(bench.of("delayed")) == count
 
 
 def test_priorities_follow_cobham() -> None:
     count, service, loads = 60_000, 1e-3, (0.3, 0.5)
     times = poisson(sum(loads) / service, count, seed=5)
     urgent = np.random.default_rng(6).random(count) < loads[0] / sum(loads)
-    bench = Bench(low=Bus(factor=service, priority=2), high=Bus(factor=service, priority=1)).play(
+    bench = Bench(low=Bus(factor=service, priority=2), high=Bus(factor=service, priority=1)).play_at(
         (time, "high" if first else "low", index) for index, (time, first) in enumerate(zip(times, urgent, strict=True))
     )
     waits = np.empty(count)
@@ -149,10 +80,10 @@ def test_priorities_follow_cobham() -> None:
 
 def test_bus_without_a_place_to_wait_loses_as_erlang_says() -> None:
     service, count, load = 1e-3, 40_000, 0.8
-    bench = Bench(a=Bus(factor=service, capacity=0)).play(
+    bench = Bench(a=Bus(factor=service, capacity=0)).play_at(
         zip(poisson(load / service, count, seed=7), itertools.repeat("a"), range(count))
     )
-    dropped = len(of(bench, "dropped"))
+    dropped = len(bench.of("dropped"))
     # Those that come while one is carried: Poisson with mean load for each that is.
     low, high = stats.poisson.interval(SURE, (count - dropped) * load)
     assert low <= dropped <= high
@@ -172,9 +103,9 @@ def test_bus_without_a_place_to_wait_loses_as_erlang_says() -> None:
 def test_overflow(overflow: str, priorities: str, arriving: str, dropped: str) -> None:
     tokens = [{"name": name, "urgency": int(number)} for name, number in zip("abcdef", priorities, strict=True)]
     bus = Bus(factor=1, capacity=2, overflow=overflow, priority_field="urgency")
-    bench = Bench(a=bus).play((0.1 * index, "a", token) for index, token in enumerate(tokens))
+    bench = Bench(a=bus).play_at((0.1 * index, "a", token) for index, token in enumerate(tokens))
     assert "".join(token["name"] for _, _, token in bench.out) == arriving
-    assert "".join(token["name"] for token in of(bench, "dropped")) == dropped
+    assert "".join(token["name"] for token in bench.of("dropped")) == dropped
 
 
 def test_length_of_a_message() -> None:
@@ -185,7 +116,7 @@ def test_length_of_a_message() -> None:
         bits: Any = 40
 
     def took(token: Any, **parameters: Any) -> float:
-        return Bench(a=Bus(factor="1 ms", **parameters)).play([(0.0, "a", token)]).out[0][0]
+        return Bench(a=Bus(factor="1 ms", **parameters)).play_at([(0.0, "a", token)]).out[0][0]
 
     image = Image("x", np.zeros((2, 3)))
     assert took(image) == 0.001
@@ -215,7 +146,7 @@ def test_length_of_a_message() -> None:
 
 def test_a_message_that_comes_as_another_is_through_finds_the_bus_free() -> None:
     # The second one's arrival is handled before the end of the first one, at the same instant.
-    bench = Bench(a=Bus(factor=1, capacity=0)).play([(0.0, "a", 1), (1.0, "a", 2), (1.5, "a", 3), (2.0, "a", 4)])
+    bench = Bench(a=Bus(factor=1, capacity=0)).play_at([(0.0, "a", 1), (1.0, "a", 2), (1.5, "a", 3), (2.0, "a", 4)])
     assert bench.out == [(1.0, "a", 1), (2.0, "a", 2), (3.0, "a", 4)]
 
 
@@ -232,7 +163,7 @@ def test_aloha(load: float) -> None:
     count = 10_000
     aloha = radio(carrier_sense=False, window=1, retries=0)
     # Each message from a station of its own: n stations in the limit.
-    bench = Bench(radio=aloha).play(
+    bench = Bench(radio=aloha).play_at(
         (time, f"s{index}.radio", index) for index, time in enumerate(poisson(load / 1e-3, count, seed=8))
     )
     through = np.zeros(count)
@@ -242,13 +173,13 @@ def test_aloha(load: float) -> None:
     assert report["collision_rate"] == pytest.approx(1 - through.mean())
     assert report["throughput"] == pytest.approx(load * math.exp(-2 * load), rel=0.1)
     assert report["mean_delay"] == pytest.approx(1e-3)
-    assert len(of(bench, "collided")) == len(of(bench, "dropped")) == count - through.sum()
+    assert len(bench.of("collided")) == len(bench.of("dropped")) == count - through.sum()
 
 
 @pytest.mark.parametrize(("robots", "window"), [(2, 4), (5, 16), (12, 32)])
 def test_broadcasts_at_once_are_heard_if_their_backoffs_differ(robots: int, window: int) -> None:
     ticks = 1600
-    bench = Bench(radio=radio(window=window, slot="20 us", retries=0)).play(
+    bench = Bench(radio=radio(window=window, slot="20 us", retries=0)).play_at(
         (0.1 * tick, f"r{robot}.radio", tick) for tick in range(ticks) for robot in range(robots)
     )
     heard = np.bincount([token for _, _, token in bench.out], minlength=ticks)
@@ -268,7 +199,7 @@ def test_broadcasts_at_once_are_heard_if_their_backoffs_differ(robots: int, wind
 
 
 def saturated(stations: int, each: int, **parameters: Any) -> Bench:
-    return Bench(radio=radio(**parameters)).play(
+    return Bench(radio=radio(**parameters)).play_at(
         (0.0, f"s{station}.radio", number) for number in range(each) for station in range(stations)
     )
 
@@ -329,7 +260,7 @@ def test_saturated_stations_follow_bianchi() -> None:
 def test_the_window_doubles() -> None:
     slot, tries = 50e-6, 6
     drawn: list[list[int]] = [[] for _ in range(tries)]
-    bench = Bench(radio=radio(loss=1, window=4, max_window=64, retries=tries - 1, slot=slot)).play(
+    bench = Bench(radio=radio(loss=1, window=4, max_window=64, retries=tries - 1, slot=slot)).play_at(
         (0.1 * index, "s.radio", index) for index in range(3000)
     )
     last = {}
@@ -341,7 +272,7 @@ def test_the_window_doubles() -> None:
             assert gap == pytest.approx(round(gap), abs=1e-3)
             drawn[number].append(round(gap))
     assert bench.out == []
-    assert len(of(bench, "dropped")) == 3000
+    assert len(bench.of("dropped")) == 3000
     for number, values in enumerate(drawn):
         size = min(4 * 2**number, 64)
         counts = np.bincount(values, minlength=size)
@@ -352,22 +283,24 @@ def test_the_window_doubles() -> None:
 def test_capture_and_loss() -> None:
     count = 4000
     both = [(0.1 * index, f"{name}.radio", index) for index in range(count) for name in "ab"]
-    bench = Bench(radio=radio(capture=0.6, window=1, retries=0)).play(both)
+    bench = Bench(radio=radio(capture=0.6, window=1, retries=0)).play_at(both)
     low, high = stats.binom.interval(SURE, count, 0.6)
     assert low <= len(bench.out) <= high
     low, high = stats.binom.interval(SURE, len(bench.out), 0.5)
     assert low <= sum(port == "a.radio" for _, port, _ in bench.out) <= high
     assert len({token for _, _, token in bench.out}) == len(bench.out)  # never both
-    bench = Bench(radio=radio(loss=0.3, retries=2)).play(both[::2])
+    bench = Bench(radio=radio(loss=0.3, retries=2)).play_at(both[::2])
     low, high = stats.binom.interval(SURE, count, 0.3**3)
-    assert low <= len(of(bench, "dropped")) <= high
-    low, high = stats.binom.interval(SURE, len(of(bench, "lost")) + len(bench.out), 0.3)
-    assert low <= len(of(bench, "lost")) <= high
+    assert low <= len(bench.of("dropped")) <= high
+    low, high = stats.binom.interval(SURE, len(bench.of("lost")) + len(bench.out), 0.3)
+    assert low <= len(bench.of("lost")) <= high
 
 
 def test_a_station_sends_one_message_at_a_time() -> None:
     def times(*tokens: tuple[float, str, int], **parameters: Any) -> tuple[dict[int, float], Bench]:
-        bench = Bench(plan=radio(window=1, **parameters), picture=radio(window=1, message_length="2 kbit")).play(tokens)
+        bench = Bench(plan=radio(window=1, **parameters), picture=radio(window=1, message_length="2 kbit")).play_at(
+            tokens
+        )
         return {token: round(1000 * time, 6) for time, _, token in bench.out}, bench
 
     found, bench = times((0.0, "a.plan", 1), (0.0, "a.picture", 2), (0.0005, "a.plan", 3))

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import copy
 import random  # noqa: TID251 (to be caught at it)
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,11 +36,8 @@ from epicycle.aspects.testing import (
 from epicycle.runner import Simulation, Trial, load_model
 from epicycle.runner.engine import Record
 from epicycle.runner.model import packaged_models
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import load
-from strengths import AT_WORK, AT_ZERO
+from tests.aspects.strengths import AT_WORK, AT_ZERO
+from tests.engine.engine_parts import load
 
 ENOUGH = 50  # events of a run
 SETTINGS = {"collision_avoidance": ["observers=1", "disturbance=0.5"]}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,9 +9,7 @@ import pytest
 from epicycle.actors.expression import ExpressionError, PortFormula
 from epicycle.runner import ActorError, ModelError, load_model
 from epicycle.runner.engine import Results
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import simulate
+from tests.engine.engine_parts import simulate
 
 PARTS = """
 actors:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +11,7 @@ from epicycle.actors import Actor, InputPort, OutputPort, Parameter, array_param
 from epicycle.aspects import Drift
 from epicycle.runner import ActorError, Model, ModelError, Simulation
 from epicycle.runner.engine import Results
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import Scale, Ticker, load
+from tests.engine.engine_parts import Scale, Ticker, load
 
 
 class Gauge(Actor):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,11 +13,8 @@ from scipy import stats
 from epicycle.aspects import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
 from epicycle.runner import ModelError
 from epicycle.runner.engine import Results
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import load, simulate
-from test_catalogue import Bench
+from tests.aspects.bench import Bench
+from tests.engine.engine_parts import load, simulate
 
 SURE = 0.999
 COUNT = 20_000
@@ -140,7 +135,7 @@ def test_occlusion(blocker: list[float], target: list[float], occluded: bool) ->
     aspect = Occlusion(positions=["a.at", "b.at", "t.at"], target="t.at", radius=1)
     bench = Bench(aspect, world={"a.at": [0.0] * len(target), "b.at": blocker, "t.at": target}).play(["seen"])
     assert bench.tokens == ([] if occluded else ["seen"])
-    assert bench.acts == ([("occluded", "seen")] if occluded else [])
+    assert bench.told == ([("occluded", "seen")] if occluded else [])
 
 
 def test_a_body_at_random_occludes_as_often_as_its_stadium_is_large() -> None:
@@ -174,7 +169,7 @@ def test_outage(groups: dict[str, Any], sender: str, passes: bool) -> None:
     token = Message(sender)
     bench = Bench(Outage(groups=groups, sender="token.robot")).play([token])
     assert bench.tokens == ([token] if passes else [])
-    assert bench.acts == ([] if passes else [("dropped", token)])
+    assert bench.told == ([] if passes else [("dropped", token)])
 
 
 # -- who is where -----------------------------------------------------------------------------------------------------
@@ -317,4 +312,5 @@ def test_mistakes(aspect: str, message: str) -> None:
 
 def test_a_pattern_may_select_what_there_is_none_of() -> None:
     text = MODEL.replace("count: 3", "count: 0").replace("  - robot[*].said => robot[*].hear", "")
-    load(text.format("loss: {type: RangeLoss, positions: 'robot[*].place', range: 3, at: 'robot[*].hear'}"))
+    model = load(text.format("loss: {type: RangeLoss, positions: 'robot[*].place', range: 3, at: 'robot[*].hear'}"))
+    assert [(each.name, each.ports) for each in model.aspects] == [("loss", [])]

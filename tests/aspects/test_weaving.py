@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,9 +11,7 @@ from epicycle.actors.expression import ExpressionError, PortFormula
 from epicycle.aspects import Aspect, Bias, JoinPoint, PacketLoss
 from epicycle.runner import ActorError, ModelError
 from epicycle.runner.engine import Results
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "engine"))
-from engine_parts import load, simulate
+from tests.engine.engine_parts import load, simulate
 
 PARTS = """
 composites:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +21,7 @@ from epicycle.runner.engine import Simulation
 from epicycle.runner.model import Model, ModelError, load_model
 from epicycle.runner.model.catalogue import built_in
 from epicycle.runner.model.schedule import dependencies, depths
-
-sys.path.insert(0, str(Path(__file__).parent))
-from conformance_parts import TYPES, TestActorPortDepth
+from tests.conformance.conformance_parts import TYPES, TestActorPortDepth
 
 HERE = Path(__file__).parent
 RESOLUTION = 1e-9  # s

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,9 +9,7 @@ import pytest
 
 from epicycle.actors import Actor, OutputPort, Parameter, ParameterError, PortParameter
 from epicycle.runner.engine import ActorError, Simulation
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "engine"))
-from engine_parts import load, sends, simulate
+from tests.engine.engine_parts import load, sends, simulate
 
 
 class Level(Actor):

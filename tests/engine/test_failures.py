@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import os
 import pickle
-import sys
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,7 @@ import pytest
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
 from epicycle.aspects import Aspect, JoinPoint
 from epicycle.runner.engine import ActorError, Simulation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import load
+from tests.engine.engine_parts import load
 
 
 class Broken(Actor):
@@ -33,7 +31,7 @@ class Broken(Actor):
     def fire(self) -> None:
         if self.where == "fire" and self.now >= 1:
             raise RuntimeError("no more")
-        things = {"text": "1.5", "array": np.zeros(2), "nameless": object(), "number": 1.0}
+        things = {"array": np.zeros(2), "nameless": object(), "number": 1.0}
         if self.where in things:
             self.output.send(things[self.where])
         if self.where == "channel":
@@ -55,7 +53,7 @@ class Worker(Process):
         yield self.wait(1) if self.how == "wait" else self.environment.timeout(10**9)
         self.output.send(1.0)
         if self.how == "fail":
-            raise RuntimeError("no more")
+            raise RuntimeError("no more work")
         yield self.wait(1)
 
 
@@ -66,6 +64,17 @@ class Trap(Aspect):
         raise RuntimeError("trapped")
 
 
+def raised(code: str) -> str:
+    """What is said of an exception that comes from a line of this file."""
+    (place,) = [place for place, line in enumerate(SOURCE, 1) if line.strip() == code]
+    source = SOURCE[place - 1]
+    before = len(source) - len(code)
+    file = __file__.removeprefix(os.getcwd() + os.sep)
+    carets = f"{'':>{before}}{'^' * len(code)}"
+    return f"\n   raised at {file}:{place}:{before + 1}\n{place:>5} | {source}\n      | {carets}\n   "
+
+
+SOURCE = Path(__file__).read_text(encoding="utf-8").splitlines()
 MODEL = """
 composites:
   Inner:
@@ -81,38 +90,50 @@ actors:
 connections: [{wires}]
 {more}
 """
+AT_12 = "declared at m.yaml:12:3"
+NO_MORE, TRAPPED = raised('raise RuntimeError("no more")'), raised('raise RuntimeError("trapped")')
 IN, OUT = "t.output -> a.input", "t.output -> c.in"
 
 
 @pytest.mark.parametrize(
     ("part", "wires", "more", "message"),
     [
-        ("{type: Broken}", IN, "", "a failed in fire() at (1 s, 1): RuntimeError: no more\n   declared at m.yaml:12:3"),
+        (
+            "{type: Broken}",
+            IN,
+            "",
+            "a failed in fire() at (1 s, 1): RuntimeError: no more" + NO_MORE + "declared at m.yaml:12:3",
+        ),
         (
             "{type: Broken}",
             OUT,
             "",
-            "c.b failed in fire() at (0 s, 1): RuntimeError: no more\n   declared at m.yaml:8:7",
+            "c.b failed in fire() at (0 s, 1): RuntimeError: no more" + NO_MORE + "declared at m.yaml:8:7",
         ),
         (
             "{type: Broken, where: initialize}",
             OUT,
             "",
-            "a failed in initialize() at (0 s, 1): RuntimeError: no start\n   declared at m.yaml:12:3",
+            "a failed in initialize() at (0 s, 1): RuntimeError: no start"
+            + raised('raise RuntimeError("no start")')
+            + "declared at m.yaml:12:3",
         ),
         (
             "{type: Broken, where: wrapup}",
             OUT,
             "",
-            "a failed in wrapup() at (5 s, 2): RuntimeError: no end\n   declared at m.yaml:12:3",
+            "a failed in wrapup() at (5 s, 2): RuntimeError: no end"
+            + raised('raise RuntimeError("no end")')
+            + "declared at m.yaml:12:3",
         ),
         (
             "{type: Broken, where: channel}",
             IN,
             "",
             (
-                "a failed in fire() at (0 s, 1): a.output has no channel 4: it has 0 channels, counted from 0\n"
-                "   declared at m.yaml:12:3"
+                "a failed in fire() at (0 s, 1): a.output has no channel 4: it has 0 channels, counted from 0"
+                + raised("self.output.send(1.0, 4)")
+                + "declared at m.yaml:12:3"
             ),
         ),
         (
@@ -121,16 +142,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             "",
             (
                 "a failed in fire() at (0 s, 1): a token of type object has no value that could be logged: make it a "
-                "dataclass, or give it a __repr__ that shows what is in it\n   declared at m.yaml:12:3"
-            ),
-        ),
-        (
-            "{type: Broken, where: text}",
-            IN,
-            "metrics:\n  total: {of: a.output, take: sum}",
-            (
-                "metric total failed in taking the sum of a.output at (0 s, 1): TypeError: unsupported operand type(s) "
-                "for +=: 'int' and 'str'\n   declared at m.yaml:16:3"
+                "dataclass, or give it a __repr__ that shows what is in it"
+                + raised("self.output.send(things[self.where])")
+                + "declared at m.yaml:12:3"
             ),
         ),
         (
@@ -147,8 +161,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             OUT,
             "aspects:\n  trap: {type: Trap, at: c.b.input}",
             (
-                "aspect trap failed in pass_token() at c.b.input at (0 s, 1): RuntimeError: trapped\n"
-                "   declared at m.yaml:16:3"
+                "aspect trap failed in pass_token() at c.b.input at (0 s, 1): RuntimeError: trapped"
+                + TRAPPED
+                + "declared at m.yaml:16:3"
             ),
         ),
         *(
@@ -157,8 +172,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
                 "t.output -> a.input",
                 f"aspects:\n  trap: {{type: Trap, at: {path}.output}}",
                 (
-                    f"aspect trap failed in pass_token() at {path}.output at (1 s, 1): RuntimeError: trapped\n"
-                    "   declared at m.yaml:16:3"
+                    f"aspect trap failed in pass_token() at {path}.output at (1 s, 1): RuntimeError: trapped"
+                    + TRAPPED
+                    + "declared at m.yaml:16:3"
                 ),
             )
             for how in ("wait", "timeout")
@@ -168,7 +184,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             "{type: Worker, how: fail}",
             OUT,
             "",
-            "a failed in run() at (1 s, 1): RuntimeError: no more\n   declared at m.yaml:12:3",
+            "a failed in run() at (1 s, 1): RuntimeError: no more work"
+            + raised('raise RuntimeError("no more work")')
+            + "declared at m.yaml:12:3",
         ),
     ],
 )

@@ -39,9 +39,7 @@ from epicycle.runner.engine import (
 from epicycle.runner.engine.encoding import TokenError
 from epicycle.runner.engine.log import EventLog
 from epicycle.runner.engine.waiting import LARGE, WaitingTokens, weight
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, load, simulate
+from tests.engine.engine_parts import Plan, load, simulate
 
 MODEL = """
 actors: {t: {type: Ticker, limit: 3}, s: {type: Scale, factor: 0.5}, join: {type: Join}}
@@ -256,8 +254,7 @@ def test_order_and_digest() -> None:
 
 def test_the_digest_does_not_depend_on_the_hash_seed() -> None:
     script = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from test_log import MODEL, simulate\n"
+        "from tests.engine.test_log import MODEL, simulate\n"
         "from epicycle.runner.engine import canonical\n"
         "print(simulate(MODEL, seed=3)[1].digest, canonical({'a', 'b', 'c', 'd'}).hex())"
     )
@@ -265,7 +262,7 @@ def test_the_digest_does_not_depend_on_the_hash_seed() -> None:
     for seed in ("0", "1", "12345"):
         environment = {**os.environ, "PYTHONHASHSEED": seed}
         run = subprocess.run(
-            [sys.executable, "-c", script, str(Path(__file__).parent)],
+            [sys.executable, "-c", script], cwd=Path(__file__).parents[2],
             env=environment, capture_output=True, text=True, check=True,
         )  # fmt: skip
         found.add(run.stdout)

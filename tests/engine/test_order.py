@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from itertools import permutations
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from epicycle.actors import Tag
 from epicycle.runner.engine import LoopError, Simulation, director
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, Probe, load, seen, sends, simulate
+from tests.engine.engine_parts import Plan, Probe, load, seen, sends, simulate
 
 
 @pytest.mark.parametrize("order", list(permutations(["clock", "double", "join", "probe"])))

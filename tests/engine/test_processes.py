@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Generator
-from pathlib import Path
 from typing import Any
 
 import pytest
 import simpy
 
 from epicycle.runner.engine import ActorError, Results, Simulation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Plan, Script, load, seen, sends, simulate
+from tests.engine.engine_parts import Plan, Script, load, seen, sends, simulate
 
 Behaviour = Callable[[Script], Generator[Any, Any, None]]
 ALONE = "actors: {a: {type: Script}, probe: {type: Probe}}\nconnections: [a.output -> probe.input]\n"
@@ -248,4 +244,7 @@ def test_an_exception_in_a_process_of_simpys_alone(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Plan, "begin", begin)
     with pytest.raises(ActorError) as caught:
         simulate("actors: {a: {type: Plan}}")
-    assert str(caught.value) == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
+    message, at, line, carets = str(caught.value).splitlines()
+    assert message == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
+    assert at.startswith("   raised at ")
+    assert line[carets.index("^") :] == 'raise KeyError("lost")'

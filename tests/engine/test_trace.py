@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Generator
-from pathlib import Path
 from typing import Any
 
 from epicycle.actors import Tag
 from epicycle.aspects import Aspect, JoinPoint
 from epicycle.runner.engine import Firing, Simulation, Tracer
 from epicycle.runner.model import load_model
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Script, load
+from tests.engine.engine_parts import Script, load
 
 SECOND = 10**9
 

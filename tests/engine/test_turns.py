@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.runner.engine import ActorError, Simulation
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import Probe, load, seen, sends, simulate
+from tests.engine.engine_parts import Probe, load, seen, sends, simulate
 
 
 class Echo(Actor):

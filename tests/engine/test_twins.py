@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Generator
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,9 +10,7 @@ import pytest
 import simpy
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
-
-sys.path.insert(0, str(Path(__file__).parent))
-from engine_parts import seen, sends, simulate
+from tests.engine.engine_parts import seen, sends, simulate
 
 
 class Tick(Process):

@@ -1,6 +1,6 @@
 """Whatever stands in a file or an option, loading it ends soon in a Model or a ModelError, and touches nothing else.
 
-    python tests/fuzz/fuzz.py [--mutants 50000] [--seed N] [--jobs 2]
+    python -m tests.fuzz.fuzz [--mutants 50000] [--seed N] [--jobs 2]
 
 makes mutants of the packaged models and of those in ``models/`` beside this file, loads each, and runs those that are
 still good for a moment.  It prints what came of them; a mutant that breaks the rules is made as small as Hypothesis
@@ -41,9 +41,7 @@ from epicycle.runner.engine import ActorError, LoopError
 from epicycle.runner.model import ModelError, load_model
 from epicycle.runner.model.catalogue import built_in
 from epicycle.runner.model.load import model_folders
-
-sys.path.insert(0, str(Path(__file__).parent))
-from mutants import Mutation, Seedling, of_options, of_text, of_tree, seedling
+from tests.fuzz.mutants import Mutation, Seedling, of_options, of_text, of_tree, seedling
 
 HERE = Path(__file__).parent / "models"
 BAD_MODELS = Path(__file__).parents[1] / "bad_models"

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-FUZZ = Path(__file__).parent / "fuzz.py"
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_mutants_of_good_models(seed: int) -> None:
     # In a process of its own, which watches what it opens, and whose memory is limited.
-    command = [sys.executable, str(FUZZ), "--mutants", "1000", "--seed", str(seed), "--jobs", "1"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=600)
+    command = [sys.executable, "-m", "tests.fuzz.fuzz", "--mutants", "1000", "--seed", str(seed), "--jobs", "1"]
+    done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     counted = re.search(r"1,000 mutants: (\d+) rejected, (\d+) accepted, (\d+) run", done.stdout.splitlines()[-2])
     assert counted is not None

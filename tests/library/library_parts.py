@@ -3,32 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
-from epicycle.actors import Actor, OutputPort, Parameter
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "engine"))
-from engine_parts import load, simulate
-
-
-class Feed(Actor):
-    """Sends tokens at given times; those of one time together."""
-
-    is_source: ClassVar[bool] = True
-    output: OutputPort[Any] = OutputPort(Any)
-    tokens: Parameter[Any] = Parameter(object, shape=(None,))
-
-    def initialize(self) -> None:
-        for time, _ in self.tokens:
-            self.wake_at(time)
-
-    def fire(self) -> None:
-        for time, token in self.tokens:
-            if time == self.now:
-                self.output.send(token)
-
+from tests.engine.engine_parts import load, simulate
+from tests.library.feeding import Feed
 
 Sends = list[tuple[float, int, str, Any]]
 Feeds = list[tuple[str, list[list[Any]]]]
@@ -37,7 +15,7 @@ Feeds = list[tuple[str, list[list[Any]]]]
 def text(actor: str, feeds: Feeds, outputs: int = 0) -> str:
     """A model with the actor ``it``, a feed for each entry, and ``outputs`` connections of its output."""
     lines = ["actors:", f"  it: {actor}"]
-    lines += [f"  feed{n}: {{type: Feed, tokens: {json.dumps(tokens)}}}" for n, (_, tokens) in enumerate(feeds)]
+    lines += [f"  feed{n}: {{type: Feed, events: {json.dumps(tokens)}}}" for n, (_, tokens) in enumerate(feeds)]
     lines += [f"  out{n}: {{type: Probe}}" for n in range(outputs)]
     lines += ["connections:"]
     lines += [f"  - feed{n}.output -> it.{port}" for n, (port, _) in enumerate(feeds)]

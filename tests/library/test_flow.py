@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from epicycle.runner.engine import ActorError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from library_parts import Feeds, behave, tokens
+from tests.library.library_parts import Feeds, behave, tokens
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from epicycle.runner.engine import ActorError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from library_parts import Feeds, behave, problem, tokens
+from tests.library.library_parts import Feeds, behave, problem, tokens
 
 
 @pytest.mark.parametrize(

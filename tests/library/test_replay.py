@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,7 @@ from pyarrow import parquet
 
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.model import ModelError, load_model
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "engine"))
-from engine_parts import sends
+from tests.engine.engine_parts import sends
 
 
 def replay(folder: Path, table: str | dict[str, list[Any]], options: str = "") -> list[Any]:

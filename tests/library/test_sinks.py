@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +11,7 @@ import pytest
 from epicycle.actors import Histogram, Recorder
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.model import ModelError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from feeding import feed, model_of, tokens
+from tests.library.feeding import feed, model_of, tokens
 
 EVENTS = [(1.0, 1.5), (1.0, 2.5), (2.0, 3.5)]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +10,9 @@ from scipy import stats
 
 from epicycle.actors import Actor
 from epicycle.runner.engine import ActorError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from library_parts import Feed, Feeds, behave, load, problem, text, tokens
+from tests.engine.engine_parts import load
+from tests.library.feeding import Feed
+from tests.library.library_parts import Feeds, behave, problem, text, tokens
 
 THREE: list[list[Any]] = [[0, "a"], [1, "b"], [1, "c"]]
 

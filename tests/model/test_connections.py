@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,9 +11,7 @@ from hypothesis import strategies as st
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.runner.model import load_model
 from epicycle.runner.model.indices import BadIndexError, resolve
-
-sys.path.insert(0, str(Path(__file__).parent))
-from model_parts import TYPES
+from tests.model.model_parts import TYPES
 
 
 def hops(text: str, tmp_path: Path, *settings: str) -> list[str]:

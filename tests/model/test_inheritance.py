@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
 from epicycle.runner.model import Model, load_composite, load_model
-
-sys.path.insert(0, str(Path(__file__).parent))
-from model_parts import TYPES
+from tests.model.model_parts import TYPES
 
 BASE = """
   Base:

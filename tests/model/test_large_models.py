@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
+from benchmarks import validation
 from epicycle.runner.model import load_model
 from epicycle.runner.model.patterns import PathIndex, matches
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import validation
 
 
 def test_two_thousand_actors_in_ten_thousand_lines(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-import sys
 import time
 from pathlib import Path
 
@@ -26,9 +25,7 @@ from epicycle.runner.cli import main
 from epicycle.runner.engine import ActorError, LogError, LoopError
 from epicycle.runner.engine.encoding import TokenError
 from epicycle.runner.model import ModelError, Position, Problem, load_model
-
-sys.path.insert(0, str(Path(__file__).parent))
-from model_parts import TYPES
+from tests.model.model_parts import TYPES
 
 
 def said(text: str, tmp_path: Path, **options: object) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -36,10 +35,9 @@ from epicycle.runner.model.schema import _value as value_schema
 from epicycle.runner.model.wiring import _ENDPOINT as ENDPOINT
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import study_figure_types
-
-sys.path.insert(0, str(Path(__file__).parent))
-from model_parts import TYPES
-from test_bad_models import CASES
+from tests.bad_models.test_bad_models import CASES
+from tests.cases import Case
+from tests.model.model_parts import TYPES
 
 ROOT = Path(__file__).parents[2]
 PACKAGED = sorted(path for folder in model_folders() for path in folder.rglob("*.yaml"))
@@ -113,16 +111,15 @@ def validator_of_bad_models() -> Draft202012Validator:
     return Draft202012Validator(json_schema(catalogue.with_types(TYPES), figure_types(), study_figure_types()))
 
 
-@pytest.mark.parametrize(("options", "model", "message"), CASES)
-def test_bad_model_fails_if_its_shape_is_broken(options: str, model: str, message: str) -> None:
-    own = re.split(r"^# file: .+\n", model, flags=re.MULTILINE)[0]
-    node = parse(own, "m.yaml", problems := Problems())
+@pytest.mark.parametrize("case", CASES)
+def test_bad_model_fails_if_its_shape_is_broken(case: Case) -> None:
+    node = parse(case.files("m.yaml")["m.yaml"], "m.yaml", problems := Problems())
     if node is None or len(problems):
         return  # broken YAML is no document at all
     found = [error.message for error in validator_of_bad_models().iter_errors(plain(node))]
-    if message.startswith("nothing"):
+    if case.message.startswith("nothing"):
         assert found == []
-    elif "model" not in options and (broken := shape_problems(message, "m.yaml")):
+    elif "model" not in dict(case.options) and (broken := shape_problems(case.message, "m.yaml")):
         assert found != [], broken
 
 

@@ -1,4 +1,4 @@
-"""Throws problems at the solver that no scenario poses: `python tests/numerics/robustness.py [--count 100000]`.
+"""Throws problems at the solver that no scenario poses: `python -m tests.numerics.robustness [--count 100000]`.
 
 Starts inside an obstacle or a peer, at no distance at all, tubes that contradict each other or the obstacle,
 covariances over twenty orders of magnitude, up to 64 peers, vehicles that are too fast, and numbers from upstream

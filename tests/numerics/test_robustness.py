@@ -4,7 +4,8 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from robustness import BOUND, KINDS, run
+
+from tests.numerics.robustness import BOUND, KINDS, run
 
 
 @pytest.mark.parametrize(("count", "seed"), [(2_000, 2), pytest.param(100_000, 1, marks=pytest.mark.slow)])

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenario import play
+
+from tests.actors.scenario import play
 
 barrier = importlib.import_module("epicycle.actors.robotics.numerics.barrier")
 constraints = importlib.import_module("epicycle.actors.robotics.numerics.constraints")

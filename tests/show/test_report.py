@@ -6,7 +6,6 @@ import json
 import math
 import re
 import shutil
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -27,9 +26,7 @@ from epicycle.runner.study.columns import Column, si_unit
 from epicycle.runner.study.manifest import manifest_text
 from epicycle.runner.study.replays import Replay, ReplayError, repeat
 from epicycle.runner.study.statistics import half_width
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
-from study_parts import STUDY, THIS, write
+from tests.study.study_parts import STUDY, THIS, write
 
 QUEUE = """
 study: queue
@@ -48,7 +45,7 @@ actors:
   clock: {type: Clock, period: 0.1 s}
   wheel: {type: CircularMotion, start: [0, 2], speed: "${speed}", turn_rate: "${speed / radius}"}
 connections: [clock.output -> wheel.trigger]
-run: {stop: 2 s}
+run: {stop: 2 s, record: [wheel.state]}
 metrics: {ticks: {of: clock.output, take: count}}
 figures: {way: {type: Trajectories, robots: wheel.state}}
 """

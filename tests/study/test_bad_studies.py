@@ -1,14 +1,13 @@
 """What is said about studies that are wrong: whole messages, from ``bad_studies.txt``.
 
 A case is ``### its name``, ``$ option`` lines for --set, the study, ``>>>``, and the message.
-``python tests/study/test_bad_studies.py`` writes the messages anew; read the difference before keeping it.
+``python -m tests.study.test_bad_studies`` writes the messages anew; read the difference before keeping it.
 """
 
 from __future__ import annotations
 
-import os
+import contextlib
 import re
-import sys
 import tempfile
 from pathlib import Path
 
@@ -23,34 +22,31 @@ from epicycle.runner.model.document import parse, plain
 from epicycle.runner.model.schema import json_schema
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import check_figures, study_figure_types
-
-sys.path.insert(0, str(Path(__file__).parent))
-from study_parts import STUDY, plan_of, write
+from tests import cases
+from tests.cases import Case
+from tests.study.study_parts import STUDY, plan_of, write
 
 FILE = Path(__file__).parent / "bad_studies.txt"
-CASE = re.compile(r"^### ([^\n]+)\n((?:\$ [^\n]*\n)*)(.*?)^>>>\n(.*?)(?=^### |\Z)", re.MULTILINE | re.DOTALL)
-CASES = CASE.findall(FILE.read_text(encoding="utf-8"))
+CASES = cases.read(FILE)
 # What grows with the house.
 LISTS = re.compile(r"(packaged \w+: |known functions: )[^;\n]*")
 
 
-def message(options: str, study: str) -> str:
+def message(case: Case) -> str:
     """What is said about a study beside the model of the tests."""
-    write(Path("."), study)
+    write(Path("."), case.text)
     (Path("gusts.yaml")).write_text("disturbance: gusts\nset: {dirft: 1}\n", encoding="utf-8")
     try:
-        check_figures(plan_of(Path("walks.yaml"), set=tuple(options.replace("$ ", "").splitlines())))
+        check_figures(plan_of(Path("walks.yaml"), set=tuple(value for _, value in case.options)))
     except ModelError as error:
         return LISTS.sub(r"\1...", str(error)) + "\n"
     return "nothing\n"
 
 
-@pytest.mark.parametrize(
-    ("options", "study", "expected"), [case[1:] for case in CASES], ids=[case[0] for case in CASES]
-)
-def test_message(options: str, study: str, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("case", [pytest.param(case, id=case.name) for case in CASES])
+def test_message(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert message(options, study) == expected.rstrip("\n") + "\n"
+    assert message(case) == case.message
 
 
 def test_names_of_the_other_kind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -104,9 +100,9 @@ def test_schema_refuses_what_is_misshapen() -> None:
         return plain(node)
 
     validator = Draft202012Validator(json_schema(built_in(), figure_types(), study_figure_types()))
-    refused = [name for name, _, study, _ in CASES if not validator.is_valid(document(study))]
+    refused = [case.name for case in CASES if not validator.is_valid(document(case.text))]
     assert [name for name in SHAPES if name not in refused] == []
-    said = {name: message for name, _, _, message in CASES}
+    said = {case.name: case.message for case in CASES}
     assert [name for name in refused if said[name] == "nothing\n"] == []
     for good in (STUDY, "study: s\nmodel: mm1\nset:\nvary:\nmetrics:\n"):
         assert list(validator.iter_errors(document(good))) == []
@@ -114,12 +110,8 @@ def test_schema_refuses_what_is_misshapen() -> None:
 
 def write_anew() -> None:
     """Put the present messages into the file."""
-    cases = []
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        for name, options, study, _ in CASES:
-            cases.append(f"### {name}\n{options}{study}>>>\n{message(options, study)}\n")
-    FILE.write_text("".join(cases).rstrip("\n") + "\n", encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        cases.write(FILE, message)
 
 
 if __name__ == "__main__":

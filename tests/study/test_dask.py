@@ -23,10 +23,8 @@ from epicycle.runner.study import Plan, open_study, read_study
 from epicycle.runner.study.one_run import Runner
 from epicycle.runner.study.parcel import fitness, pack
 from epicycle.runner.study.schedule import Schedule
-
-sys.path.insert(0, str(Path(__file__).parent))
-from dask_cluster import Cluster, a_cluster, without_epicycle
-from study_parts import STUDY, THIS, command, write
+from tests.study.dask_cluster import Cluster, a_cluster, without_epicycle
+from tests.study.study_parts import STUDY, THIS, command, write
 
 pytest.importorskip("distributed")
 from epicycle.runner.study import cluster as cluster_module

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from study_parts import plan_of, write
+from tests.study.study_parts import plan_of, write
 
 HEAD = "study: s\nmodel: ./walk.yaml\n"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,9 +15,7 @@ import numpy as np
 import pytest
 
 from epicycle.runner.study import open_study, run_study
-
-sys.path.insert(0, str(Path(__file__).parent))
-from study_parts import STUDY, THIS, command, plan_of, write
+from tests.study.study_parts import STUDY, THIS, command, plan_of, write
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes in /proc")
 
@@ -140,7 +137,7 @@ def test_nothing_is_lost_in_twenty_kills(executor: str, jobs: int, tmp_path: Pat
 def test_nothing_is_lost_in_twenty_kills_on_a_cluster(tmp_path: Path) -> None:
     """The workers of a scheduler are killed, too, and the processes that make runs for them."""
     pytest.importorskip("distributed")
-    from dask_cluster import a_cluster
+    from tests.study.dask_cluster import a_cluster
 
     with a_cluster(tmp_path / "cluster") as cluster:
         nannies = [cluster.add_worker("--nanny") for _ in range(2)]  # which start new workers

@@ -29,9 +29,7 @@ from epicycle.runner.study.manifest import checksum, manifest_text
 from epicycle.runner.study.schedule import OK, Done, Schedule
 from epicycle.runner.study.session import duration, manifest_of
 from epicycle.runner.study.store import Store, Writer, lock, prepare
-
-sys.path.insert(0, str(Path(__file__).parent))
-from study_parts import MODEL, STUDY, THIS, plan_of, write
+from tests.study.study_parts import MODEL, STUDY, THIS, plan_of, write
 
 
 def study(folder: Path, *arguments: object, out: str = "out") -> int:
@@ -58,7 +56,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_rows_are_what_single_runs_give(done: Path) -> None:
-    from study_parts import Walk
+    from tests.study.study_parts import Walk
 
     rows = open_study(done / "out").table().to_pylist()
     assert [(row["condition"], row["replication"]) for row in rows] == [(c, r) for c in range(2) for r in range(5)]

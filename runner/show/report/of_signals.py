@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
@@ -27,7 +28,7 @@ from ...model import Model, Problems
 from ...model.patterns import select
 from ...study import Plan
 from ...study.statistics import half_width
-from ..drawing import figures_of
+from ..drawing import draw, figures_of
 from ..figures import Figure, positions
 from .data import Condition, Data
 from .figure import Complaint, Layout, Roles, RunKey, SignalFigure, layout, roles, unknown
@@ -154,7 +155,7 @@ def over_time(
     means, halves = [], []
     for column in columns.T[kept]:
         values = column[~np.isnan(column)].tolist()
-        means.append(sum(values) / len(values))
+        means.append(math.fsum(values) / len(values))
         halves.append(half_width(values) if len(values) > 1 else 0.0)
     return times[kept], np.array(means), np.array(halves)
 
@@ -295,7 +296,7 @@ class SingleRun(SignalFigure):
         with tempfile.TemporaryDirectory() as folder:
             for ending in FORMATS:
                 path = Path(folder) / f"run.{ending}"
-                figure.draw(results, path)
+                draw(self.figure, figure, results, path)
                 files[ending] = path.read_bytes()
         return files
 

@@ -1,0 +1,1 @@
+"""The benchmarks; `make bench` runs those that have a goal."""
