@@ -78,15 +78,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     from ..engine import ActorError, LogFile, LogFilter, LoopError, Pace, Simulation
     from ..model import Problems
-    from ..show import (
-        FigureError,
-        check_folder,
-        draw_figures,
-        figures_of,
-        summary_object,
-        summary_table,
-        write_folder,
-    )
+    from ..show import FigureError, check_folder, draw_figures, figures_of, summary_object, summary_table, write_folder
 
     log = LogFile(options.log) if options.log is not None else None
     if log is None and options.log_where:
@@ -117,16 +109,16 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
                 complain(f"what was recorded until then is in {folder}")
             raise
         # Before the log is closed, which may fail.
-        written = [] if folder is None else write_folder(folder, results, command)
+        saved = [] if folder is None else write_folder(folder, results, command)
     if pace is not None and pace.worst > NOTICEABLE:
         complain(
             f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
             f"{pace.behind:.3g} s at the end"
         )
-    failed = list[FigureError]()
+    written, failed = [], list[FigureError]()
     if folder is not None:
         drawn, failed = draw_figures(folder, results, figures)
-        written = [*drawn, *written]
+        written = [*drawn, *saved]
     if options.json:
         tell_json(summary_object(results))
     else:

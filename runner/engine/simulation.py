@@ -27,8 +27,8 @@ class Simulation:
     """One run of a model, which is checked first and may not be changed between this and ``run``.
 
     A model can be run any number of times, one after the other, each time by a Simulation of its own.  ``keep_log``
-    keeps the records of the event log, all or those that a ``LogFilter`` lets pass; ``log_to`` is given them instead,
-    as by a ``LogFile``.
+    keeps the records of the event log, all or those that a ``LogFilter`` lets pass; ``log_to``, such as
+    ``LogFile.add``, is given them instead.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
