@@ -30,6 +30,7 @@ OPTIONS = (
     "-q", "--tb=no", "--no-header", "-W", "ignore",
     "-p", "no:cacheprovider", "-p", "no:unraisableexception", "-p", "no:threadexception",
 )  # fmt: skip
+ROOT = Path(__file__).parents[2]  # of the project that is copied, which no test must meet
 MEMORY = 16_000_000_000  # address space of a process, in bytes
 
 
@@ -146,9 +147,11 @@ def _settle(tree: Path, compiled: bool, limit: float) -> None:
         NUMBA_DISABLE_JIT=str(int(not compiled)),
     )
     numba.config.DISABLE_JIT = int(not compiled)
-    sys.path[:] = [str(tree), *(each for each in sys.path if each and Path(each).resolve() != Path.cwd())]
-    for name in [name for name in sys.modules if name.partition(".")[0] == "tests"]:
+    sys.path[:] = [str(tree), *(each for each in sys.path if each and Path(each) != ROOT)]
+    ours = {path.stem for path in tree.iterdir()}
+    for name in [name for name in sys.modules if name.partition(".")[0] in ours]:
         del sys.modules[name]
+    importlib.invalidate_caches()
     silence = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(silence, stream)
