@@ -5,18 +5,21 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
+LINKED := $(VENV)/linked
 
 .NOTPARALLEL:
-.PHONY: help run paper test check bench fuzz robust lint reference wheel clean
+.PHONY: help run paper test check bench fuzz mutants robust portable lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
 	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
+	@echo "make portable  every digest under settings that stand for other machines (10 min)"
 	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, and types"
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
+	@echo "make mutants 200 small changes of our sources: do the quick tests notice at least 90 % of them?"
 	@echo "make robust 100,000 problems that no scenario poses: does the solver answer each within its limits?"
 	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
 	@echo "make wheel  build dist/epicycle-*.whl"
@@ -41,8 +44,14 @@ bench: $(DEV)
 fuzz: $(DEV)
 	$(BIN)/python -m tests.fuzz.fuzz
 
+mutants: $(DEV)
+	$(BIN)/python -m tests.mutation
+
 robust: $(DEV)
 	$(BIN)/python -m tests.numerics.robustness
+
+portable: $(DEV)
+	$(BIN)/python -m tests.portable.portable
 
 lint: $(DEV)
 	$(BIN)/ruff check .
@@ -67,12 +76,20 @@ $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Epicycle needs Python 3.11 or newer: make PYTHON=python3.x")'
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-$(USE): pyproject.toml | $(BIN)/python
+# mypy cannot follow an editable install to the folders at the root.  It looks into a package of stubs, which Python does
+# not: links there let it check the programs of users against the source.
+$(LINKED): | $(BIN)/python
+	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') && \
+	mkdir -p "$$site/epicycle-stubs" && \
+	for folder in actors aspects runner; do ln -sfn "$(CURDIR)/$$folder" "$$site/epicycle-stubs/$$folder"; done
+	@touch $@
+
+$(USE): pyproject.toml | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle into $(VENV) (first time only, and when pyproject.toml changes)"
 	@$(PIP) install --editable .
 	@touch $@
 
-$(DEV): pyproject.toml | $(BIN)/python
+$(DEV): pyproject.toml | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[dev] into $(VENV) (first time only, and when pyproject.toml changes)"
 	@$(PIP) install --editable '.[dev]'
 	@touch $(USE) $@

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, ClassVar
-
-import numpy as np
 
 from .core import (
     NANOSECONDS_PER_SECOND,
@@ -21,9 +20,12 @@ from .core import (
     did_you_mean,
 )
 from .expression import Formula, FormulaParameter, operand
-from .segment import METHODS, Crossing, Guard, Segment, State
+from .expression.enclosure import bounds_of
+from .integration import STEPPERS, Bounds, State
+from .segment import Crossing, Equations, Guard, Segment, sign_of
 
 _MAX_STEPS = 10_000
+_AHEAD = 64  # parts of a step that are searched for crossings at once
 
 
 class ODE(Actor):
@@ -50,8 +52,20 @@ class ODE(Actor):
     later.  An expression that is zero at the start does not cross there.  Crossings of one kind that come closer
     together than ``min_interval`` end the run with an error: a ball that comes to rest bounces without end (Zeno).
 
-    The solution does not depend on when it is looked at.  Numbers are bare, in the units that the model chooses, time
-    in s.  Solvers: ``scipy.integrate``.  Ptolemy: ``DifferentialSystem``, ``LevelCrossingDetector``.
+    The solution does not depend on when it is looked at, and has the same bits on every processor.  Numbers are bare,
+    in the units that the model chooses, time in s.
+
+    Methods: ``RK23`` (Bogacki-Shampine), ``RK45`` (Dormand-Prince) and ``DOP853`` (Hairer) are explicit Runge-Kutta
+    methods.  ``Radau`` (Radau IIA of order 5) and ``BDF`` (order 1 to 5) are for stiff systems: ``Radau`` is the more
+    exact one at loose tolerances, ``BDF`` takes fewer evaluations at tight ones.  The steps are those of SciPy's
+    solvers of these names, but the arithmetic is our own.
+
+    Steps are as long as the tolerances allow, but longer than 1 s only where nothing can hide in them: bounds on the
+    derivatives along the step (interval arithmetic) must show that they stay near what the step has seen.  A crossing
+    that comes and goes within an eighth of a second may be missed, if such bounds do not show that there is none.
+    With ``max_step`` no step is longer, that check is left out, and its eighth takes the place of the second's.
+
+    Ptolemy: ``DifferentialSystem``, ``LevelCrossingDetector``.
     """
 
     is_source: ClassVar[bool] = True
@@ -69,14 +83,14 @@ class ODE(Actor):
     )
     held = MappingParameter(Parameter(float), {}, doc="values of the inputs before their first token; 0 if left out")
 
-    method = Parameter(str, "DOP853", choices=METHODS, doc="the solver; Radau and BDF are for stiff systems")
+    method = Parameter(str, "DOP853", choices=tuple(STEPPERS), doc="the solver; Radau and BDF are for stiff systems")
     relative_tolerance = Parameter(
         float, 1e-10, unit="1", min=1e-13, max=0.1, doc="error per step, relative to each state"
     )
     absolute_tolerance = Parameter(float, 1e-12, min=1e-300, doc="error per step, added to the relative one")
     max_step = Parameter(
-        float, 1.0, unit="s", min=1e-9, max=1e6,
-        doc="longest step; two crossings within an eighth of it may go unnoticed",
+        float, None, unit="s", min=1e-9, max=1e6,
+        doc="longest step; if left out, 1 s, or what the tolerances allow where nothing can hide in it",
     )  # fmt: skip
     min_interval = Parameter(float, 1e-6, unit="s", min=1e-9, doc="what crossings of one kind keep between them")
 
@@ -122,11 +136,10 @@ class ODE(Actor):
         self._wake: Wake | None = None
         ways = [self.directions.get(name, "both") for name in self.crossings]
         self._guards = [
-            Guard(self._number(formula, f"crossing {name}"), way != "falling", way != "rising")
+            Guard(self._crossing(name), partial(self._bounds, formula), way != "falling", way != "rising")
             for (name, formula), way in zip(self.crossings.items(), ways, strict=True)
         ]
-        self._derivatives = [self._number(self.derivatives[name], f"derivative of {name}") for name in self._states]
-        self._begin(self.tag.time, 0.0, np.array([self.initial[name] for name in self._states], dtype=float))
+        self._begin(self.tag.time, 0.0, [self.initial[name] for name in self._states])
         for guard, side in zip(self._guards, self._signs(0.0, self._segment.at(0.0)), strict=True):
             guard.side = side
         if self._guards:
@@ -136,7 +149,7 @@ class ODE(Actor):
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s: no rounding adds up over crossings."""
         self._time, self._fraction = time, fraction
         self._segment = Segment(
-            lambda at, x: np.array([derivative(at, x) for derivative in self._derivatives]),
+            Equations(self._rates, self._bounds_of_rates),
             state,
             self._guards,
             method=self.method,
@@ -144,26 +157,40 @@ class ODE(Actor):
             max_step=self.max_step,
         )
 
+    def _at(self, at: float) -> float:
+        """The time in the model at a time of the present segment."""
+        return self._time / NANOSECONDS_PER_SECOND + (self._fraction + at)
+
     def _names(self, at: float, state: State) -> dict[str, Any]:
         """What expressions know at a time of the present segment."""
-        time = self._time / NANOSECONDS_PER_SECOND + (self._fraction + at)
-        return {**self._held, **dict(zip(self._states, state.tolist(), strict=True)), "time": time}
+        names = {**self._held, **dict(zip(self._states, state, strict=True))}
+        names["time"] = self._at(at)
+        return names
 
-    def _number(self, formula: Formula, what: str) -> Any:
-        def value(at: float, state: State) -> float:
-            try:
-                result = formula(self._names(at, state))
-            except EpicycleError as error:
-                raise EpicycleError(f"{what}: {error}") from None
-            if isinstance(result, bool) or not isinstance(result, (int, float)):
-                raise EpicycleError(f"{what}: {formula} gives {result!r}, which is not a number")
-            return float(result)
+    def _rates(self, at: float, state: State) -> State:
+        names = self._names(at, state)
+        return [_number(self.derivatives[name], names, "derivative of", name) for name in self._states]
 
-        return value
+    def _crossing(self, name: str) -> Callable[[float, State], float]:
+        formula = self.crossings[name]
+        return lambda at, state: _number(formula, self._names(at, state), "crossing", name)
+
+    def _bounds(self, formula: Formula, left: float, right: float, states: Sequence[Bounds]) -> Bounds:
+        return bounds_of(formula, self._known_bounds(left, right, states))
+
+    def _bounds_of_rates(self, left: float, right: float, states: Sequence[Bounds]) -> list[Bounds]:
+        known = self._known_bounds(left, right, states)
+        return [bounds_of(self.derivatives[name], known) for name in self._states]
+
+    def _known_bounds(self, left: float, right: float, states: Sequence[Bounds]) -> dict[str, Bounds]:
+        """What the names in expressions lie between, from one time of the present segment to another."""
+        numbers = {name: (value, value) for name, value in self._held.items() if isinstance(value, (int, float))}
+        return {**numbers, **dict(zip(self._states, states, strict=True)), "time": (self._at(left), self._at(right))}
 
     def fire(self) -> None:
         now = self._elapsed()
-        self._segment.at(now)  # steps are taken up to here, and searched for crossings
+        if self._guards:
+            self._segment.search(now)
         crossed = dict(self._jumps)
         self._jumps.clear()
         crossing = self._segment.crossing
@@ -174,7 +201,7 @@ class ODE(Actor):
             self._cross(Crossing(now, crossed), crossed)
         if crossed or self.trigger.present:
             at = 0.0 if crossed else now
-            for name, value in zip(self._states, self._segment.at(at).tolist(), strict=True):
+            for name, value in zip(self._states, self._segment.at(at), strict=True):
                 self.outputs[name].send(value)
         self._take_inputs()
         self._plan()
@@ -190,19 +217,20 @@ class ODE(Actor):
     def _cross(self, crossing: Crossing, crossed: Mapping[int, int]) -> None:
         """Send the crossings, reset what they reset, and begin a new solution."""
         at, state = crossing.time, self._segment.at(crossing.time)
-        before, time = self._signs(at, state), self._names(at, state)["time"]
-        after = dict(zip(self._states, state.tolist(), strict=True))
+        self._segment.rewind(at)
+        before, names = self._signs(at, state), self._names(at, state)
+        after = dict(zip(self._states, state, strict=True))
         for number, name in enumerate(self.crossings):
             if number in crossed:
-                self._count(name, time)
+                self._count(name, names["time"])
                 for target, formula in self.resets.get(name, {}).items():
-                    after[target] = self._number(formula, f"reset of {target} at {name}")(at, state)
-        start = np.array([after[name] for name in self._states])
+                    after[target] = _number(formula, names, f"reset of {target} at", name)
+        start = [after[name] for name in self._states]
         moment = self._moment(at)
         self._begin(moment, self._fraction + at - (moment - self._time) / NANOSECONDS_PER_SECOND, start)
         signs = self._signs(0.0, start)
         for number, side in crossed.items():
-            if not np.array_equal(start, state):
+            if start != state:
                 # After a reset at zero, the solution will show which side comes of it.
                 side = -side if signs[number] == -side else 0
             self._guards[number].side = side
@@ -227,14 +255,16 @@ class ODE(Actor):
                 changed[name] = value
         if not changed:
             return
-        state = self._segment.at(self._elapsed())
-        before = self._signs(self._elapsed(), state)
+        now = self._elapsed()
+        state = self._segment.at(now)
+        self._segment.rewind(now)
+        before = self._signs(now, state)
         self._held.update(changed)
         self._begin(self.tag.time, 0.0, state)
         self._notice_jumps(before, self._signs(0.0, state), self._jumps)
 
     def _signs(self, at: float, state: State) -> list[int]:
-        return [_sign(guard.value(at, state)) for guard in self._guards]
+        return [sign_of(guard.value(at, state)) for guard in self._guards]
 
     def _notice_jumps(self, before: list[int], after: list[int], known: Mapping[int, int]) -> None:
         """See which guards are on their other side all at once."""
@@ -245,7 +275,7 @@ class ODE(Actor):
                 guard.side = after[number]
 
     def _plan(self) -> None:
-        """Ask to be fired at the next crossing or, while none is in sight, at the end of the step that is known.
+        """Ask to be fired at the next crossing or, while none is in sight, where the search for it ends.
 
         A wake-up that an input has overtaken is cancelled, for the solution it was found on is no more.
         """
@@ -257,19 +287,28 @@ class ODE(Actor):
             return
         if not self._guards:
             return
-        steps = 0
-        while self._segment.crossing is None and self._moment(self._segment.end) <= self.tag.time:
-            self._segment.extend()
-            steps += 1
-            if steps > _MAX_STEPS:
+        segment, parts = self._segment, 0
+        while segment.crossing is None and self._moment(segment.searched) <= self.tag.time:
+            segment.look()
+            parts += 1
+            if parts > _MAX_STEPS:
                 raise EpicycleError(f"the solver takes more than {_MAX_STEPS:,} steps within a nanosecond")
-        crossing = self._segment.crossing
-        moment = self._moment(self._segment.end if crossing is None else crossing.time)
+        while segment.crossing is None and segment.searched < segment.end and parts < _AHEAD:
+            segment.look()
+            parts += 1
+        moment = self._moment(segment.searched if segment.crossing is None else segment.crossing.time)
         self._wake = self.context.wake(self, moment)
 
 
-def _sign(value: float) -> int:
-    return (value > 0) - (value < 0)
+def _number(formula: Formula, names: Mapping[str, Any], what: str, name: str) -> float:
+    """The value of a formula, which must be a number; ``what`` it is of, for messages."""
+    try:
+        result = formula(names)
+    except EpicycleError as error:
+        raise EpicycleError(f"{what} {name}: {error}") from None
+    if isinstance(result, bool) or not isinstance(result, (int, float)):
+        raise EpicycleError(f"{what} {name}: {formula} gives {result!r}, which is not a number")
+    return float(result)
 
 
 def _same_names(label: str, given: Mapping[str, object], kind: str, known: Any, *, all_of_them: bool = False) -> None:

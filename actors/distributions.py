@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from .core import Configurable, Parameter, ParameterError, array_parameter, counted
+from .core import Configurable, Parameter, ParameterError, Stream, array_parameter, counted
+from .core.laws import cumulated, weighted
 from .tokens import token_type
 
 
@@ -18,7 +17,7 @@ class Distribution(Configurable):
 
     token_type: Any = float
 
-    def draw(self, random: np.random.Generator) -> Any:
+    def draw(self, random: Stream) -> Any:
         """A value, from the stream given."""
         raise NotImplementedError(f"{type(self).__name__} has no draw()")
 
@@ -28,7 +27,7 @@ class Constant(Distribution):
 
     value = Parameter(float, doc="the value")
 
-    def draw(self, random: np.random.Generator) -> float:
+    def draw(self, random: Stream) -> float:
         return self.value
 
 
@@ -42,8 +41,8 @@ class Uniform(Distribution):
         super().__init__(**values)
         _check_order("low", self.low, "high", self.high)
 
-    def draw(self, random: np.random.Generator) -> float:
-        return float(random.uniform(self.low, self.high))
+    def draw(self, random: Stream) -> float:
+        return random.uniform(self.low, self.high)
 
 
 class Normal(Distribution):
@@ -52,8 +51,8 @@ class Normal(Distribution):
     mean = Parameter(float, 0.0, doc="the mean")
     standard_deviation = Parameter(float, 1.0, min=0, doc="the square root of the variance")
 
-    def draw(self, random: np.random.Generator) -> float:
-        return float(random.normal(self.mean, self.standard_deviation))
+    def draw(self, random: Stream) -> float:
+        return random.normal(self.mean, self.standard_deviation)
 
 
 class LogNormal(Distribution):
@@ -62,8 +61,8 @@ class LogNormal(Distribution):
     median = Parameter(float, 1.0, min=0, doc="the median, e to the mean of the logarithm")
     sigma = Parameter(float, 1.0, unit="1", min=0, doc="standard deviation of the logarithm")
 
-    def draw(self, random: np.random.Generator) -> float:
-        return float(self.median * np.exp(random.normal(0.0, self.sigma)))
+    def draw(self, random: Stream) -> float:
+        return self.median * random.lognormal(0.0, self.sigma)
 
 
 class Exponential(Distribution):
@@ -71,8 +70,8 @@ class Exponential(Distribution):
 
     mean = Parameter(float, 1.0, min=0, doc="the mean, one over the rate")
 
-    def draw(self, random: np.random.Generator) -> float:
-        return float(random.exponential(self.mean))
+    def draw(self, random: Stream) -> float:
+        return random.exponential(self.mean)
 
 
 class Gamma(Distribution):
@@ -86,8 +85,8 @@ class Gamma(Distribution):
         if self.shape == 0:
             raise ParameterError("Gamma.shape: 0 is not above 0")
 
-    def draw(self, random: np.random.Generator) -> float:
-        return float(random.gamma(self.shape, self.mean / self.shape))
+    def draw(self, random: Stream) -> float:
+        return random.gamma(self.shape, self.mean / self.shape)
 
 
 class Triangular(Distribution):
@@ -102,9 +101,8 @@ class Triangular(Distribution):
         _check_order("low", self.low, "mode", self.mode)
         _check_order("mode", self.mode, "high", self.high)
 
-    def draw(self, random: np.random.Generator) -> float:
-        # NumPy refuses an interval without width.
-        return float(random.triangular(self.low, self.mode, self.high)) if self.low < self.high else self.low
+    def draw(self, random: Stream) -> float:
+        return random.triangular(self.low, self.mode, self.high)
 
 
 class Bernoulli(Distribution):
@@ -114,8 +112,8 @@ class Bernoulli(Distribution):
 
     probability = Parameter(float, 0.5, unit="1", min=0, max=1, doc="of true")
 
-    def draw(self, random: np.random.Generator) -> bool:
-        return bool(random.random() < self.probability)
+    def draw(self, random: Stream) -> bool:
+        return random.random() < self.probability
 
 
 class RandomInteger(Distribution):
@@ -130,8 +128,8 @@ class RandomInteger(Distribution):
         super().__init__(**values)
         _check_order("low", self.low, "high", self.high)
 
-    def draw(self, random: np.random.Generator) -> int:
-        return int(random.integers(self.low, self.high, endpoint=True))
+    def draw(self, random: Stream) -> int:
+        return self.low + random.below(self.high - self.low + 1)
 
 
 class Choice(Distribution):
@@ -146,18 +144,19 @@ class Choice(Distribution):
         super().__init__(**values)
         if not self.values:
             raise ParameterError("Choice.values: the list is empty, there is nothing to choose from")
-        if self.weights is not None and (len(self.weights) != len(self.values) or not 0 < self.weights.sum() < np.inf):
-            raise ParameterError(
-                f"Choice.weights: {self.weights.tolist()} does not give a weight to each of "
-                f"{counted(len(self.values), 'value')}"
-            )
         self.token_type = token_type(self.values)
-        weights = np.ones(len(self.values)) if self.weights is None else self.weights
-        self._sums = np.cumsum(weights / weights.sum())
+        weights = [1.0] * len(self.values) if self.weights is None else self.weights.tolist()
+        try:
+            self._sums = cumulated(weights)
+        except ValueError:
+            self._sums = []
+        if len(self._sums) != len(self.values):
+            raise ParameterError(
+                f"Choice.weights: {weights} does not give a weight to each of {counted(len(self.values), 'value')}"
+            )
 
-    def draw(self, random: np.random.Generator) -> Any:
-        # The last sum may fall short of 1 by rounding.
-        return self.values[min(int(np.searchsorted(self._sums, random.random(), side="right")), len(self.values) - 1)]
+    def draw(self, random: Stream) -> Any:
+        return self.values[weighted(random, self._sums)]
 
 
 def _check_order(low_name: str, low: float, high_name: str, high: float) -> None:

@@ -56,7 +56,7 @@ class Router(Actor):
             return
         for token in self.input.tokens:
             if self.policy == "random":
-                self._next = int(self.random.integers(self.output.width))
+                self._next = self.random.below(self.output.width)
             self.output.send(token, self._next)
             self._next = (self._next + 1) % self.output.width
 

@@ -9,7 +9,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, Tag, array_parameter, counted
+from .core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    Tag,
+    array_parameter,
+    counted,
+    visible_lines,
+)
 
 _DISPLAY = logging.getLogger("epicycle.display")
 
@@ -68,7 +79,7 @@ class Display(Actor):
 
     def fire(self) -> None:
         for token in self.input.tokens:
-            line = f"{self.now:.9g} s  {self.title or self.path}: {token}"
+            line = visible_lines(f"{self.now:.9g} s  {self.title or self.path}: {token}")
             if _DISPLAY.hasHandlers():
                 _DISPLAY.info("%s", line)
             else:

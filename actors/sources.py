@@ -37,6 +37,10 @@ class _Ticking(Actor):
             raise ParameterError("values: the list is empty, there is nothing to send")
         self.output.type = int if self.values is None else token_type(self.values)
 
+    @property
+    def is_endless(self) -> bool:
+        return self.stop_time is None and not any(port.name == "stop" and port.width for port in self.inputs.values())
+
     def _send(self, tick: int) -> None:
         values: Sequence[Any] | None = self.values
         self.output.send(tick if values is None else values[tick % len(values)])
@@ -126,7 +130,7 @@ class PoissonClock(_Ticking):
         self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
     def _interval(self) -> int:
-        return to_nanoseconds(float(self.random.exponential(self.mean_interval)))
+        return to_nanoseconds(self.random.exponential(self.mean_interval))
 
     def fire(self) -> None:
         self._send(self._tick)

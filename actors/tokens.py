@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import reduce
+from operator import or_
 from typing import Any
 
 
 def token_type(values: Iterable[object]) -> Any:
-    """The port type of these values: ``bool``, ``int``, ``float`` (also for a mixture with ints), ``str``, or any."""
-    found = {type(value) for value in values}
-    if found == {int, float}:
-        return float
-    return found.pop() if len(found) == 1 and found <= {bool, int, float, str} else Any
+    """The port type of these values: ``bool``, ``int``, ``float`` (ints count as such beside floats), ``str``, or a
+    union of these; any if there are others among them."""
+    found = dict.fromkeys(type(value) for value in values)
+    if not found or found.keys() - {bool, int, float, str}:
+        return Any
+    return reduce(or_, (each for each in found if each is not int or float not in found))

@@ -6,9 +6,7 @@ from abc import ABC, abstractmethod
 from fractions import Fraction
 from typing import ClassVar
 
-import numpy as np
-
-from epicycle.actors import EpicycleError, Parameter, to_nanoseconds
+from epicycle.actors import EpicycleError, Parameter, Stream, to_nanoseconds
 
 from .core import Aspect
 
@@ -30,7 +28,7 @@ class ClockAspect(Aspect, ABC):
             raise EpicycleError(f"a clock is wrong from the beginning of a run to its end: leave out {windows[0]!r}")
 
     @abstractmethod
-    def error(self, random: np.random.Generator) -> tuple[int, Fraction]:
+    def error(self, random: Stream) -> tuple[int, Fraction]:
         """How far a clock is ahead in the beginning (ns), and how many times as fast it goes."""
 
 
@@ -47,8 +45,8 @@ class ClockDrift(ClockAspect):
     )
     deviation = Parameter(float, 0.0, unit="1", min=0.0, max=1e6, doc="standard deviation of that from clock to clock")
 
-    def error(self, random: np.random.Generator) -> tuple[int, Fraction]:
-        draw = self.deviation * float(random.standard_normal())
+    def error(self, random: Stream) -> tuple[int, Fraction]:
+        draw = self.deviation * random.standard_normal()
         # The decimals as they were written: 0.1 is a tenth here, and not the nearest binary fraction.
         return 0, max(Fraction(1, 1_000_000), 1 + Fraction(repr(self.gain)) + Fraction(repr(draw)))
 
@@ -60,8 +58,8 @@ class ClockOffset(ClockAspect):
     after some time is not affected; what it does at a time is, and what it says of the time.
     """
 
-    offset = Parameter(float, 0.0, unit="s", doc="how far the clock is ahead; below 0 it is late")
-    deviation = Parameter(float, 0.0, min=0.0, unit="s", doc="standard deviation of that from clock to clock")
+    offset = Parameter(float, 0.0, unit="s", min=-1e9, max=1e9, doc="how far the clock is ahead; below 0 it is late")
+    deviation = Parameter(float, 0.0, min=0.0, max=1e8, unit="s", doc="standard deviation of that from clock to clock")
 
-    def error(self, random: np.random.Generator) -> tuple[int, Fraction]:
-        return to_nanoseconds(self.offset + self.deviation * float(random.standard_normal())), Fraction(1)
+    def error(self, random: Stream) -> tuple[int, Fraction]:
+        return to_nanoseconds(self.offset + self.deviation * random.standard_normal()), Fraction(1)

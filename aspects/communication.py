@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Parameter, texts_parameter
+from epicycle.actors import Parameter, Stream, texts_parameter
 
 from .core import CommunicationAspect, JoinPoint
 from .loss import is_bad, loses
@@ -151,7 +151,7 @@ class Corrupt(CommunicationAspect):
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is damaged")
     kind = Parameter(str, GAUSSIAN, choices=(GAUSSIAN, BIT_FLIP), doc="what happens to a number")
     deviation = Parameter(float, 1.0, min=0.0, doc="standard deviation of the error, in the number's own unit")
-    fields = texts_parameter((), doc="fields of the message that can be damaged; none: all numbers in it")
+    fields = texts_parameter((), doc="fields of the message that can be damaged; none: all numbers but its time")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         hit = point.random.random() < self.probability
@@ -168,7 +168,7 @@ class Corrupt(CommunicationAspect):
         point.forward(new)
 
 
-def _flip(numbers: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
+def _flip(numbers: NDArray[np.float64], random: Stream) -> NDArray[np.float64]:
     """Each number with one bit of its IEEE 754 form turned."""
     bits = np.left_shift(np.uint64(1), random.integers(0, 64, numbers.shape, dtype=np.uint64))
     return (numbers.view(np.uint64) ^ bits).view(np.float64)

@@ -24,9 +24,16 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
-import numpy as np
-
-from epicycle.actors import Configurable, EpicycleError, Parameter, Tag, random_stream, to_nanoseconds, to_seconds
+from epicycle.actors import (
+    Configurable,
+    EpicycleError,
+    Parameter,
+    Stream,
+    Tag,
+    random_stream,
+    to_nanoseconds,
+    to_seconds,
+)
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand, value_at
 
 from .decoration import Decoration, decoration
@@ -101,7 +108,7 @@ class JoinPoint:
         self._selections = selections or {}
 
     @cached_property
-    def random(self) -> np.random.Generator:
+    def random(self) -> Stream:
         """The random stream of the aspect at this port; many never ask for theirs."""
         if self._first is not self:
             return self._first.random

@@ -68,7 +68,7 @@ class CrashRestart(ExecutionAspect):
         is_over = self.until is not None and self.every is None and unit.now >= self.until
         if self.mtbf is not None and not is_over:
             life: _Life = unit.memory["life"]
-            unit.later(float(unit.random.exponential(self.mtbf)), self._fail, (unit, life.crashes))
+            unit.later(unit.random.exponential(self.mtbf), self._fail, (unit, life.crashes))
 
     def _fail(self, what: tuple[Unit, int]) -> None:
         """A random failure, unless a crash at a given time came before it."""

@@ -1,15 +1,24 @@
-"""Durations: parameters that are a time or a distribution of times."""
+"""Durations: parameters that are a time or a distribution of times, and the times that firings take."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
-import numpy as np
+from epicycle.actors import (
+    REQUIRED,
+    Configurable,
+    Distribution,
+    MappingParameter,
+    Parameter,
+    ParameterError,
+    Stream,
+)
 
-from epicycle.actors import REQUIRED, Configurable, Distribution, Parameter, ParameterError
+from .execution import Job
 
 Duration: TypeAlias = float | Distribution
+FiringTime: TypeAlias = Duration | Mapping[str, Duration]  # by input port
 
 
 class DurationParameter(Parameter[Duration]):
@@ -34,6 +43,40 @@ class DurationParameter(Parameter[Duration]):
         return super().convert(value)
 
 
-def drawn(duration: Duration, random: np.random.Generator) -> float:
+def drawn(duration: Duration, random: Stream) -> float:
     """A time in seconds; a number is drawn only from a distribution, and counts as 0 where it is negative."""
     return max(0.0, float(duration.draw(random))) if isinstance(duration, Distribution) else duration
+
+
+class FiringTimeParameter(DurationParameter):
+    """How long a firing takes: a duration, or one for each input port that costs time, ``{trigger: 60 ms}``.
+
+    A duration alone is for firings in which the actor has work to do: for a wake-up, or a token at a port that
+    triggers it.  What it only takes note of costs nothing.  With durations by port a firing takes the longest of those
+    of the ports at which tokens came; other ports, and wake-ups, cost nothing.
+    """
+
+    def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
+        super().__init__(default, doc=doc)
+        self._by_port = MappingParameter(DurationParameter())
+        self.forms = (*self.forms, self._by_port)
+
+    def describe_type(self) -> str:
+        return "time, distribution, or {port: time}"
+
+    def _expected(self) -> str:
+        return "a time in s >= 0, a distribution, or these by input port"
+
+    def convert(self, value: object) -> FiringTime | None:  # type: ignore[override]
+        if isinstance(value, Mapping) and value and "type" not in value:
+            by_port: Mapping[str, Duration] | None = self._by_port.convert(value)
+            return by_port
+        return super().convert(value)
+
+
+def time_needed(time: FiringTime, job: Job, random: Stream) -> float | None:
+    """How long a firing takes (s); None: there is nothing to do in it that would take time."""
+    if not isinstance(time, Mapping):
+        return drawn(time, random) if job.is_triggered else None
+    come = {port.name for port in job.arrivals}
+    return max((drawn(time[port], random) for port in sorted(come & time.keys())), default=None)

@@ -49,6 +49,11 @@ class Job:
         return {port.name: tuple(tokens) for port, (tokens, _) in self.arrivals.items()}
 
     @property
+    def is_triggered(self) -> bool:
+        """Whether there is work for the actor: a wake-up, or a token at a port that triggers it."""
+        return bool(self.wakes) or any(port.triggers for port in self.arrivals)
+
+    @property
     def is_wanted(self) -> bool:
         """Whether there still is something to fire for: the actor may have cancelled the wake-ups meanwhile."""
         return bool(self.arrivals) or not all(wake.cancelled for wake in self.wakes)

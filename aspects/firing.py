@@ -8,7 +8,7 @@ from typing import ClassVar
 from epicycle.actors import EpicycleError, Parameter, to_nanoseconds, to_seconds
 
 from .core import JoinPoint
-from .duration import DurationParameter, drawn
+from .duration import FiringTimeParameter, time_needed
 from .execution import ActorPoint, ExecutionAspect, Job
 from .measured import MeasuredTimes
 
@@ -18,9 +18,12 @@ WAIT, SKIP = "wait", "skip"
 class ExecutionTime(ExecutionAspect):
     """Lets the firings of an actor take time: it fires when that is over, with the tokens that came at the beginning.
 
-    A firing takes ``scale`` * (``time`` + the next of the measured ``times``).  An actor does one thing after the
-    other: what falls due meanwhile waits for its turn, or is skipped; a firing for a wake-up always waits, for an actor
-    that misses one may never ask for the next.
+    A firing takes ``scale`` * (``time`` + the next of the measured ``times``), if there is something to do in it: at
+    ports that do not trigger an actor it only takes note of tokens, which costs nothing.  With a ``time`` for each port
+    that costs something, ``{trigger: 60 ms, peer_plans: 1 ms}``, a firing takes the longest of those of the ports at
+    which tokens came.  An actor does one thing after the other: what falls due meanwhile waits for its turn, or is
+    skipped; a firing for a wake-up, or in which nothing takes time, always waits, for an actor that misses a wake-up
+    may never ask for the next.
 
     With ``measure`` nothing is delayed.  Instead the time that each firing takes to compute here and now is recorded as
     the signal ``NAME@ACTOR``, and the ``signals.parquet`` of that run can be given as ``times`` from then on: the run
@@ -31,7 +34,9 @@ class ExecutionTime(ExecutionAspect):
 
     events: ClassVar[tuple[str, ...]] = ("delayed", "skipped")
 
-    time = DurationParameter(0.0, doc="execution time, or a distribution from which one is drawn for every firing")
+    time = FiringTimeParameter(
+        0.0, doc="execution time of a firing, or a distribution of it; or {port: time} for each input port that costs"
+    )
     times: Parameter[Path | None] = Parameter(
         Path,
         None,
@@ -48,11 +53,14 @@ class ExecutionTime(ExecutionAspect):
         self._measured = None if self.times is None else MeasuredTimes(self.times)
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
+        seconds = time_needed(self.time, job, point.random)
+        if seconds is None:
+            self._occupy(job, point, 0)
+            return
         if self.measure:
             job.watch = point.record
             point.forward(job)
             return
-        seconds = drawn(self.time, point.random)
         if self._measured is not None:
             number = point.memory["number"] = point.memory.get("number", -1) + 1
             seconds += self._measured.of(point.port, number)
@@ -67,7 +75,7 @@ class ExecutionTime(ExecutionAspect):
     def _occupy(self, job: Job, point: ActorPoint, duration: int) -> None:
         now = point.tag.time
         free = max(now, point.memory.get("free", now))
-        if free > now and self.busy == SKIP and not job.wakes:
+        if free > now and duration > 0 and self.busy == SKIP and not job.wakes:
             point.act("skipped", None)
             return
         point.memory["free"] = free + duration

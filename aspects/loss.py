@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from .core import JoinPoint
 
-_AHEAD = 64
-
 
 def loses(point: JoinPoint, probability: float, spare_first: bool) -> bool:
     """Whether this token is lost, independently of all others (Bernoulli).
@@ -13,7 +11,7 @@ def loses(point: JoinPoint, probability: float, spare_first: bool) -> bool:
     One uniform number is drawn for every token, whatever the probability: runs at two probabilities from one seed lose
     nested sets of tokens.  With ``spare_first`` the tokens of the first tag at which any passes here are kept.
     """
-    return spared(point, _draw(point) < probability, spare_first)
+    return spared(point, point.random.random() < probability, spare_first)
 
 
 def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:
@@ -22,7 +20,7 @@ def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:
     ``worsens`` is the probability of good -> bad in a step, ``recovers`` that of bad -> good.  One uniform number is
     drawn for every token.
     """
-    draw = _draw(point)
+    draw = point.random.random()
     bad = point.memory.get("bad")
     if bad is None:
         bad = draw * (worsens + recovers) < worsens
@@ -41,14 +39,3 @@ def spared(point: JoinPoint, lost: bool, spare_first: bool) -> bool:
         point.memory["first tag"] = point.tag
         return False
     return lost and bool(point.tag != first)
-
-
-def _draw(point: JoinPoint) -> float:
-    """The next uniform number of the point's stream, from which nothing else may be drawn then.
-
-    They are drawn many at a time, which takes a tenth of the time, and gives the same numbers.
-    """
-    ahead: list[float] = point.memory.setdefault("drawn", [])
-    if not ahead:
-        ahead += point.random.random(_AHEAD)[::-1].tolist()
-    return ahead.pop()

@@ -14,7 +14,7 @@ from epicycle.actors.expression import PortFormulaParameter
 
 from .core import JoinPoint, MeasurementAspect
 from .loss import is_bad, loses, spared
-from .tokens import altered
+from .tokens import altered, stamped_as
 
 NORMAL, UNIFORM, LAPLACE = "normal", "uniform", "laplace"
 Numbers = NDArray[np.float64]
@@ -68,7 +68,7 @@ class Alteration(MeasurementAspect, ABC):
     events: ClassVar[tuple[str, ...]] = ("replaced",)
     alters_parameters: ClassVar[bool] = True
 
-    fields = texts_parameter((), doc="fields of the measurement that are altered; none: all numbers in it")
+    fields = texts_parameter((), doc="fields of the measurement that are altered; none: all numbers but its time")
 
     @abstractmethod
     def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
@@ -203,7 +203,7 @@ class Saturate(Alteration):
 
 
 class StuckAt(MeasurementAspect):
-    """Repeats the last good measurement while the sensor is stuck.
+    """Repeats the last good measurement while the sensor is stuck, with the time of the one that it should be.
 
     From measurement to measurement a working sensor gets stuck with probability ``p`` and a stuck one comes free with
     probability ``r``; the first measurement is always good.  Event: ``replaced``, with the old measurement.
@@ -219,8 +219,9 @@ class StuckAt(MeasurementAspect):
         if "good" in point.memory:
             stuck = is_bad(point, self.p, self.r)
         if stuck:
-            point.act("replaced", token, point.memory["good"])
-            point.forward(point.memory["good"])
+            old = stamped_as(point.memory["good"], token)
+            point.act("replaced", token, old)
+            point.forward(old)
         else:
             point.memory["good"] = token
             point.forward(token)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
 from .core import JoinPoint
-from .duration import Duration, DurationParameter, drawn
+from .duration import FiringTime, FiringTimeParameter, time_needed
 from .execution import ActorPoint, ExecutionAspect, Job
 from .selection import ByActorParameter
 
@@ -21,6 +21,7 @@ class Processor(ExecutionAspect):
     """One processor for all the actors at which it stands: each of their firings needs it for some time.
 
     An actor fires when the time that its firing needs has been worked off, with the tokens that came at the beginning.
+    As in ``ExecutionTime``, tokens of which it only takes note cost nothing, and times may be given by input port.
     fcfs: firings go in the order in which they fell due.  priority: the actor with the smallest number goes first; an
     actor without one, last.  edf: the firing goes first whose deadline comes first.  Among equals it is again the
     order in which they fell due, by the tag and within a tag by the firing order of the model.  With ``preemptive``, a
@@ -46,11 +47,13 @@ class Processor(ExecutionAspect):
 
     policy = Parameter(str, FCFS, choices=(FCFS, PRIORITY, EDF), doc="which of the firings that are due goes first")
     preemptive = Parameter(bool, True, doc="whether a more urgent firing interrupts the one that goes on")
-    time = DurationParameter(0.0, doc="time that a firing needs, or a distribution, for actors not named in times")
+    time = FiringTimeParameter(
+        0.0, doc="time that a firing needs, or a distribution, or {port: time}, for actors not named in times"
+    )
     times = ByActorParameter(
-        DurationParameter(),
+        FiringTimeParameter(),
         words="times or distributions",
-        doc="time that a firing needs (s), by actor: {pattern: time or distribution}",
+        doc="time that a firing needs (s), by actor: {pattern: time, distribution, or {port: time}}",
     )
     priorities = ByActorParameter(
         Parameter(float, unit="1"), doc="priority by actor, the smallest most urgent: {pattern: number}"
@@ -62,8 +65,13 @@ class Processor(ExecutionAspect):
     )
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
-        task = self._task(job, point, self._duration(point))
-        self._core(point).arrive(task, preemptive=self.preemptive)
+        given: FiringTime | None = self._of(self.times, "times", point)
+        seconds = time_needed(self.time if given is None else given, job, point.random)
+        if seconds is None:
+            self.pass_by(job, point)
+        else:
+            task = self._task(job, point, to_nanoseconds(seconds))
+            self._core(point).arrive(task, preemptive=self.preemptive)
 
     def pass_by(self, job: Job, point: ActorPoint) -> None:  # type: ignore[override]
         # It takes no time, but has to stay behind the earlier ones of its actor.
@@ -89,10 +97,6 @@ class Processor(ExecutionAspect):
     def _core(point: ActorPoint) -> _Core:
         core: _Core = point.shared.setdefault("core", _Core())
         return core
-
-    def _duration(self, point: ActorPoint) -> int:
-        given: Duration | None = self._of(self.times, "times", point)
-        return to_nanoseconds(drawn(self.time if given is None else given, point.random))
 
     def _task(self, job: Job, point: ActorPoint, duration: int) -> _Task:
         now, limit = point.tag.time, self._of(self.deadlines, "deadlines", point)

@@ -159,7 +159,7 @@ class _Air:
     def contend(self, frame: _Frame) -> None:
         """Begin the backoff before a transmission."""
         window = min(frame.radio.window << min(frame.attempt, 20), frame.radio.max_window)
-        frame.slots = int(frame.point.random.integers(window))
+        frame.slots = frame.point.random.below(window)
         frame.since = None if self.sending and frame.radio.carrier_sense else frame.point.tag.time
         self.contending.append(frame)
         self._call_again(frame.point)
@@ -195,7 +195,7 @@ class _Air:
         if not self.sending:
             self._busy_since = now
             # Of those that begin at the same time, none is the first by its place in the model.
-            first = int(due[0].point.random.integers(len(due))) if len(due) > 1 else 0
+            first = due[0].point.random.below(len(due)) if len(due) > 1 else 0
             due[first].is_first = True
         for frame in due:
             frame.begun = now

@@ -64,7 +64,7 @@ class ByActorParameter(SelectionParameter[Mapping[str, T]], Generic[T]):
             try:
                 converted[pattern] = self.item.convert(each)
             except ParameterError as error:
-                raise ParameterError(f"{pattern}: {error}") from None
+                raise ParameterError(f"{pattern}: {error}", (pattern, *error.keys), of_key=error.of_key) from None
         return converted
 
     def patterns(self, value: Mapping[str, T]) -> tuple[str, ...]:

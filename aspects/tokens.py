@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from epicycle.actors import EpicycleError
 
+# The field in which a token says of when it is.  No sensor measures that, so what alters all numbers leaves it alone.
+STAMP = "time"
+
 Change = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -19,7 +22,7 @@ class FieldError(EpicycleError):
 
 
 def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
-    """The token with ``change`` applied to its numbers: all of them, or those of the named fields alone.
+    """The token with ``change`` applied to its numbers: all but the time in its field ``time``, or the named fields.
 
     A token may be a number, an array, a list or tuple of these, a dataclass or a dict.  Texts and truth values stay as
     they are, and an integer stays an integer (rounded to even).  Raises ``FieldError``.
@@ -31,6 +34,20 @@ def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
     if isinstance(token, dict):
         return {name: _changed(value, change) if name in fields else value for name, value in token.items()}
     return dataclasses.replace(token, **{name: _changed(getattr(token, name), change) for name in fields})
+
+
+def stamped_as(token: Any, other: Any) -> Any:
+    """A token with the time of another one, if both say of when they are."""
+    if isinstance(token, dict) and isinstance(other, dict):
+        return {**token, STAMP: other[STAMP]} if STAMP in token and STAMP in other else token
+    if _has_stamp(token) and _has_stamp(other):
+        return dataclasses.replace(token, **{STAMP: getattr(other, STAMP)})
+    return token
+
+
+def _has_stamp(token: Any) -> bool:
+    is_record = dataclasses.is_dataclass(token) and not isinstance(token, type)
+    return is_record and any(each.name == STAMP for each in dataclasses.fields(token))
 
 
 def field_of(token: Any, name: str, advice: str = "") -> Any:
@@ -80,8 +97,8 @@ def _changed(value: Any, change: Change) -> Any:
     if isinstance(value, (list, tuple)):
         return type(value)([_changed(item, change) for item in value])
     if isinstance(value, dict):
-        return {key: _changed(item, change) for key, item in value.items()}
+        return {key: item if key == STAMP else _changed(item, change) for key, item in value.items()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        names = [each.name for each in dataclasses.fields(value)]
+        names = [each.name for each in dataclasses.fields(value) if each.name != STAMP]
         return dataclasses.replace(value, **{name: _changed(getattr(value, name), change) for name in names})
     raise FieldError(f"a token of type {type(value).__name__} holds no numbers to alter")

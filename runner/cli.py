@@ -8,20 +8,29 @@ from collections.abc import Callable, Sequence
 
 from .collection import seldom_collecting
 from .commands import COMMANDS
-from .commands.options import BAD_INPUT, FAILED, INTERRUPTED, complain
+from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
+from .leaving import leave
+from .printing import complain, complain_traceback, open_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:  # as a program, not called by one
+        return leave(main(sys.argv[1:]))
+    open_streams()
+    given = list(arguments)
     options = parser().parse_args(given)
     command: Callable[[argparse.Namespace, list[str]], int] = options.command
     from epicycle.actors import EpicycleError
 
     try:
         with seldom_collecting():
-            return command(options, given)
+            code = command(options, given)
+        sys.stdout.flush()  # here, where it can be told that it fails
+        return code
     except EpicycleError as error:
+        if options.debug:
+            complain_traceback(error)
         from .engine import ActorError, LoopError  # here, for many commands do without the engine
 
         if isinstance(error, (ActorError, LoopError)):
@@ -52,6 +61,7 @@ def parser() -> argparse.ArgumentParser:
         name = module.__name__.rpartition(".")[2]
         command = commands.add_parser(name, help=module.__doc__, description=module.DESCRIPTION)
         module.add(command)
+        command.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
         command.set_defaults(command=module.run)
     return top
 

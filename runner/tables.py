@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, visible
 
 MAX_ROWS = 40
 
@@ -32,11 +32,12 @@ class Table:
 
 def as_text(caption: str, tables: Iterable[Table]) -> str:
     """The caption and the tables below each other, in columns; tables without rows are left out."""
-    parts = [caption]
+    parts = [visible(caption)]
     for table in tables:
         if not table.rows:
             continue
-        rows, more = table.shown()
+        shown, more = table.shown()
+        rows = [tuple(map(visible, row)) for row in shown]
         widths = [max(len(row[column]) for row in (table.head, *rows)) for column in range(len(table.head))]
         lines = [
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

@@ -39,32 +39,27 @@ DRAWN = "what is drawn or told to people; no digest, token, metric or table come
 FOREIGN = "a foreign library computes; docs/semantics.md says that the promise ends there"
 FRACTIONS = "powers of fractions and whole numbers, which are exact"
 WHOLE = "sums of whole numbers"
-MOVING = "work of this week: the exception goes when the use has gone"
-JUDGED = "intervals and tests over finished runs, by SciPy; no run hangs on them"
 EXCEPTIONS = {  # file or folder: what it may use, and why
     "actors/core/elementary/powers.py": (("**", "pow"), "powers of whole numbers, and the pow of this file"),
     "actors/core/elementary/tables.py": (("sum",), WHOLE),
     "actors/core/quantity.py": (("**",), FRACTIONS),
     "actors/core/units.py": (("**",), FRACTIONS),
     "actors/expression/values.py": (("**",), "of quantities, which say themselves how"),
-    "actors/distributions.py": ((".sum()", "numpy.cumsum", "numpy.exp"), MOVING),
     "actors/logic.py": (("sum",), WHOLE),
     "actors/robotics/casadi_solver.py": (("casadi", "sum", "**", "numpy.cumsum"), FOREIGN),
     "actors/robotics/filterpy_estimator.py": (("filterpy", "numpy.linalg"), FOREIGN),
     "actors/robotics/messages.py": (("sum",), "only asks whether a sum is finite"),
-    "actors/segment.py": (("scipy", "**"), MOVING),
     "actors/statistics.py": (("**",), FRACTIONS),
     "aspects/crash.py": (("sum",), WHOLE),
     "aspects/tokens.py": (("sum",), WHOLE),
+    "runner/engine/statistic.py": (("sum",), WHOLE),
     "runner/engine/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/model/checks.py": (("sum",), WHOLE),
     "runner/model/problems.py": (("sum",), WHOLE),
+    "runner/columns.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
     "runner/study/claims.py": (("sum",), WHOLE),
     "runner/study/cluster.py": (("sum",), WHOLE),
-    "runner/study/guideline.py": (("numpy.random.default_rng",), JUDGED),
-    "runner/study/statistics.py": (("numpy.mean", "numpy.random.default_rng", "scipy"), JUDGED),
-    "runner/study/variation.py": (("numpy.random.default_rng", "scipy"), "a Latin hypercube is SciPy's"),
 }
 
 

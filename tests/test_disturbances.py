@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from epicycle.aspects import ClockOffset, ExecutionTime, Latency
 from epicycle.runner import ModelError, Results, Simulation, load_model
 from epicycle.runner.cli import main
 from epicycle.runner.model import Problems, packaged_disturbances
@@ -144,8 +145,8 @@ def test_airtime_of_the_shared_radio_grows_with_the_robots() -> None:
     for robots in (1, 3, 5):
         model = load_model("collision_avoidance", set={"observers": robots - 1, "horizon": 3}, disturb="shared_radio")
         share.append(Simulation(model, seed=1).run(until=1.0).aspects["radio"]["utilisation"])
-    # A plan of 3 steps has 1 + 4 + 2 * 4 numbers, a measurement 6, 64 bits each, beside what every message has.
-    airtime = 2 * (242e-6 + 768e-6) + (13 + 6) * 64e-6
+    # A plan of 3 steps has 1 + 5 + 2 * 4 numbers, a measurement 7, 64 bits each, beside what every message has.
+    airtime = 2 * (242e-6 + 768e-6) + (14 + 7) * 64e-6
     assert share[0] == pytest.approx(airtime / 0.1, rel=0.11)  # up to the airtime of the last tick
     for robots, each in ((3, share[1]), (5, share[2])):  # what collides takes its time only once
         assert 0.6 * robots * share[0] < each <= robots * share[0]
@@ -197,6 +198,89 @@ def test_a_controller_that_is_ready_by_the_next_tick_is_fast_enough() -> None:
         states = Simulation(model, seed=1).run(until=2.5).signals["main.state"]
         ways.append([token.position.tolist() for token in states.tokens])
     assert ways[0] == ways[1] != ways[2]
+
+
+def test_every_plan_is_as_old_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How old the controllers take plans to be, against when their makers were where the plans begin: none is wrong."""
+    from epicycle.actors.robotics.numerics import reachability
+    from epicycle.actors.robotics.numerics.warm_up import compile_kernels
+
+    compile_kernels()  # which calls it, too
+    used: list[tuple[float, np.ndarray]] = []
+    original = reachability.peer_tubes
+
+    def watched(plans: np.ndarray, now: float, *rest: Any) -> Any:
+        used.append((now, plans.copy()))
+        return original(plans, now, *rest)
+
+    monkeypatch.setattr(reachability, "peer_tubes", watched)
+    ages = wrong = 0
+    for seed in (1, 2):
+        used.clear()
+        model = load_model("collision_avoidance", set={"observers": 3}, disturb="slow_controller")
+        results = Simulation(model, seed=seed, keep_log=True).run()
+        when: dict[tuple[float, ...], list[int]] = {}
+        for record in results.log.records:
+            if record.port == "state" and record.actor.endswith(".vehicle"):
+                place = (*record.value.position.tolist(), *record.value.velocity.tolist())
+                when.setdefault(place, []).append(record.tag.time)
+        plans = [record.value for record in results.log.records if record.port == "plan"]
+        assert all(plan.time == plan.state.time for plan in plans)
+        assert len(plans) == len(used)
+        for plan, (now, known) in zip(plans, used, strict=True):
+            solved_for = when[*plan.state.position.tolist(), *plan.state.velocity.tolist()]
+            for row in known:
+                made_at = when[tuple(row[:4].tolist())]
+                if len(solved_for) == len(made_at) == 1:  # at the start, robots stand where they were
+                    ages += 1
+                    wrong += round((solved_for[0] - made_at[0]) / 1e8) != round((now - row[4]) / 0.1)
+    assert ages > 900
+    assert wrong == 0
+
+
+@pytest.mark.parametrize("time", ["60 ms", {"trigger": "60 ms", "peer_plans": 0}])
+def test_controllers_that_take_60_ms_bring_every_run_home(time: Any) -> None:
+    """Only solving takes them time; if hearing a plan did, too, they would be busy for longer than there is time."""
+    arrivals = []
+    for seed in range(1, 7):
+        model = load_model("collision_avoidance", set={"observers": 3})
+        model.weave("slow", ExecutionTime(time=time), at="**.controller")
+        arrivals.append(Simulation(model, seed=seed).run().metrics["arrival_time"])
+    assert all(4.5 < arrival < 6.0 for arrival in arrivals), arrivals
+
+
+def test_a_robot_whose_clock_is_wrong_trusts_its_own_data() -> None:
+    """A second ahead in all that it says, it fuses its own measurements in time, and its estimates are fresh to it."""
+    alone = load_model("collision_avoidance", set={"observers": 0})
+    right = Simulation(alone, seed=1, keep_log=True).run(until=2)
+    alone.weave("ahead", ClockOffset(offset=1), at="main")
+    wrong = Simulation(alone, seed=1, keep_log=True).run(until=2)
+    estimates = values(wrong, "main.estimator", "estimate")
+    for tick, expected in values(right, "main.estimator", "estimate").items():
+        assert estimates[tick].time == pytest.approx(expected.time + 1)
+        assert estimates[tick].mean.tolist() == pytest.approx(expected.mean.tolist())
+    assert values(wrong, "main.estimator", "too_late") == {}
+    here, there = (values(run, "main.vehicle", "state")[20].position for run in (right, wrong))
+    assert there == pytest.approx(here, abs=1e-6)
+
+
+def test_an_estimate_that_is_late_is_not_taken_for_fresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    from epicycle.actors.robotics.numerics import reachability
+    from epicycle.actors.robotics.numerics.warm_up import compile_kernels
+
+    compile_kernels()
+    ages: list[float] = []
+    original = reachability.expected_target
+
+    def watched(*arguments: Any) -> Any:
+        ages.append(arguments[-2])
+        return original(*arguments)
+
+    monkeypatch.setattr(reachability, "expected_target", watched)
+    model = load_model("collision_avoidance", set={"observers": 0})
+    model.weave("late", Latency(delay=0.4), at="main.controller.estimate")
+    Simulation(model, seed=1).run(until=2)
+    assert ages == pytest.approx([0.4] * 17)  # from 0.4 s on
 
 
 @pytest.mark.parametrize("latency", ["1 us", "30 ms"])

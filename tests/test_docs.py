@@ -25,6 +25,7 @@ import pytest
 from epicycle.runner import ModelError, Simulation, load_model
 from epicycle.runner.cli import main
 from epicycle.runner.model.catalogue import built_in
+from epicycle.runner.model.measure import TAKES, TIME, TOKENS
 from epicycle.runner.study import Plan, read_study
 
 ROOT = Path(__file__).parent.parent
@@ -189,6 +190,17 @@ def test_every_aspect_is_in_the_table_of_families() -> None:
     document = (ROOT / "docs" / "aspects.md").read_text(encoding="utf-8")
     families = "".join(line for line in document[: document.index("\n## ")].splitlines() if line.startswith("| "))
     assert set(re.findall(r"`([A-Z]\w+)`", families)) == set(built_in().aspects)
+
+
+def test_every_metric_counts_what_the_table_says() -> None:
+    document = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"^\| counts tokens .*\n\|-.*\n((?:\|.*\n)+)", document, re.M)
+    found: dict[str, set[str]] = {TOKENS: set(), TIME: set()}
+    for row in table.splitlines():
+        _, of_tokens, _, of_time, *_ = row.split("|")
+        found[TOKENS] |= set(re.findall(r"`(\w+)`", of_tokens)) - {"p", "when"}
+        found[TIME] |= set(re.findall(r"`(\w+)`", of_time)) - {"p", "when"}
+    assert found == {over: {name for name, each in TAKES.items() if each.over == over} for over in (TOKENS, TIME)}
 
 
 def refresh(path: Path) -> None:

@@ -23,9 +23,10 @@ def test_packaged_model_runs(name: str) -> None:
 def test_scenario_runs_for_any_number_of_observers(observers: int) -> None:
     model = load_model("collision_avoidance", set=[f"observers={observers}", "disturbance=0.5"])
     results = Simulation(model, seed=3).run(until=1.0)
-    for name, signal in results.signals.items():
-        if name.endswith(".state"):
-            assert all(math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity))
+    states = [signal for name, signal in results.signals.items() if name.endswith(".state")]
+    assert [len(signal.tokens) for signal in states] == [11] * (observers + 2)
+    for signal in states:
+        assert all(math.isfinite(x) for token in signal.tokens for x in (*token.position, *token.velocity))
 
 
 def test_scenario_parameters_reach_every_robot() -> None:
@@ -36,6 +37,8 @@ def test_scenario_parameters_reach_every_robot() -> None:
             "measurement_range=15 m",
             "observer[*].sensor.max_range=5 m",
             "safe_distance=2.5",
+            "kappa=0.5",
+            "velocity_noise=0.3",
         ],
     )
     actors = model.graph.actors
@@ -46,6 +49,9 @@ def test_scenario_parameters_reach_every_robot() -> None:
         5.0,
     ]
     assert actors["main.controller"].safe_distance == 2.5  # type: ignore[attr-defined]
+    # What a filter and a controller assume of the obstacle is one.
+    parts = [actors[f"{robot}.{part}"] for robot in ("main", "observer[1]") for part in ("estimator", "controller")]
+    assert {(part.kappa, part.velocity_noise) for part in parts} == {(0.5, 0.3)}  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("kind", ["relative_position", "range"])

@@ -243,6 +243,72 @@ def busy_folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+PROGRAM = """
+from epicycle.actors import Actor, InputPort, OutputPort, Parameter, PoissonClock
+from epicycle.aspects import JoinPoint, MeasurementAspect
+from epicycle.runner import Model, Results, Simulation
+
+
+class Gain(Actor):
+    input = InputPort(float)
+    output = OutputPort(float)
+    factor = Parameter(float, 1.0)
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self.output.send(self.factor * token)
+
+
+class Twice(MeasurementAspect):
+    def pass_token(self, token: float, point: JoinPoint) -> None:
+        point.forward(2 * token)
+
+
+model = Model("gain", stop="1 min")
+clock = model.add(PoissonClock("clock", mean_interval="1 s"))
+gain = model.add(Gain("gain"))
+model.connect(clock.output, gain.input)
+model.weave("twice", Twice(), at=gain.output)
+results: Results = Simulation(model).run()
+reveal_type(gain.factor)
+reveal_type(gain.input.value)
+gain.output.send("text")
+"""
+
+
+def types_of_a_program(folder: Path, python: object) -> str:
+    """What mypy says of a user's program, written in a folder of its own."""
+    (folder / "program.py").write_text(PROGRAM, "utf-8")
+    words = [sys.executable, "-m", "mypy", "--strict", "--python-executable", str(python), "program.py"]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    return done.stdout
+
+
+EXPECTED_TYPES = """\
+program.py:28: note: Revealed type is "float"
+program.py:29: note: Revealed type is "float"
+program.py:30: error: Argument 1 to "send" of "OutputPort" has incompatible type "str"; expected "float"  [arg-type]
+Found 1 error in 1 file (checked 1 source file)
+"""
+
+
+@pytest.mark.slow
+def test_mypy_finds_the_types_of_what_make_installs(tmp_path: Path) -> None:
+    if not Path(sys.prefix, "linked").exists():
+        pytest.skip("this environment was not made by make")
+    assert types_of_a_program(tmp_path, sys.executable) == EXPECTED_TYPES
+
+
+@pytest.mark.slow
+def test_mypy_finds_the_types_of_the_wheel(wheel: Path, tmp_path: Path) -> None:
+    venv.create(tmp_path / "environment", symlinks=os.name != "nt")
+    at = {"base": str(tmp_path / "environment"), "platbase": str(tmp_path / "environment")}
+    python = Path(sysconfig.get_path("scripts", "venv", at)) / "python"
+    pip("--python", python, "install", "--no-deps", "--no-index", wheel)
+    assert types_of_a_program(tmp_path, python) == EXPECTED_TYPES
+
+
 def pip(*arguments: object) -> None:
     command = [sys.executable, "-m", "pip", "--disable-pip-version-check", *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

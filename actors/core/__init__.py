@@ -4,6 +4,7 @@ from . import elementary
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
+from .laws import normal_quantile, normal_share
 from .mapping import MappingParameter
 from .nearest import did_you_mean, nearest
 from .parameter import (
@@ -20,13 +21,15 @@ from .parameter import (
 from .port_parameter import PortParameter
 from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
 from .process import Process
-from .quantity import Quantity, counted_in_si, plain
-from .random import random_stream
+from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
+from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
+from .visible import readable, shortened, visible, visible_character, visible_lines
 from .words import counted
 
 __all__ = [
+    "MAX_DEPTH",
     "NANOSECONDS_PER_SECOND",
     "REQUIRED",
     "Actor",
@@ -43,6 +46,7 @@ __all__ = [
     "PortParameter",
     "Process",
     "Quantity",
+    "Stream",
     "Tag",
     "UnitError",
     "Wake",
@@ -57,18 +61,26 @@ __all__ = [
     "elementary",
     "has_own_ports",
     "irregular",
+    "is_too_deep",
     "nearest",
+    "normal_quantile",
+    "normal_share",
     "open_regular",
     "parse_unit",
     "plain",
     "random_stream",
     "read_regular",
     "read_table",
+    "readable",
     "shaped",
+    "shortened",
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
     "type_name",
     "unknown_parameter",
     "variants",
+    "visible",
+    "visible_character",
+    "visible_lines",
 ]

@@ -32,12 +32,10 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Protocol
 from weakref import WeakKeyDictionary
 
-import numpy as np
-
 from .parameter import Configurable, ParameterError
 from .port_parameter import ParameterPort, PortParameter
 from .ports import InputPort, OutputPort, PortError
-from .random import random_stream
+from .random import Stream, random_stream
 from .tag import Tag, to_nanoseconds, to_seconds
 
 
@@ -106,6 +104,11 @@ class Actor(Configurable):
     # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.
     is_source: ClassVar[bool] = False
 
+    @property
+    def is_endless(self) -> bool:
+        """Whether it is known to drive itself for ever, so that a run has to be ended by something else."""
+        return False
+
     def __init__(self, path: str, **parameters: object) -> None:
         try:
             super().__init__(**parameters)
@@ -114,7 +117,7 @@ class Actor(Configurable):
         self.path = path
         self.home: object | None = None  # the graph that it is part of
         self.context: Context = _NoContext(self)  # the run that the actor is part of
-        self._streams: dict[str, np.random.Generator] = {}
+        self._streams: dict[str, Stream] = {}
         self.inputs: dict[str, InputPort[Any]] = {}
         self.outputs: dict[str, OutputPort[Any]] = {}
         for name, port in declared_ports(type(self)).items():
@@ -196,11 +199,11 @@ class Actor(Configurable):
         return to_seconds(self.context.tag.time)
 
     @property
-    def random(self) -> np.random.Generator:
+    def random(self) -> Stream:
         """The actor's own random stream."""
         return self.random_stream("")
 
-    def random_stream(self, purpose: str) -> np.random.Generator:
+    def random_stream(self, purpose: str) -> Stream:
         """A random stream of the actor's for one purpose, independent of all others."""
         if purpose not in self._streams:
             self._streams[purpose] = random_stream(self.context.seed, self.path, purpose)

@@ -31,5 +31,5 @@ class MappingParameter(Parameter[Any]):
             try:
                 converted[name] = self.item.convert(each)
             except ParameterError as error:
-                raise ParameterError(f"{name}: {error}") from None
+                raise ParameterError(f"{name}: {error}", (name, *error.keys), of_key=error.of_key) from None
         return converted

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import EpicycleError
 from .nearest import did_you_mean
-from .quantity import Quantity, counted_in_si
+from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
 
 T = TypeVar("T")
@@ -42,6 +42,7 @@ class _Required:
 
 
 REQUIRED: Any = _Required()
+_EXACT = 2**53  # up to which all whole numbers are floats
 _WORDS: dict[Any, str] = {
     float: "number",
     int | float: "number",
@@ -179,6 +180,8 @@ class Parameter(Generic[T]):
 
     def _scalar(self, value: object) -> object:
         if self.type is object:
+            if is_too_deep(value):
+                raise ParameterError(f"nested deeper than {MAX_DEPTH} levels")
             return counted_in_si(value)
         if self.type is Path:
             if isinstance(value, (str, Path)) and str(value) and "\0" not in str(value):
@@ -234,11 +237,23 @@ class Parameter(Generic[T]):
 
     def _array(self, value: object) -> NDArray[np.float64]:
         assert self.shape is not None
-        array = np.array(self._rows(value, self.shape, value), dtype=float)
+        rows = value if self._is_plain_row(value) else self._rows(value, self.shape, value)
+        array = np.array(rows, dtype=float)
         if array.size == 0:
             array = array.reshape([0 if size is None else size for size in self.shape])
         array.flags.writeable = False
         return array
+
+    def _is_plain_row(self, value: object) -> bool:
+        """Whether this is a list of plain numbers within bounds: there may be very many, of which most lists are."""
+        if self.shape != (None,) or self.type is not float or not isinstance(value, (list, tuple)):
+            return False
+        if not value or not {float, int}.issuperset(map(type, value)):
+            return False
+        if any(isinstance(each, int) and abs(each) > _EXACT for each in value) or any(map(math.isnan, value)):
+            return False
+        low, high = min(value), max(value)
+        return (self.min is None or low >= self.min) and (self.max is None or high <= self.max)
 
     def _rows(self, value: object, shape: tuple[int | None, ...], whole: object) -> object:
         if not shape:

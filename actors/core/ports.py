@@ -66,7 +66,8 @@ class InputPort(_Port[T]):
 
     ``shape`` is that of a ``numpy`` array, as for parameters: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
     ``required``: the model is wrong when nothing is connected to it.  ``multi``: any number of connections, each a
-    channel, in the order in which they are declared.
+    channel, in the order in which they are declared.  ``triggers``: a token makes the actor do its work; if not, the
+    actor only takes note of it, which takes no time, and works with it later.
     """
 
     direction = "input"
@@ -79,11 +80,18 @@ class InputPort(_Port[T]):
         shape: tuple[int | None, ...] | None = ...,
         multi: bool = ...,
         required: bool = ...,
+        triggers: bool = ...,
         doc: str = ...,
     ) -> None: ...
     @overload  # unions and other types that are no classes
     def __init__(
-        self: InputPort[Any], type: object, *, multi: bool = ..., required: bool = ..., doc: str = ...
+        self: InputPort[Any],
+        type: object,
+        *,
+        multi: bool = ...,
+        required: bool = ...,
+        triggers: bool = ...,
+        doc: str = ...,
     ) -> None: ...
     def __init__(
         self,
@@ -92,10 +100,12 @@ class InputPort(_Port[T]):
         shape: tuple[int | None, ...] | None = None,
         multi: bool = False,
         required: bool = True,
+        triggers: bool = True,
         doc: str = "",
     ) -> None:
         super().__init__(type, shape=shape, multi=multi, doc=doc)
         self.required = required
+        self.triggers = triggers
         self.width = 0
         self._arriving: tuple[list[T], list[int]] = [], []  # the same two lists all the time
         self._tokens, self._channels = self._arriving
@@ -134,6 +144,11 @@ class InputPort(_Port[T]):
         """Engine: what to call when a token arrives, first with the token and then with its channel."""
         tokens, channels = self._arriving
         return tokens.append, channels.append
+
+    @property
+    def arrived(self) -> list[int]:
+        """Engine: the channels of the tokens that have arrived, shown or not; the same list all the time."""
+        return self._arriving[1]
 
     def clear(self) -> None:
         """Engine: forget the tokens that are shown."""

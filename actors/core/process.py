@@ -35,7 +35,7 @@ class Process(Actor):
         # Weak, so that a read that lost a race is forgotten as soon as the process has.
         self._reads: list[tuple[str, ReferenceType[Event]]] = []
         self._queued: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
-        self.failure: Exception | None = None
+        self.failure: BaseException | None = None
         start = self.wait(0.0)
         self.process = SimPyProcess(self.environment, self._behave(start))
 
@@ -43,7 +43,9 @@ class Process(Actor):
         yield start
         try:
             yield from self.run()
-        except Exception as error:
+        except (GeneratorExit, KeyboardInterrupt):
+            raise
+        except BaseException as error:
             self.failure = error  # SimPy raises a copy of it later, from which the actor cannot be told
             raise
 

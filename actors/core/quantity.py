@@ -9,6 +9,8 @@ from typing import Any
 from .elementary import power as power_of
 from .units import UnitError, between, is_compound, parse_unit
 
+MAX_DEPTH = 100  # of lists and mappings in each other, in files and in what expressions make of them
+
 
 class Quantity(float):
     """A float that is counted in ``unit``.
@@ -39,13 +41,13 @@ class Quantity(float):
         number = float(self)
         if unit == self.unit:
             return number
-        return _times(number, *between(self.unit, unit, f"{number:g} {self.unit}"))
+        return _times(number, *between(self.unit, unit, f"{number:g} {self.unit}"), self.unit, unit)
 
     @property
     def si(self) -> float:
         """The number counted in SI units."""
         unit = parse_unit(self.unit)
-        return _times(float(self), unit.scale, unit.pi_power)
+        return _times(float(self), unit.scale, unit.pi_power, self.unit, "SI units")
 
     def _beside(self, other: float) -> float:
         """The other side of a sum or comparison, in this unit."""
@@ -130,11 +132,14 @@ class Quantity(float):
     __hash__ = float.__hash__
 
 
-def _times(number: float, factor: Fraction, pi_power: int) -> float:
+def _times(number: float, factor: Fraction, pi_power: int, unit: str, wanted: str) -> float:
     if not math.isfinite(number) or (factor == 1 and not pi_power):
         return number
     exact = Fraction(number) * factor
-    return float(exact * Fraction(math.pi) ** pi_power if pi_power else exact)
+    try:
+        return float(exact * Fraction(math.pi) ** pi_power if pi_power else exact)
+    except OverflowError:
+        raise UnitError(f"{number:g} {unit} is too large for a number in {wanted}") from None
 
 
 def _in(number: float, unit: str, sign: str, other: float) -> float:
@@ -147,7 +152,7 @@ def _in(number: float, unit: str, sign: str, other: float) -> float:
     if _is_readable(text):
         return Quantity(number, text)
     whole = parse_unit(unit) * parse_unit(other.unit) ** (1 if sign == "*" else -1)
-    return _times(number, whole.scale, whole.pi_power)
+    return _times(number, whole.scale, whole.pi_power, text, "SI units")
 
 
 def _is_readable(unit: str) -> bool:
@@ -155,6 +160,18 @@ def _is_readable(unit: str) -> bool:
         parse_unit(unit)
     except UnitError:  # powers, or a text, without end
         return False
+    return True
+
+
+def is_too_deep(value: object) -> bool:
+    """Whether lists and mappings stand in each other at more than ``MAX_DEPTH`` levels."""
+    level: list[Any] = [value]
+    for _ in range(MAX_DEPTH + 1):
+        # What several share is looked at once, or else a few could hold more than can be counted.
+        holders = {id(each): each for each in level if isinstance(each, (list, tuple, dict))}.values()
+        if not holders:
+            return False
+        level = [inner for each in holders for inner in (each.values() if isinstance(each, dict) else each)]
     return True
 
 

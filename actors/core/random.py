@@ -2,17 +2,365 @@
 
 The key of a stream is a hash of its names, so adding, removing or reordering actors and aspects moves no other
 stream, and neither ``PYTHONHASHSEED`` nor the worker count can.
+
+NumPy promises the bits of its bit generators for all versions and machines, but not what its distributions make of
+them.  So only the bits are NumPy's (PCG64); every law is our own (``laws``), and draws the same numbers everywhere.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
+from collections.abc import Callable, MutableSequence, Sequence
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from . import laws
+from .nearest import did_you_mean
+
+Size = int | Sequence[int] | None
+
+_STEP: Final = 1 / 2**53  # from one number of ``random`` to the next
+_MOST: Final = 64  # words taken from the generator at once, which costs a tenth of taking them one by one
+_PLAIN: Final = frozenset({float, int, bool})
 
 
-def random_stream(seed: int, path: str, purpose: str = "") -> np.random.Generator:
-    """The generator that belongs to one purpose of one actor or aspect in one run."""
+class RandomStream:
+    """Random numbers of one purpose, with the methods of ``numpy.random.Generator`` and bits that never change.
+
+    Parameters may be arrays, and ``size`` asks for an array; its values are drawn one by one in C order, so that
+    ``normal(size=3)`` gives what three calls give.  A law with a closed inverse takes one word of 64 bits for a value
+    and grows with it, so streams stay in step when only parameters differ (common random numbers).
+
+    What differs from NumPy: the numbers, but those of ``random`` and ``uniform``; ``choice``, ``shuffle`` and
+    ``permutation`` know the first axis only; rare laws are missing.  Raises ``ValueError`` for parameters out of range.
+    """
+
+    __slots__ = ("_ahead", "_bits", "_block")
+
+    def __init__(self, bits: np.random.PCG64) -> None:
+        self._bits = bits
+        self._ahead: list[int] = []  # words that have been taken already, the next one last
+        self._block = 4
+
+    def __repr__(self) -> str:
+        return f"<Stream {self.state}>"
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_") and hasattr(np.random.Generator, name):
+            known = [each for each in vars(RandomStream) if not each.startswith("_")]
+            raise AttributeError(
+                f"a random stream has no {name!r}{did_you_mean(name, known)}, as what NumPy makes of it depends on its "
+                f"version and the machine; there are {', '.join(sorted(known))}"
+            )
+        raise AttributeError(f"a random stream has no {name!r}")
+
+    @property
+    def state(self) -> tuple[int, int]:
+        """Where the stream stands: the state of PCG64 before the next word, and its increment."""
+        bits = np.random.PCG64()
+        bits.state = self._bits.state
+        inner = bits.advance(-len(self._ahead)).state["state"]
+        return int(inner["state"]), int(inner["inc"])
+
+    # -- bits ------------------------------------------------------------------------------------------------------
+
+    def word(self) -> int:
+        """The next 64 random bits, as a number that is not negative."""
+        if not self._ahead:
+            self._block = min(2 * self._block, _MOST)
+            self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
+        return self._ahead.pop()
+
+    def below(self, bound: int) -> int:
+        """An integer of 0, 1, ..., ``bound`` - 1, all alike.
+
+        Source: D. Lemire, Fast Random Integer Generation in an Interval, ACM TOMACS 29, 2019.
+        """
+        if bound > 1 << 64:
+            # A value of many words at a time, until one lies below the bound.
+            words = (bound.bit_length() + 63) // 64
+            while True:
+                value = 0
+                for _ in range(words):
+                    value = value << 64 | self.word()
+                value >>= 64 * words - bound.bit_length()
+                if value < bound:
+                    return value
+        product = self.word() * bound
+        low = product & 0xFFFF_FFFF_FFFF_FFFF
+        if low < bound:
+            refused = (1 << 64) % bound
+            while low < refused:
+                product = self.word() * bound
+                low = product & 0xFFFF_FFFF_FFFF_FFFF
+        return product >> 64
+
+    def _words(self, count: int) -> np.ndarray[Any, np.dtype[np.uint64]]:
+        """The next words, as an array."""
+        ahead = [self._ahead.pop() for _ in range(min(count, len(self._ahead)))]
+        return np.append(np.array(ahead, np.uint64), self._bits.random_raw(count - len(ahead)))
+
+    def _many_below(self, bound: int, count: int) -> np.ndarray[Any, np.dtype[np.uint64]]:
+        """What ``below`` gives so many times, for a bound of 32 bits at most; many times as fast."""
+        found = np.empty(0, np.uint64)
+        while len(found) < count:
+            words, factor, half = self._words(count - len(found)), np.uint64(bound), np.uint64(32)
+            high = ((words >> half) * factor + ((words & np.uint64(0xFFFF_FFFF)) * factor >> half)) >> half
+            found = np.append(found, high[words * factor >= np.uint64((1 << 64) % bound)])
+        return found
+
+    def bytes(self, length: int) -> bytes:
+        """So many random bytes."""
+        words = b"".join(self.word().to_bytes(8, "little") for _ in range(-(-length // 8)))
+        return words[:length]
+
+    # -- numbers ---------------------------------------------------------------------------------------------------
+
+    def random(self, size: Size = None) -> Any:
+        """Uniform in [0, 1), a multiple of 2^-53."""
+        if size is None:
+            return (self.word() >> 11) * _STEP
+        shape = _shape(size)
+        return (self._words(math.prod(shape)) >> np.uint64(11)).reshape(shape) * _STEP
+
+    def integers(
+        self,
+        low: ArrayLike,
+        high: ArrayLike | None = None,
+        size: Size = None,
+        dtype: Any = np.int64,
+        endpoint: bool = False,
+    ) -> Any:
+        """Integers from ``low`` up to, but not including, ``high`` (with ``endpoint`` including it); or from 0."""
+        low, high = (0, low) if high is None else (low, high)
+        if size is not None and isinstance(low, int) and isinstance(high, int) and 0 < high - low + endpoint < 1 << 32:
+            shape = _shape(size)
+            drawn = self._many_below(high - low + endpoint, math.prod(shape)).astype(dtype)
+            return drawn.reshape(shape) + np.asarray(low, dtype)
+
+        def draw(low: int, high: int) -> int:
+            count = int(high) - int(low) + endpoint
+            if count <= 0:
+                raise ValueError(f"there is no integer from {low} to {high}{'' if endpoint else ', which is left out'}")
+            return int(low) + self.below(count)
+
+        return self._drawn(draw, size, low, high, dtype=dtype)
+
+    def choice(self, a: Any, size: Size = None, replace: bool = True, p: ArrayLike | None = None) -> Any:
+        """One of the elements of ``a``, or of 0 ... ``a`` - 1; with weights ``p``; several with ``size``."""
+        items = np.arange(a) if isinstance(a, (int, np.integer)) else a
+        count = len(items)
+        if not count:
+            raise ValueError("there is nothing to choose from")
+        weights = None if p is None else np.asarray(p, float).ravel().tolist()
+        if weights is not None and len(weights) != count:
+            raise ValueError(f"{len(weights)} weights are given for {count} elements")
+        sums = None if weights is None else laws.cumulated(weights)
+        if size is None:
+            return items[self.below(count) if sums is None else laws.weighted(self, sums)]
+        shape = _shape(size)
+        wanted = math.prod(shape)
+        if not replace:
+            draws = laws.without_replacement(self, count, wanted, weights)
+        else:
+            draws = [self.below(count) if sums is None else laws.weighted(self, sums) for _ in range(wanted)]
+        chosen = np.asarray(items)[np.array(draws, np.int64)]
+        return chosen.reshape(*shape, *chosen.shape[1:])
+
+    def shuffle(self, x: MutableSequence[Any] | np.ndarray[Any, Any]) -> None:
+        """Put a list or the rows of an array into random order, in place."""
+        if isinstance(x, np.ndarray):
+            x[...] = x[self.permutation(len(x))]
+            return
+        for last in range(len(x) - 1, 0, -1):
+            other = self.below(last + 1)
+            x[last], x[other] = x[other], x[last]
+
+    def permutation(self, x: Any) -> Any:
+        """The numbers 0 ... ``x`` - 1, or the elements of a sequence, in random order, as an array."""
+        if not isinstance(x, (int, np.integer)):
+            items = np.asarray(x)
+            return items[self.permutation(len(items))]
+        order = list(range(x))
+        self.shuffle(order)
+        return np.array(order, np.int64)
+
+    # -- laws with a closed inverse: one word a value -----------------------------------------------------------------
+
+    def uniform(self, low: ArrayLike = 0.0, high: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Uniform in [low, high)."""
+        return self._drawn(lambda low, high: low + (high - low) * ((self.word() >> 11) * _STEP), size, low, high)
+
+    def standard_normal(self, size: Size = None) -> Any:
+        """Normal with mean 0 and variance 1."""
+        return self._law(laws.standard_normal, size)
+
+    def normal(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Normal (Gaussian) with mean ``loc`` and standard deviation ``scale``."""
+        return self._law(laws.normal, size, loc, scale)
+
+    def lognormal(self, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Positive, with a normal logarithm of this mean and standard deviation."""
+        return self._law(laws.lognormal, size, mean, sigma)
+
+    def standard_exponential(self, size: Size = None) -> Any:
+        """Exponential with mean 1."""
+        return self._law(laws.standard_exponential, size)
+
+    def exponential(self, scale: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Exponential with mean ``scale``."""
+        return self._law(laws.exponential, size, scale)
+
+    def weibull(self, a: ArrayLike, size: Size = None) -> Any:
+        """Weibull with shape ``a`` and scale 1."""
+        return self._law(laws.weibull, size, a)
+
+    def pareto(self, a: ArrayLike, size: Size = None) -> Any:
+        """Lomax (Pareto II) with shape ``a``, from 0 on; add 1 for the classical law from 1 on."""
+        return self._law(laws.pareto, size, a)
+
+    def power(self, a: ArrayLike, size: Size = None) -> Any:
+        """In [0, 1], with density ``a * x^(a - 1)``."""
+        return self._law(laws.power, size, a)
+
+    def rayleigh(self, scale: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Rayleigh: the length of a plane vector of two normal numbers with deviation ``scale``."""
+        return self._law(laws.rayleigh, size, scale)
+
+    def laplace(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Laplace (double exponential) with variance ``2 * scale^2``."""
+        return self._law(laws.laplace, size, loc, scale)
+
+    def logistic(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Logistic."""
+        return self._law(laws.logistic, size, loc, scale)
+
+    def gumbel(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Gumbel's law of greatest values."""
+        return self._law(laws.gumbel, size, loc, scale)
+
+    def standard_cauchy(self, size: Size = None) -> Any:
+        """Cauchy with mode 0."""
+        return self._law(laws.standard_cauchy, size)
+
+    def triangular(self, left: ArrayLike, mode: ArrayLike, right: ArrayLike, size: Size = None) -> Any:
+        """Triangular over [left, right] with its top at ``mode``."""
+        return self._law(laws.triangular, size, left, mode, right)
+
+    def geometric(self, p: ArrayLike, size: Size = None) -> Any:
+        """How many trials it takes until one of probability ``p`` succeeds: 1, 2, ..."""
+        return self._law(laws.geometric, size, p, dtype=np.int64)
+
+    # -- laws that draw until a value is accepted ---------------------------------------------------------------------
+
+    def standard_gamma(self, shape: ArrayLike, size: Size = None) -> Any:
+        """Gamma with scale 1."""
+        return self._law(laws.standard_gamma, size, shape)
+
+    def gamma(self, shape: ArrayLike, scale: ArrayLike = 1.0, size: Size = None) -> Any:
+        """Gamma with mean ``shape * scale``; with a whole shape it is Erlang's law."""
+        return self._law(laws.gamma, size, shape, scale)
+
+    def chisquare(self, df: ArrayLike, size: Size = None) -> Any:
+        """Chi-square with ``df`` degrees of freedom."""
+        return self._law(laws.chisquare, size, df)
+
+    def beta(self, a: ArrayLike, b: ArrayLike, size: Size = None) -> Any:
+        """Beta over [0, 1] with mean ``a / (a + b)``."""
+        return self._law(laws.beta, size, a, b)
+
+    def standard_t(self, df: ArrayLike, size: Size = None) -> Any:
+        """Student's t with ``df`` degrees of freedom."""
+        return self._law(laws.standard_t, size, df)
+
+    def f(self, dfnum: ArrayLike, dfden: ArrayLike, size: Size = None) -> Any:
+        """Fisher's F with these degrees of freedom."""
+        return self._law(laws.f, size, dfnum, dfden)
+
+    def vonmises(self, mu: ArrayLike, kappa: ArrayLike, size: Size = None) -> Any:
+        """An angle in [-pi, pi] with mean direction ``mu`` and concentration ``kappa``."""
+        return self._law(laws.vonmises, size, mu, kappa)
+
+    def wald(self, mean: ArrayLike, scale: ArrayLike, size: Size = None) -> Any:
+        """Wald (inverse Gaussian)."""
+        return self._law(laws.wald, size, mean, scale)
+
+    def poisson(self, lam: ArrayLike = 1.0, size: Size = None) -> Any:
+        """How many events of a Poisson process come, if ``lam`` do on the average."""
+        return self._law(laws.poisson, size, lam, dtype=np.int64)
+
+    def binomial(self, n: ArrayLike, p: ArrayLike, size: Size = None) -> Any:
+        """How many of ``n`` trials of probability ``p`` succeed."""
+        return self._law(laws.binomial, size, n, p, dtype=np.int64)
+
+    def negative_binomial(self, n: ArrayLike, p: ArrayLike, size: Size = None) -> Any:
+        """How many trials of probability ``p`` fail before the ``n``-th success."""
+        return self._law(laws.negative_binomial, size, n, p, dtype=np.int64)
+
+    # -- vectors -------------------------------------------------------------------------------------------------------
+
+    def multinomial(self, n: int, pvals: ArrayLike, size: Size = None) -> Any:
+        """How often each outcome comes in ``n`` trials with these probabilities; the last one takes what is left."""
+        weights = np.asarray(pvals, float).ravel().tolist()
+        return self._vectors(lambda: laws.multinomial(self, n, weights), len(weights), size, np.int64)
+
+    def dirichlet(self, alpha: ArrayLike, size: Size = None) -> Any:
+        """Shares that add up to 1, with concentrations ``alpha``."""
+        shapes = np.asarray(alpha, float).ravel().tolist()
+        return self._vectors(lambda: laws.dirichlet(self, shapes), len(shapes), size, float)
+
+    def multivariate_normal(self, mean: ArrayLike, cov: ArrayLike, size: Size = None) -> Any:
+        """A normal vector with this mean and covariance (symmetric, positive semidefinite)."""
+        means, root = np.asarray(mean, float).tolist(), laws.square_root(np.asarray(cov, float).tolist())
+        return self._vectors(lambda: laws.multivariate_normal(self, means, root), len(means), size, float)
+
+    # -- shapes --------------------------------------------------------------------------------------------------------
+
+    def _law(self, law: Callable[..., Any], size: Size, *parameters: ArrayLike, dtype: Any = float) -> Any:
+        if size is None and _PLAIN.issuperset(map(type, parameters)):
+            return law(self, *parameters)
+        return self._drawn(lambda *values: law(self, *values), size, *parameters, dtype=dtype)
+
+    def _drawn(self, draw: Callable[..., Any], size: Size, *parameters: ArrayLike, dtype: Any = float) -> Any:
+        """One value of ``draw`` for each element of the parameters, which are broadcast to ``size``."""
+        if size is None and _PLAIN.issuperset(map(type, parameters)):
+            return draw(*parameters)
+        arrays = [np.asarray(each) for each in parameters]
+        shape = np.broadcast_shapes(*(each.shape for each in arrays)) if size is None else _shape(size)
+        columns = [np.broadcast_to(each, shape).ravel().tolist() for each in arrays]
+        if size is None and not shape:
+            return draw(*(column[0] for column in columns))
+        values = map(draw, *columns) if columns else (draw() for _ in range(math.prod(shape)))
+        return np.array(list(values), dtype).reshape(shape)
+
+    def _vectors(self, draw: Callable[[], Sequence[Any]], length: int, size: Size, dtype: Any) -> Any:
+        shape = _shape(size)
+        return np.array([draw() for _ in range(math.prod(shape))], dtype).reshape(*shape, length)
+
+
+def _shape(size: Size) -> tuple[int, ...]:
+    return () if size is None else (int(size),) if isinstance(size, (int, np.integer)) else tuple(size)
+
+
+if TYPE_CHECKING:
+
+    class Stream(np.random.Generator):
+        """A ``RandomStream``, whose methods have the types of NumPy's."""
+
+        state: tuple[int, int]
+
+        def word(self) -> int: ...
+        def below(self, bound: int) -> int: ...
+
+else:
+    Stream = RandomStream
+
+
+def random_stream(seed: int, path: str, purpose: str = "") -> Stream:
+    """The stream that belongs to one purpose of one actor or aspect in one run."""
     digest = hashlib.sha256(f"{path}\0{purpose}".encode()).digest()
     key = tuple(int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4))
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
+    return cast(Stream, RandomStream(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key))))

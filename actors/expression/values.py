@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, Final
 
-from ..core import Quantity, counted, did_you_mean, elementary
+from ..core import MAX_DEPTH, Quantity, counted, did_you_mean, elementary
 
 MAX_STEPS = 100_000
 MAX_ELEMENTS = 100_000
@@ -58,16 +58,21 @@ class Budget:
 
 def _size(value: object) -> int:
     """Count the elements at all levels, shared ones as often as they appear; a text counts by its length."""
-    size = 0
-    stack = [value]
-    while stack:
-        item = stack.pop()
-        if isinstance(item, str):
-            size += len(item) // 10
-        elif isinstance(item, (list, tuple, dict)):
-            size += len(item)
-            _check_elements(size)
-            stack += item.values() if isinstance(item, dict) else item
+    size = depth = 0
+    level = [value]
+    while level:
+        inner: list[object] = []
+        for item in level:
+            if isinstance(item, str):
+                size += len(item) // 10
+            elif isinstance(item, (list, tuple, dict)):
+                size += len(item)
+                _check_elements(size)
+                inner += item.values() if isinstance(item, dict) else item
+        level = inner
+        depth += 1
+        if depth > MAX_DEPTH and level:
+            raise BudgetError(f"nested deeper than {MAX_DEPTH} levels")
     _check_elements(size)
     return size
 
@@ -93,7 +98,9 @@ def check_result(value: object) -> None:
         item = stack.pop()
         if isinstance(item, float) and math.isnan(item):
             raise ValueError("the result is not a number (NaN)")
-        if isinstance(item, int):
+        if isinstance(item, Quantity):
+            item.si  # noqa: B018  raises what would be raised wherever it counts in SI units
+        elif isinstance(item, int):
             _checked(item)
         elif isinstance(item, (list, tuple, dict)):
             stack += item.values() if isinstance(item, dict) else item

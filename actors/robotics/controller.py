@@ -12,6 +12,7 @@ from ..core.elementary import hypot
 from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing, read_only
 from .objectives import Objective, ReachGoal
 from .solvers import Barrier, Solver
+from .target_model import TargetModel
 
 if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem
@@ -24,7 +25,7 @@ _MADE_AT, _CONTROLS = 4, 6  # columns of a table of plans, see ``peer_tubes``
 class _Standing(NamedTuple):
     """The plan that the controller made last; made an infinite time ago, nothing is left of it."""
 
-    made_at: float  # s
+    made_at: float  # s, the time of the state that it began from
     position: Array  # (2,) and velocity at step 1 from made_at
     velocity: Array
     controls: Array  # (N, 2) U_{t+1} .. U_{t+N}, as seen from made_at
@@ -60,7 +61,7 @@ class _Peers:
         self._rows = {name: row for row, name in enumerate(names)}
 
 
-class RobustController(Actor):
+class RobustController(TargetModel, Actor):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period.
 
     Connect ``control`` to the vehicle with a delay of one period: solving takes time, so what is computed
@@ -70,16 +71,22 @@ class RobustController(Actor):
     control moves the robot two periods later.  ``horizon_from: decision`` counts the N steps from t + period instead,
     from where the first unknown control acts.
 
-    The latest plan of each peer counts; with every period beyond the first that has passed since it was made,
-    the distance to keep grows (eq. 4).  Before a first plan or estimate comes, there is nobody to avoid.
-    Plans and estimates that are not finite are ignored, the last good ones stay.  Without a finite own state
-    the control is zero, and nothing else is sent.
+    The problem is posed at the time of the own state, whenever that comes and however long solving takes; the plan is
+    of that time, and the ages of all else are counted from it.  The latest plan of each peer counts; with every period
+    beyond the first between its time and that of the own state, the distance to keep grows (eq. 4).  The latest
+    estimate counts, too: an old one is predicted to the time of the own state as its filter would predict it, with the
+    process noise, so that its covariance grows.
+
+    Before a first plan or estimate comes, there is nobody to avoid.  Plans and estimates that are not finite are
+    ignored, the last good ones stay.  Without a finite own state the control is zero, and nothing else is sent.
     """
 
     trigger = InputPort(object, doc="plan now")
-    state = InputPort(BodyState, doc="where the robot is")
-    estimate = InputPort(Estimate, required=False, doc="of the target; unconnected: there is none to avoid")
-    peer_plans = InputPort(Plan, multi=True, required=False, doc="what the other robots intend")
+    state = InputPort(BodyState, triggers=False, doc="where the robot is")
+    estimate = InputPort(
+        Estimate, required=False, triggers=False, doc="of the target; unconnected: there is none to avoid"
+    )
+    peer_plans = InputPort(Plan, multi=True, required=False, triggers=False, doc="what the other robots intend")
     control = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, for the period after this one")
     plan = OutputPort(Plan, doc="what this robot intends, for the others")
     violation = OutputPort(float, doc="metres by which the plan breaks a constraint at worst; 0 if it keeps all")
@@ -103,9 +110,9 @@ class RobustController(Actor):
     tube_initial = Parameter(float, 0.2, unit="m", min=1e-6, doc="sigma_r0: radius of the reachability set now")
     tube_growth = Parameter(float, 0.4, unit="m", min=0, doc="beta: what it grows by, per unit of tau")
     tube_time = Parameter(str, STEPS, choices=(STEPS, SECONDS), doc="unit of tau in eq. (3)")
-    covariance_noise = Parameter(bool, False, doc="let process noise widen the target's predicted covariance")
-    position_noise = Parameter(float, 0.002, unit="m^2", min=0, doc="Qp in one period; for covariance_noise")
-    velocity_noise = Parameter(float, 0.4, unit="m^2/s^2", min=0, doc="Qv in one period; for covariance_noise")
+    covariance_noise = Parameter(
+        bool, False, doc="let process noise widen the target's predicted covariance, in f4 and in eq. (5)"
+    )
     robot_name = Parameter(str, "", doc="name in the plan; empty: the path of what the controller stands in")
 
     def initialize(self) -> None:
@@ -125,18 +132,15 @@ class RobustController(Actor):
         self._radius = reachability.tube_radius(
             self.tube_initial - ahead * self.tube_growth * tau, self.tube_growth, tau, self._steps
         )
-        noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
-        self._process_noise = noise if self.covariance_noise else np.zeros((4, 4))
+        self._process_noise = self.process_noise
         self._applied = np.zeros(2)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(2), np.zeros(2), np.zeros((self._steps, 2)))
         self._peers = _Peers()
         self._target: Estimate | None = None
-        self._target_at = 0.0
         self._infeasible = 0
 
     def fire(self) -> None:
-        now = self.now
-        self._listen(now)
+        self._listen()
         if not self.trigger.present:
             return
         own = self.state.value if self.state.present else None
@@ -145,41 +149,42 @@ class RobustController(Actor):
             self._standing = self._nothing
             self.control.send(np.zeros(2))
             return
-        problem, starts = self._problem(own, now)
+        problem, starts = self._problem(own)
         solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
         # Input may be so large that its squares are not finite.
         if not violation < math.inf and not all_finite(controls.ravel().tolist()):
             controls, violation = starts[1], math.inf  # braking
-        self._send(own, problem, controls, now)
+        self._send(own, problem, controls)
         self._infeasible += violation > 0.0
         self.violation.send(float(violation))
         self.infeasible.send(self._infeasible)
         self.iterations.send(int(solution.iterations))
 
-    def _listen(self, now: float) -> None:
-        """Remember the latest estimate and plans, also those that come between triggers."""
+    def _listen(self) -> None:
+        """Remember the latest estimate and plans, also those that come between triggers or overtaken by others."""
         for plan in self.peer_plans.tokens:
             if plan.robot != self._name and plan.finite:
                 self._peers.hear(plan)
-        if self.estimate.present and (estimate := self.estimate.value).finite:
-            self._target, self._target_at = estimate, now
+        for estimate in self.estimate.tokens:
+            if estimate.finite and (self._target is None or estimate.time >= self._target.time):
+                self._target = estimate
 
-    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array, now: float) -> None:
-        self._standing = _Standing(now, problem.position, problem.velocity, controls)
+    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
+        self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
         announced = np.empty((self.horizon + 1, 2))
         announced[0], announced[1:] = self._applied, controls[: self.horizon]
-        self.plan.send(Plan(self._name, now, own, announced))
+        self.plan.send(Plan(self._name, own.time, own, announced))
         self._applied = read_only(controls[0])
         self.control.send(self._applied)
 
     # --- the problem ------------------------------------------------------------------------------------
 
-    def _problem(self, own: BodyState, now: float) -> tuple[HorizonProblem, Array]:
+    def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
         """The problem, and where its solver may start (2, N, 2): the standing plan from the next period on; braking."""
         # Floats: arithmetic on arrays of two takes ten times as long.
         (x, y), (vx, vy), (ux, uy) = own.position.tolist(), own.velocity.tolist(), self._applied.tolist()
-        period = self.period
+        now, period = own.time, self.period
         position = np.array([x + period * vx, y + period * vy])
         vx, vy = vx + period * ux, vy + period * uy
         velocity, speed = np.array([vx, vy]), hypot(vx, vy)
@@ -221,5 +226,13 @@ class RobustController(Actor):
         target, steps = self._target, self._steps
         if target is None:
             return np.empty((0, steps, 2)), np.empty((0, steps, 3)), np.empty((0, 2)), np.empty(0)
-        elapsed = now - self._target_at
-        return self._expected_target(target.mean, target.covariance, self._process_noise, self.period, elapsed, steps)
+        return self._expected_target(
+            target.mean,
+            target.covariance,
+            self._process_noise,
+            self.covariance_noise,
+            self.kappa,
+            self.period,
+            now - target.time,
+            steps,
+        )

@@ -2,40 +2,56 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter, to_nanoseconds, to_seconds
 from .messages import RANGE, RELATIVE_POSITION, Array, Estimate, Measurement
+from .target_model import TargetModel
 
 EXPECTED, PREDICTED = "expected", "predicted"
 
 
-class _Estimator(Actor):
+@dataclass(slots=True)
+class _Step:
+    """What the filter did at one time, which is done again when a late measurement belongs there or before."""
+
+    time: int  # ns
+    measurements: list[Measurement]
+    after: Any = None  # what the filter has saved then
+
+
+class _Estimator(TargetModel, Actor):
     """What all estimators share: the model of eq. (1), and one prediction and fusion at each trigger.
 
-    A measurement that arrives between two triggers is fused at the next one as if it were made then, unless its robot
-    has sent a later one by that time.  One that is not finite is ignored, and so is an update whose result would not
-    be.
+    The estimate is of the time of the trigger, and each measurement is fused at its own time.  One that comes later is
+    put where it belongs among what the filter has done, and the filter runs again from there: from then on the
+    estimates are, to the bit, those of a filter that got it in time.  (Formulas for such out-of-sequence measurements,
+    as by Bar-Shalom, IEEE Trans. Aerosp. Electron. Syst. 38, 2002, spare the second run and are exact for linear
+    models.)  What the filter has done is kept for ``max_delay``; what was measured longer ago is not fused, and
+    counted at ``too_late``.
+
+    A measurement that comes between two triggers waits for the next one; one from the future, whose clock is wrong, is
+    taken as of now.  A copy of what is fused already changes nothing.  Before the first measurement, or the first
+    trigger, the filter holds its prior.  A measurement that is not finite is ignored, and so is an update whose result
+    would not be.
     """
 
     trigger = InputPort(object, doc="predict to the present time, fuse, and send the estimate")
-    measurements = InputPort(Measurement, multi=True, required=False, doc="of all robots, own included")
+    measurements = InputPort(Measurement, multi=True, required=False, triggers=False, doc="of all robots, own included")
     estimate = OutputPort(Estimate, doc="the target's state (x, y, vx, vy) after fusion")
+    too_late = OutputPort(int, doc="how many measurements so far came more than max_delay late; sent with each of them")
 
     period = Parameter(float, 0.1, unit="s", min=1e-9, doc="the time over which the process noise was measured")
-    position_noise = Parameter(float, 0.002, unit="m^2", min=0, doc="Qp: variance a position gains in one period")
-    velocity_noise = Parameter(
-        float,
-        0.4,
-        unit="m^2/s^2",
-        min=0,
-        doc="Qv: variance a velocity gains in one period; Table II's 0.004 is in (m per 0.1 s)^2",
-    )
     prior_mean = array_parameter((4,), (10.0, 0.0, 0.0, 0.0), doc="first guess of (x, y, vx, vy) in m and m/s")
     prior_variance = array_parameter((4,), (400.0, 400.0, 4.0, 4.0), min=0, doc="its variances, in m^2 and m^2/s^2")
+    max_delay = Parameter(
+        float, 2.0, unit="s", min=0, max=1e9, doc="how old a measurement may be when it comes, to be fused"
+    )
 
     noise_direction = Parameter(
         str,
@@ -50,27 +66,73 @@ class _Estimator(Actor):
 
         compile_kernels()
         self._kinds = {RANGE: ukf.RANGE, RELATIVE_POSITION: ukf.RELATIVE_POSITION}
-        self._predicted_at: int | None = None
-        self._late: dict[tuple[str, str], Measurement] = {}  # what came since the last trigger
-        self._process_noise = np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
+        self._process_noise = self.process_noise
+        self._waiting: list[Measurement] = []  # for the next trigger
+        self._too_late = 0
+        self._steps: list[_Step] = []  # of the last ``max_delay``, and what the filter saved before them, at which time
+        self._before: Any = None
+        self._before_at: int | None = None  # None: it is the prior, of whatever time
 
     def fire(self) -> None:
-        present = [each for each in self.measurements.tokens if each.finite]
-        if not self.trigger.present:
-            self._late.update({(each.robot, each.kind): each for each in present})
-            return
         now = self.tag.time
-        elapsed = 0.0 if self._predicted_at is None else (now - self._predicted_at) / 1e9
-        self._predicted_at = now
-        if self._late:
-            known = {(each.robot, each.kind) for each in present}
-            present += [late for source, late in self._late.items() if source not in known]
-            self._late.clear()
-        # Sorted, so that the order of arrival decides nothing, not even the last bit.
-        usable = sorted(present, key=_order)
-        fused = self._step(elapsed, usable)
-        sources = dict.fromkeys(each.robot for each in usable) if fused else ()
-        self.estimate.send(Estimate(*self._state(), tuple(sources)))
+        self._take(now - to_nanoseconds(self.max_delay))
+        if not self.trigger.present:
+            return
+        if not self._steps and self._before is None:
+            self._before = self._save()
+        fused = self._catch_up(self._waiting, now)
+        self._waiting = []
+        self._forget(now - to_nanoseconds(self.max_delay))
+        self.estimate.send(Estimate(*self._state(), to_seconds(now), tuple(sorted(fused))))
+
+    def _take(self, earliest: int) -> None:
+        """Let the measurements that have come wait for the next trigger, unless they are older than ``earliest``."""
+        come = [*self._waiting, *(each for each in self.measurements.tokens if each.finite)]
+        self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
+        if len(self._waiting) < len(come):
+            self._too_late += len(come) - len(self._waiting)
+            self.too_late.send(self._too_late)
+
+    def _catch_up(self, measurements: list[Measurement], now: int) -> set[str]:
+        """Put measurements where they belong, and bring the filter to the present; the robots that were heard."""
+        steps, done = self._steps, len(self._steps)
+        changed = self._step_at(now)
+        new: list[tuple[_Step, Measurement]] = []
+        for each in measurements:
+            step = self._step_at(min(to_nanoseconds(each.time), now))
+            if not any(known.robot == each.robot and _order(known) == _order(each) for known in step.measurements):
+                step.measurements.append(each)
+                new.append((step, each))
+                changed = min(changed, step, key=_time)
+        first = steps.index(changed)
+        if first < done:
+            self._restore(steps[first - 1].after if first else self._before)
+        fused = set()
+        for number in range(first, len(steps)):
+            step = steps[number]
+            before = steps[number - 1].time if number else self._before_at
+            elapsed = 0.0 if before is None else to_seconds(step.time - before)
+            # Sorted, so that the order of arrival decides nothing, not even the last bit.
+            step.measurements.sort(key=_order)
+            if self._step(elapsed, step.measurements):
+                fused |= {each.robot for where, each in new if where is step}
+            step.after = self._save()
+        return fused
+
+    def _step_at(self, time: int) -> _Step:
+        """The step of that time, which may be a new one."""
+        steps = self._steps
+        place = bisect_left(steps, time, key=_time)
+        if place == len(steps) or steps[place].time != time:
+            steps.insert(place, _Step(time, []))
+        return steps[place]
+
+    def _forget(self, earliest: int) -> None:
+        """Forget the steps before a time, of which nothing will come any more."""
+        count = bisect_left(self._steps, earliest, key=_time)
+        if count:
+            self._before, self._before_at = self._steps[count - 1].after, self._steps[count - 1].time
+            del self._steps[:count]
 
     def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
         """Predict over ``elapsed`` seconds, 0 at the first trigger, and fuse; whether anything was fused."""
@@ -78,6 +140,14 @@ class _Estimator(Actor):
 
     def _state(self) -> tuple[Array, Array]:
         """Mean and covariance."""
+        raise NotImplementedError
+
+    def _save(self) -> Any:
+        """What ``_restore`` needs to let the filter go back to where it is now."""
+        raise NotImplementedError
+
+    def _restore(self, saved: Any) -> None:
+        """Let the filter go back."""
         raise NotImplementedError
 
     def _noise_over(self, elapsed: float) -> Array:
@@ -95,14 +165,22 @@ class _Estimator(Actor):
         return np.array(rows, np.float64).reshape(-1, 7)
 
 
+def _time(step: _Step) -> int:
+    return step.time
+
+
 def _order(measurement: Measurement) -> Any:
-    return measurement.robot, measurement.kind, measurement.observer.tolist(), measurement.value.tolist()
+    each = measurement
+    return each.robot, each.kind, each.observer.tolist(), each.value.tolist(), each.along, each.across
 
 
 class UnscentedEstimator(_Estimator):
-    """The unscented Kalman filter of the paper, compiled; fuses all measurements of a tag at once."""
+    """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once.
 
-    kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; 0 gives the centre no weight")
+    The estimate is of the time of the trigger, and each measurement is fused at its own time.  For one that comes later
+    the filter goes back to that time and runs again from there, so that from then on nothing tells that it was late;
+    what comes more than ``max_delay`` after it was made is not fused, and counted at ``too_late``.
+    """
 
     def initialize(self) -> None:
         from .numerics import ukf
@@ -128,3 +206,9 @@ class UnscentedEstimator(_Estimator):
 
     def _state(self) -> tuple[Array, Array]:
         return self._mean, self._covariance
+
+    def _save(self) -> Any:
+        return self._mean, self._covariance  # of which every step makes new ones
+
+    def _restore(self, saved: Any) -> None:
+        self._mean, self._covariance = saved

@@ -24,6 +24,8 @@ class FilterError(EpicycleError):
 class FilterPyEstimator(_Estimator):
     """A filter of FilterPy with the model of ``UnscentedEstimator``; fuses one measurement after another.
 
+    Late measurements are fused at their own time, as there.
+
     ``KalmanFilter`` and ``SquareRootKalmanFilter`` are linear and take relative positions only.
     """
 
@@ -33,7 +35,7 @@ class FilterPyEstimator(_Estimator):
 
     def initialize(self) -> None:
         super().initialize()
-        self._filter = _make_filter(self.filter)
+        self._filter = _make_filter(self.filter, self.kappa)
         # The cubature filter alone wants columns.
         column = self.filter == "CubatureKalmanFilter"
         self._filter.x = np.array(self.prior_mean).reshape((4, 1) if column else 4)
@@ -54,13 +56,13 @@ class FilterPyEstimator(_Estimator):
 
     def _update(self, measurements: list[Measurement]) -> bool:
         noises = self._noises(measurements)
-        before = np.array(self._filter.x), np.array(self._filter.P)
+        before = self._save()
         for each, (xx, xy, yy) in zip(measurements, noises, strict=True):
             ranged = each.kind == RANGE
             self._fuse(each, np.array([[xx]]) if ranged else np.array([[xx, xy], [xy, yy]]))
         if np.isfinite(self._filter.x).all() and np.isfinite(self._filter.P).all():
             return True
-        self._filter.x, self._filter.P = before
+        self._restore(before)
         return False
 
     def _noises(self, measurements: list[Measurement]) -> Array:
@@ -69,7 +71,7 @@ class FilterPyEstimator(_Estimator):
 
         mean, covariance = self._state()
         if self.noise_direction == EXPECTED:
-            points, weights = sigma_points(mean, covariance, 0.0)
+            points, weights = sigma_points(mean, covariance, self.kappa)
         else:
             points, weights = np.array(mean)[np.newaxis], np.ones(1)
         return measurement_noise(points, weights, self._rows(measurements))
@@ -121,12 +123,18 @@ class FilterPyEstimator(_Estimator):
         covariance = np.array(self._filter.P)
         return np.array(self._filter.x).ravel(), 0.5 * (covariance + covariance.T)
 
+    def _save(self) -> Any:
+        return np.array(self._filter.x), np.array(self._filter.P)
 
-def _make_filter(name: str) -> Any:
+    def _restore(self, saved: Any) -> None:
+        self._filter.x, self._filter.P = map(np.array, saved)
+
+
+def _make_filter(name: str, kappa: float) -> Any:
     from filterpy import kalman  # takes seconds, so only when it is used
 
     if name == "UnscentedKalmanFilter":
-        points = kalman.JulierSigmaPoints(4, kappa=0.0)
+        points = kalman.JulierSigmaPoints(4, kappa=kappa)
         made = kalman.UnscentedKalmanFilter(4, 2, 1.0, hx=_unused, fx=_move, points=points)
     elif name == "CubatureKalmanFilter":
         made = kalman.CubatureKalmanFilter(4, 2, 1.0, hx=_unused, fx=_move)

@@ -1,4 +1,8 @@
-"""The tokens that robots and their parts exchange.  All are immutable; their arrays are read-only."""
+"""The tokens that robots and their parts exchange.  All are immutable; their arrays are read-only.
+
+Each says by its ``time`` (s) of when it is: when what it describes was so, and not when it was sent or came.  The
+source sets it, and whoever uses the token goes by it, however long it was under way.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.tag import LATEST, to_seconds
+
 Array = NDArray[np.float64]
 
 RELATIVE_POSITION = "relative_position"
 RANGE = "range"
 
 _FLOAT = np.dtype(np.float64)  # NumPy looks for it at each call where the type is given instead
+_LATEST = to_seconds(LATEST)
 _set = object.__setattr__  # in a frozen token; each has its own __init__, as the dataclass's would set arrays twice
 
 
@@ -30,26 +37,33 @@ def all_finite(numbers: Sequence[float]) -> bool:
     return math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))  # finite ones can add up to infinity
 
 
+def is_time(seconds: float) -> bool:
+    """Whether a number can be the time of something."""
+    return abs(seconds) <= _LATEST
+
+
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class BodyState:
-    """Where a body is and how it moves."""
+    """Where a body was at ``time``, and how it moved."""
 
     position: Array  # (2,) m
     velocity: Array  # (2,) m/s
+    time: float  # s
 
-    def __init__(self, position: ArrayLike, velocity: ArrayLike) -> None:
+    def __init__(self, position: ArrayLike, velocity: ArrayLike, time: float) -> None:
         _set(self, "position", read_only(position))
         _set(self, "velocity", read_only(velocity))
+        _set(self, "time", time)
 
     @property
     def finite(self) -> bool:
         """Whether every number in it is finite."""
-        return all_finite(self.position.tolist() + self.velocity.tolist())
+        return is_time(self.time) and all_finite(self.position.tolist() + self.velocity.tolist())
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Measurement:
-    """What a robot's sensor saw of the target, with what is needed to fuse it elsewhere."""
+    """What a robot's sensor saw of the target at ``time``, with what is needed to fuse it elsewhere and later."""
 
     robot: str  # dotted path of the robot that measured
     observer: Array  # (2,) m, where the sensor was
@@ -57,9 +71,10 @@ class Measurement:
     value: Array  # (2,) m from observer to target, or (1,) m
     along: float  # standard deviation along the line of sight, m
     across: float  # standard deviation across it, m; no part of a range
+    time: float  # s, when it was made
 
     def __init__(
-        self, robot: str, observer: ArrayLike, kind: str, value: ArrayLike, along: float, across: float
+        self, robot: str, observer: ArrayLike, kind: str, value: ArrayLike, along: float, across: float, time: float
     ) -> None:
         _set(self, "robot", robot)
         _set(self, "observer", read_only(observer))
@@ -67,6 +82,7 @@ class Measurement:
         _set(self, "value", read_only(value))
         _set(self, "along", along)
         _set(self, "across", across)
+        _set(self, "time", time)
 
     @property
     def finite(self) -> bool:
@@ -74,6 +90,7 @@ class Measurement:
         shape = (1,) if self.kind == RANGE else (2,)
         return (
             self.value.shape == shape
+            and is_time(self.time)
             and all_finite(self.value.tolist() + self.observer.tolist())
             and 0.0 < self.along < math.inf
             and (self.kind == RANGE or 0.0 < self.across < math.inf)
@@ -82,21 +99,23 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Estimate:
-    """What a robot believes about the target: a normal distribution over (x, y, vx, vy)."""
+    """What a robot believes about the target at ``time``: a normal distribution over (x, y, vx, vy)."""
 
     mean: Array  # (4,) m and m/s
     covariance: Array  # (4, 4)
+    time: float  # s
     sources: tuple[str, ...]  # robots whose measurements were fused at this step, sorted
 
-    def __init__(self, mean: ArrayLike, covariance: ArrayLike, sources: tuple[str, ...] = ()) -> None:
+    def __init__(self, mean: ArrayLike, covariance: ArrayLike, time: float, sources: tuple[str, ...] = ()) -> None:
         _set(self, "mean", read_only(mean))
         _set(self, "covariance", read_only(covariance))
+        _set(self, "time", time)
         _set(self, "sources", sources)
 
     @property
     def finite(self) -> bool:
         """Whether every number in it is finite."""
-        return all_finite(self.mean.tolist() + self.covariance.ravel().tolist())
+        return is_time(self.time) and all_finite(self.mean.tolist() + self.covariance.ravel().tolist())
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -104,7 +123,7 @@ class Plan:
     """What a robot intends: its state at ``time`` and its accelerations from then on, one per period."""
 
     robot: str  # dotted path of the robot
-    time: float  # s
+    time: float  # s, that of ``state``
     state: BodyState
     controls: Array  # (N + 1, 2) m/s^2: the one being applied now, then the planned ones
 
@@ -119,7 +138,7 @@ class Plan:
         """Whether it can be rolled out: finite numbers, one control at least."""
         controls = self.controls
         shaped = controls.ndim == 2 and controls.shape[1] == 2 and len(controls) > 0
-        return shaped and math.isfinite(self.time) and all_finite(controls.ravel().tolist()) and self.state.finite
+        return shaped and is_time(self.time) and all_finite(controls.ravel().tolist()) and self.state.finite
 
 
 def enclosing(path: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import combinations
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
@@ -14,7 +15,7 @@ class GoalMonitor(Actor):
 
     state = InputPort(BodyState, doc="the body")
     arrived = OutputPort(bool, doc="true, once, at the first arrival")
-    time = OutputPort(float, doc="the time of the first arrival in seconds, once")
+    time = OutputPort(float, doc="the time of that state in seconds, once")
     path_length = OutputPort(float, doc="metres travelled so far, at every state")
     distance = OutputPort(float, doc="metres to the goal, at every state")
 
@@ -36,30 +37,73 @@ class GoalMonitor(Actor):
         self.distance.send(left)
         if left <= self.tolerance and not self._has_arrived:
             self._has_arrived = True
-            self.time.send(self.now)
+            self.time.send(self.state.value.time)
             self.arrived.send(True)
 
 
+class _Known:
+    """The latest state of each of several bodies."""
+
+    def __init__(self) -> None:
+        self._states: dict[int, BodyState] = {}
+
+    def see(self, body: int, states: Iterable[BodyState]) -> None:
+        """Take note of states of a body; an older one than what is known of it says nothing new."""
+        for state in states:
+            if body not in self._states or state.time >= self._states[body].time:
+                self._states[body] = state
+
+    def positions(self) -> list[tuple[float, float]]:
+        """Where they all are at the time of the latest state: each has moved on with its velocity since its own."""
+        now = max((state.time for state in self._states.values()), default=0.0)
+        found = []
+        for state in self._states.values():
+            (x, y), elapsed = state.position.tolist(), now - state.time
+            if elapsed > 0.0:
+                vx, vy = state.velocity.tolist()
+                x, y = x + elapsed * vx, y + elapsed * vy
+            found.append((x, y))
+        return found
+
+
 class DistanceMonitor(Actor):
-    """The distance between two bodies at each tag at which both are known."""
+    """The distance between two bodies, whenever a state of one comes and both are known.
+
+    It is that of the time of the later state: where the other body was last known to be is moved on with its velocity
+    since.  So bodies need not tell where they are at the same times; what the older state lacks is half its
+    acceleration times the square of the difference in time.
+    """
 
     a = InputPort(BodyState, doc="one body")
     b = InputPort(BodyState, doc="the other body")
     distance = OutputPort(float, doc="metres between them")
 
+    def initialize(self) -> None:
+        self._known = _Known()
+
     def fire(self) -> None:
-        if self.a.present and self.b.present:
-            self.distance.send(distance(self.a.value.position.tolist(), self.b.value.position.tolist()))
+        self._known.see(0, self.a.tokens)
+        self._known.see(1, self.b.tokens)
+        places = self._known.positions()
+        if len(places) == 2:
+            self.distance.send(distance(*places))
 
 
 class SeparationMonitor(Actor):
-    """The smallest distance between any two of several bodies, at each tag at which two or more are known."""
+    """The smallest distance between any two of several bodies, whenever a state comes and two or more are known.
+
+    It is that of the time of the latest state, as ``DistanceMonitor`` tells it.
+    """
 
     bodies = InputPort(BodyState, multi=True, doc="a connection for each body")
     distance = OutputPort(float, doc="smallest distance between two of them in metres")
 
+    def initialize(self) -> None:
+        self._known = _Known()
+
     def fire(self) -> None:
-        # One state of each body: a state that was duplicated on its way is not two bodies at one place.
-        positions = [states[-1].position.tolist() for states in self.bodies.by_channel() if states]
-        if len(positions) >= 2:
-            self.distance.send(min(distance(a, b) for a, b in combinations(positions, 2)))
+        for body, states in enumerate(self.bodies.by_channel()):
+            self._known.see(body, states)
+        places = self._known.positions()
+        if len(places) >= 2:
+            self.distance.send(min(distance(a, b) for a, b in combinations(places, 2)))

@@ -28,7 +28,8 @@ class CircularMotion(Actor):
         self._began = self.now
 
     def fire(self) -> None:
-        elapsed = self.now - self._began
+        now = self.now
+        elapsed = now - self._began
         turned = self.turn_rate * elapsed
         # The chord of the arc travelled: right for any turn rate, 0 included.
         chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
@@ -36,7 +37,7 @@ class CircularMotion(Actor):
         x, y = self.start.tolist()
         position = x + chord * cos(direction), y + chord * sin(direction)
         velocity = self.speed * cos(heading), self.speed * sin(heading)
-        self.state.send(BodyState(position, velocity))
+        self.state.send(BodyState(position, velocity, now))
 
 
 def _sinc(x: float) -> float:

@@ -12,7 +12,8 @@ class Sensor(Actor):
 
     The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both
     of its components are drawn at every firing, whether used or not, so that neither ``kind`` nor
-    ``max_range`` moves the noise of later measurements.
+    ``max_range`` moves the noise of later measurements.  A measurement is of the time of the robot's own
+    state, by the robot's own clock.
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
@@ -38,7 +39,8 @@ class Sensor(Actor):
         error_along, error_across = self._draw(2).tolist()
         if not (self.robot.present and self.target.present):
             return
-        position = self.robot.value.position
+        robot = self.robot.value
+        position = robot.position
         believed = self.location.value.position if self.location.present else position
         # Floats: arithmetic on arrays of two takes ten times as long.
         (tx, ty), (x, y) = self.target.value.position.tolist(), position.tolist()
@@ -52,4 +54,4 @@ class Sensor(Actor):
         else:
             nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
             value = [dx + along * nx - across * ny, dy + along * ny + across * nx]
-        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across))
+        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, robot.time))

@@ -23,7 +23,7 @@ class Vehicle(Actor):
     """
 
     trigger = InputPort(object, doc="move to the present time and send the state")
-    acceleration = InputPort(np.ndarray, shape=(2,), doc="m/s^2, the control to be applied from now on")
+    acceleration = InputPort(np.ndarray, shape=(2,), triggers=False, doc="m/s^2, the control to be applied from now on")
     state = OutputPort(BodyState, depends_on=("trigger",), doc="position and velocity at this time")
 
     start = array_parameter((2,), unit="m", doc="position at the first trigger")
@@ -45,7 +45,7 @@ class Vehicle(Actor):
                 self._move((now - self._moved_at) / 1e9)
             self._held = self._next
             self._moved_at = now
-            self.state.send(BodyState(self._position, self._velocity))
+            self.state.send(BodyState(self._position, self._velocity, self.now))
         if self.acceleration.present and all_finite(wanted := _pair(self.acceleration.value)):
             self._next = shortened(wanted, self.max_acceleration)
             if self._moved_at == now:

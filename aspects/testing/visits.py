@@ -40,7 +40,7 @@ class Visits:
     def _pass_token(self, token: Any, point: JoinPoint) -> None:
         self.count += 1
         if point.port not in self.streams:
-            self.streams[point.port] = repr(point.random.bit_generator.state)
+            self.streams[point.port] = repr(point.random)
         self._do(self._original.pass_token, token, point)
 
     def _pass_by(self, token: Any, point: JoinPoint) -> None:

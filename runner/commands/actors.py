@@ -21,5 +21,6 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print the reference."""
     from ..model.catalogue import installed
 
-    print_reference(installed().with_types(own_types(options)).actors, "actor", options.name, options.json)
+    known = installed().with_types(own_types(options))
+    print_reference(known.actors, known.aspects, "actor", options.name, options.json)
     return DONE

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 
+from ..printing import console, tell_json
 from .options import DONE, add_changes, load, own_types
-from .reference import add_json, print_reference, show
+from .reference import add_json, print_reference
 
 DESCRIPTION = (
     "List the aspects that a model may use, describe one, or show which aspects stand at the ports of a model, in the "
@@ -33,17 +33,18 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from ..model.catalogue import installed
     from ..model.packaged import is_path, packaged_models
 
-    name, types, models = options.model, installed().with_types(own_types(options)).aspects, packaged_models()
+    known = installed().with_types(own_types(options))
+    name, types, models = options.model, known.aspects, packaged_models()
     if name is None or name in types or not (name in models or is_path(name)):
         if options.set or options.overrides or options.disturb or options.aspect or options.without:
             raise EpicycleError("--set, --overrides, --disturb, --aspect and --without change a model: name one")
-        print_reference(types, "aspect", name, options.json, also=models)
+        print_reference(types, known.actors, "aspect", name, options.json, also=models)
         return DONE
     from ..show import aspects_at, weaving
 
-    model, _ = load(options)
+    model = load(options)
     if options.json:
-        print(json.dumps(aspects_at(model), indent=2, ensure_ascii=False, allow_nan=False))
+        tell_json(aspects_at(model), indent=2)
     else:
-        show(weaving(model))
+        console().print(weaving(model))
     return DONE

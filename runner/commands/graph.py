@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
-from .options import DONE, add_model, complain, load
+from ..printing import complain, tell
+from .options import DONE, add_model, load
 
 DESCRIPTION = "Draw the model graph: actors, composites, ports, connections with their delays, and aspects."
 
@@ -45,13 +45,13 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     if options.out is not None:
         check_graph_path(options.out)
-    model, _ = load(options)
+    model = load(options)
     drawn = outline(model, depth=options.depth, expand=options.expand)
     if options.out is None:
-        sys.stdout.write(mermaid(drawn))
+        tell(mermaid(drawn).rstrip("\n"))
     else:
         write_graph(drawn, options.out)
-        print(f"wrote {options.out}")
+        tell(f"wrote {options.out}")
     if drawn.note and options.depth is None:
         complain(f"note: {drawn.note}")
     return DONE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from ..printing import tell
 from .options import DONE
 
 DESCRIPTION = "List the models that come with Epicycle, the disturbances for --disturb, and the studies."
@@ -21,13 +22,13 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     for name, path in packaged_models().items():
         print_line(name, load_model(path).doc)
-    print("\ndisturbances, to be added with --disturb:")
+    tell("\ndisturbances, to be added with --disturb:")
     problems = Problems()
     for name in packaged_disturbances():
         disturbance = load_disturbance(name, problems)
         problems.raise_if_any()
         print_line(name, disturbance.text.doc if disturbance is not None else "")
-    print("\nstudies, to be run with epicycle study:")
+    tell("\nstudies, to be run with epicycle study:")
     for name in packaged_studies():
         print_line(name, read_study(name).doc)
     return DONE
@@ -36,4 +37,4 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 def print_line(name: str, doc: str) -> None:
     """A name with the first sentence of what is said of it."""
     first, _, _ = doc.partition(". ")
-    print(f"{name}: {first}" if doc else name)
+    tell(f"{name}: {first}" if doc else name)

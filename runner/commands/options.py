@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from ..printing import complain, complain_traceback
 
 if TYPE_CHECKING:
+    from epicycle.actors import EpicycleError
+
     from ..model import Model
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -108,9 +112,18 @@ def seconds(option: str, text: str) -> float:
     return time
 
 
-def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, dict[str, Any]]:
-    """The model that the options describe, and its figures; warnings are printed, or with ``strict`` raised."""
-    from ..model import ModelError, Problems, load_model
+def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) -> int:
+    """Say what went wrong after a run; the exit code."""
+    for error in errors:
+        if options.debug:
+            complain_traceback(error)
+        complain(f"error: {error}")
+    return FAILED if errors else DONE
+
+
+def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
+    """The model that the options describe; warnings are printed, or with ``strict`` raised."""
+    from ..model import ModelError, load_model
 
     model = load_model(
         options.model,
@@ -127,16 +140,4 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> tuple[Model, d
             complain(str(warning))
     elif model.warnings:
         raise ModelError(replace(warning, severity="error") for warning in model.warnings)
-    if not model.figures:
-        return model, {}
-    from ..show import figures_of
-
-    problems = Problems()
-    figures = figures_of(model, problems)
-    problems.raise_if_any()
-    return model, figures
-
-
-def complain(text: str) -> None:
-    """Say what went wrong."""
-    print(text, file=sys.stderr)
+    return model

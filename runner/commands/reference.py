@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from .options import complain
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
+from ..printing import complain, console, tell_json
 
 
 def add_json(command: argparse.ArgumentParser) -> None:
@@ -20,9 +15,16 @@ def add_json(command: argparse.ArgumentParser) -> None:
 
 
 def print_reference(
-    types: Mapping[str, type[Any]], kind: str, name: str | None, as_json: bool, *, also: Iterable[str] = ()
+    types: Mapping[str, type[Any]],
+    others: Mapping[str, type[Any]],
+    kind: str,
+    name: str | None,
+    as_json: bool,
+    *,
+    also: Iterable[str] = (),
 ) -> None:
-    """The list of all types, or all about one; ``also`` are other names that could have been meant."""
+    """The list of all types, or all about one; ``others`` are those of the other kind, ``also`` names that could have
+    been meant, too."""
     from dataclasses import asdict
 
     from epicycle.actors import EpicycleError
@@ -33,37 +35,31 @@ def print_reference(
 
     if name is not None:
         if name not in types:
-            other = " or packaged model" if also else ""
+            if name in others:
+                other = "aspect" if kind == "actor" else "actor"
+                raise EpicycleError(
+                    f"{name} is an {other}, not an {kind}\n   help: 'epicycle {other}s {name}' describes it"
+                )
+            what = f"{kind} type or packaged model" if also else f"{kind} type"
             raise EpicycleError(
-                f"there is no {kind} type{other} {name!r}{did_you_mean(name, [*types, *also])}\n"
-                f"   help: 'epicycle {kind}s' lists them"
+                f"there is no {what} {name!r}{did_you_mean(name, [*types, *also])}\n"
+                f"   help: 'epicycle {kind}s' lists them\n"
+                f"   help: one of your own is known after '--types FILE.py'"
             )
         (reference,) = described({name: types[name]})
         parts = parts_described([types[name]])
         if as_json:
-            write_json({**asdict(reference), "parts": {k: [asdict(each) for each in v] for k, v in parts.items()}})
+            tell_json(
+                {**asdict(reference), "parts": {k: [asdict(each) for each in v] for k, v in parts.items()}}, indent=2
+            )
         else:
-            show(detail(reference, parts))
+            console().print(detail(reference, parts))
         return
     loaded, errors = load_all(types)
     for error in errors:
         complain(f"warning: {error}")
     references = described(loaded)
     if as_json:
-        write_json([asdict(each) for each in references])
+        tell_json([asdict(each) for each in references], indent=2)
     else:
-        show(overview(references))
-
-
-def write_json(value: object) -> None:
-    """Print JSON."""
-    print(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def show(what: RenderableType) -> None:
-    """Print a table or text, to a terminal or into a pipe."""
-    from rich.console import Console
-
-    # Piped output has no width of its own; the default of 80 would fold the tables.
-    console = Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=120)
-    console.print(what)
+        console().print(overview(references))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import DONE, FAILED, complain
+from ..printing import complain, console, tell
+from .options import DONE, FAILED, complain_of
 
 DESCRIPTION = "Repeat one run of a study alone, with its event log, all recorded signals and figures."
 
@@ -21,7 +22,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Repeat the run, and compare its digest."""
     from ..engine import write_log
     from ..model import Problems
-    from ..show import figures_of, summary_table, write_folder
+    from ..show import check_folder, draw_figures, figures_of, summary_table, write_folder
     from ..study import open_study, plan_of_folder
     from ..study.one_run import again
 
@@ -30,19 +31,19 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     folder = options.out or options.folder / "replays" / row["run"][:12]
     model, results, simulation, error = again(plan, plan.condition(row["condition"]), row["seed"])
     figures = {} if error is not None else figures_of(model, Problems())
-    written = write_folder(folder, results, figures, ["epicycle", *given], "" if error is None else str(error))
+    if replaced := check_folder(folder, model.name, ["epicycle", *given]):
+        complain(replaced)
+    written = write_folder(folder, results, ["epicycle", *given], "" if error is None else str(error))
     written.append(folder / "log.parquet")
     write_log(simulation.log.records, written[-1])
-    from rich.console import Console
-
-    Console(width=120).print(summary_table(model, results))
-    for path in written:
-        print(f"wrote {path}")
-    if error is not None:
-        complain(f"error: {error}")
-        return FAILED
+    drawn, failed = draw_figures(folder, results, figures)
+    console().print(summary_table(model, results))
+    for path in [*drawn, *written]:
+        tell(f"wrote {path}")
+    if error is not None or failed:
+        return complain_of([*([error] if error is not None else []), *failed], options)
     if row["digest"] is not None and row["digest"] != results.digest:
         complain(f"error: the digest is {results.digest}, but was {row['digest']}: something has changed since")
         return FAILED
-    print(f"digest {results.digest}" + (": the same" if row["digest"] is not None else ""))
+    tell(f"digest {results.digest}" + (": the same" if row["digest"] is not None else ""))
     return DONE

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .options import DONE, FAILED, complain
+from ..printing import complain, console, tell
+from .options import DONE, FAILED
 from .study import count
 
 DESCRIPTION = "Write report.html, one file that holds all, and its figures; the study need not be finished."
@@ -28,12 +29,12 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     results = open_study(options.folder)
     folder = options.out or options.folder
-    with _progress() as tell:
-        report = write_report(results, folder, jobs=options.jobs or available_cores(), tell=tell)
+    with _progress() as told:
+        report = write_report(results, folder, jobs=options.jobs or available_cores(), tell=told)
     for path in report.files:
-        print(f"wrote {path}")
+        tell(f"wrote {path}")
     if report.verdicts:
-        print("claims: " + ", ".join(f"{number} {verdict}" for verdict, number in sorted(report.verdicts.items())))
+        tell("claims: " + ", ".join(f"{number} {verdict}" for verdict, number in sorted(report.verdicts.items())))
     for problem in report.problems:
         complain(f"error: {problem}")
     return FAILED if report.problems else DONE
@@ -45,9 +46,8 @@ def _progress() -> Iterator[Callable[[int, int], None]]:
     if not sys.stderr.isatty():
         yield lambda done, total: None
         return
-    from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    with Progress(console=console(stderr=True), transient=True) as bar:
         task = bar.add_task("repeating runs for their signals", total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
-import logging
 import math
-import sys
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import DONE, add_model, complain, load, seconds, seed
+from ..printing import complain, console, notices, tell, tell_json
+from .options import add_model, complain_of, load, seconds, seed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -60,13 +58,17 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def factor(text: str) -> float:
     """How many seconds of model time pass in a second."""
+    from ..engine import SLOWEST
+
     try:
         number = float(text)
     except ValueError:
         number = math.nan
-    if not 0.0 < number < math.inf:
+    if not SLOWEST <= number < math.inf:
         # The model, perhaps, which stands behind the option.
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number greater than 0 (write MODEL before --realtime)")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a number from {SLOWEST:g} on (write MODEL before --realtime)"
+        )
     return number
 
 
@@ -74,74 +76,78 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Run the model, report and write what was asked for."""
     from epicycle.actors import EpicycleError
 
-    from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation, check_log_path, write_log
-    from ..show import summary_object, summary_table, write_folder
+    from ..engine import ActorError, LogFile, LogFilter, LoopError, Pace, Simulation
+    from ..model import Problems
+    from ..show import (
+        FigureError,
+        check_folder,
+        draw_figures,
+        figures_of,
+        summary_object,
+        summary_table,
+        write_folder,
+    )
 
-    if options.log is not None:
-        check_log_path(options.log)
-    elif options.log_where:
+    log = LogFile(options.log) if options.log is not None else None
+    if log is None and options.log_where:
         raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, to which the log is written")
     log_filter = LogFilter.of(options.log_where)
     until = seconds("--until", options.until) if options.until is not None else None
-    model, figures = load(options)
+    model = load(options)
+    figures = figures_of(model, Problems())
     folder = options.out or (None if options.json else Path("results") / model.name)
     if folder is not None and folder.exists() and not folder.is_dir():
         raise EpicycleError(f"--out {folder} is a file, not a folder")
-    simulation = Simulation(model, seed=options.seed, keep_log=log_filter if options.log is not None else False)
+    command = ["epicycle", *given]
+    if folder is not None and (replaced := check_folder(folder, model.name, command)):
+        complain(replaced)
+    keep_log, log_to = (False, None) if log is None else (log_filter, log.add)
+    simulation = Simulation(model, seed=options.seed, keep_log=keep_log, log_to=log_to)
     pace = Pace(options.realtime) if options.realtime is not None else None
-    with progress(model, until) as report:
+    if until is None and model.endless:
+        complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
+    with log or nullcontext(), progress(model, until) as report:
         try:
             results = simulation.run(until=until, progress=report, pace=pace)
         except (ActorError, LoopError, KeyboardInterrupt) as error:
             interrupted = isinstance(error, KeyboardInterrupt)
             results = simulation.results("interrupted" if interrupted else "failed")
-            if options.log is not None:
-                write_log(simulation.log.records, options.log)
             if folder is not None:
-                write_folder(folder, results, {}, ["epicycle", *given], "interrupted" if interrupted else str(error))
+                write_folder(folder, results, command, "interrupted" if interrupted else str(error))
                 complain(f"what was recorded until then is in {folder}")
             raise
+        # Before the log is closed, which may fail.
+        written = [] if folder is None else write_folder(folder, results, command)
     if pace is not None and pace.worst > NOTICEABLE:
         complain(
             f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
             f"{pace.behind:.3g} s at the end"
         )
-    if options.log is not None:
-        write_log(simulation.log.records, options.log)
-    written = [] if folder is None else write_folder(folder, results, figures, ["epicycle", *given])
+    failed = list[FigureError]()
+    if folder is not None:
+        drawn, failed = draw_figures(folder, results, figures)
+        written = [*drawn, *written]
     if options.json:
-        print(json.dumps(summary_object(results)))
-        return DONE
-    from rich.console import Console
-
-    # Piped output has no width of its own; the default of 80 would fold the table.
-    console = Console() if sys.stdout.isatty() else Console(width=120)
-    console.print(summary_table(model, results))
-    for path in written:
-        console.print(f"wrote {path}", highlight=False, markup=False)
-    return DONE
+        tell_json(summary_object(results))
+    else:
+        console().print(summary_table(model, results))
+        for path in written:
+            tell(f"wrote {path}")
+    return complain_of(failed, options)
 
 
 @contextmanager
 def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None] | None]:
     """A bar on a terminal's standard error, and notices of what takes long."""
-    from rich.console import Console
-    from rich.logging import RichHandler
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    console = Console(stderr=True)
-    notices = logging.getLogger("epicycle")
-    handler = RichHandler(console=console, show_time=False, show_level=False, show_path=False)
-    notices.addHandler(handler)
-    notices.setLevel(logging.INFO)
-    try:
-        if not console.is_terminal:
+    terminal = console(stderr=True)
+    with notices(terminal):
+        if not terminal.is_terminal:
             yield None
             return
         end = until if until is not None else model.stop
-        text = TextColumn("{task.description} {task.completed:.1f} s of model time")
-        with Progress(text, BarColumn(), TimeElapsedColumn(), console=console, transient=True) as bar:
+        text = TextColumn("{task.description} {task.completed:.1f} s of model time", markup=False)
+        with Progress(text, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
             task = bar.add_task(model.name, total=end)
             yield lambda now: bar.update(task, completed=now)
-    finally:
-        notices.removeHandler(handler)

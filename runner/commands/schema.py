@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .options import DONE, add_types, complain, own_types
+from ..printing import complain, tell, tell_json_text
+from .options import DONE, add_types, own_types
 
 DESCRIPTION = (
     "Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language "
@@ -31,8 +32,8 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         complain(f"warning: {error}")
     text = schema_text(json_schema(catalogue, figure_types(), study_figure_types()))
     if options.out is None:
-        print(text, end="")
+        tell_json_text(text)
     else:
         options.out.write_text(text, encoding="utf-8")
-        print(f"wrote {options.out}")
+        tell(f"wrote {options.out}")
     return DONE

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections import Counter
 from pathlib import Path
 
+from ..printing import tell, tell_json
 from .options import DONE
+from .study import about_others
 
 DESCRIPTION = "Say how far a study is, also while it is running."
 
@@ -32,14 +33,24 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     failures = results.failures()
     if options.json:
         found = {"study": plan.study.name, "runs": plan.size, "conditions": plan.conditions, "statuses": dict(counts)}
-        print(json.dumps({**found, "running": is_running(options.folder), "failures": failures}))
+        tell_json({**found, "running": is_running(options.folder), "failures": failures})
         return DONE
+    beyond, running = results.beyond(), is_running(options.folder)
     about = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"
     most = "" if plan.study.until is None else "at most "
-    print(
-        f"{plan.study.name}: {len(statuses):,} of {most}{plan.size:,} runs are over ({about})"
-        + ("; it is running" if is_running(options.folder) else "")
+    tell(
+        f"{plan.study.name}: {len(statuses) - beyond:,} of {most}{plan.size:,} runs are over"
+        + (f", and {beyond:,} more" if beyond else "")
+        + f" ({about})"
+        + ("; it is running" if running else "")
     )
+    for told in about_others(results):
+        tell(told)
+    if results.path.exists() and not running and not results.is_written():
+        tell(
+            f"{results.path} is not the table of these runs, but damaged or older than they are\n"
+            f"   help: 'epicycle resume {options.folder}' writes it anew"
+        )
     if options.conditions:
         by_condition = Counter(zip(table["condition"].to_pylist(), statuses, strict=True))
         for index in sorted({condition for condition, _ in by_condition}):
@@ -47,7 +58,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
             done = ", ".join(
                 f"{number:,} {status}" for (at, status), number in sorted(by_condition.items()) if at == index
             )
-            print(f"{index} ({values}): {done} of {plan.replications:,}")
+            tell(f"{index} ({values}): {done} of {plan.replications:,}")
     for row in failures:
-        print(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
+        tell(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
     return DONE

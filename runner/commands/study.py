@@ -8,10 +8,11 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .options import DONE, FAILED, INTERRUPTED, add_types, complain
+from ..printing import complain, complain_traceback, tell
+from .options import DONE, FAILED, INTERRUPTED, add_types
 
 if TYPE_CHECKING:
-    from ..study import Plan
+    from ..study import Plan, StudyResults
 
 DESCRIPTION = "Make all runs of a study that are not in its results folder yet."
 SHOWN = 5  # failed runs that are told one by one
@@ -105,6 +106,22 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     return session(plan, options.out or Path("results") / study.name, options)
 
 
+def about_others(results: StudyResults) -> list[str]:
+    """What is to be said of runs that the study as it is now does not ask for."""
+    from epicycle.actors import counted
+
+    told = []
+    if beyond := results.beyond():
+        asked = counted(results.plan.replications, "replication")
+        told.append(f"{results.folder} has {counted(beyond, 'run')} beyond the {asked} asked for: the table keeps them")
+    if left_out := results.left_out:
+        told.append(
+            f"{results.folder} has {counted(left_out, 'run')} of another version of the study, its model or Epicycle, "
+            "which the table leaves out"
+        )
+    return told
+
+
 def check_session(options: argparse.Namespace) -> None:
     """Raise ``EpicycleError`` for options that do not go together."""
     from epicycle.actors import EpicycleError
@@ -123,17 +140,18 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     from epicycle.actors import counted
 
     from ..study import WorkerError, WriteError, open_study, run_study
+    from ..study.one_run import again
     from ..study.progress import progress
 
     try:
-        with progress(plan.study.name) as tell:
+        with progress(plan.study.name) as told:
             outcome = run_study(
                 plan,
                 folder,
                 jobs=options.jobs,
                 timeout=options.run_timeout,
                 retry=options.retry,
-                tell=tell,
+                tell=told,
                 executor=options.executor,
                 scheduler=options.scheduler,
             )
@@ -143,17 +161,25 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     except (WorkerError, WriteError) as error:  # no fault of the study's
         complain(f"error: {error}")
         return FAILED
-    print(
+    tell(
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
         f"{outcome.there:,} there before" + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
     )
-    print(f"wrote {outcome.table}")
+    results = open_study(folder)
+    for said in about_others(results):
+        complain(said)
+    tell(f"wrote {outcome.table}")
     if outcome.is_good:
         return DONE
-    failures = open_study(folder).failures()
+    failures = results.failures()
     for row in failures[:SHOWN]:
         complain(f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}")
     if len(failures) > SHOWN:
         complain(f"... and {len(failures) - SHOWN:,} more: epicycle status {folder}")
+    if options.debug and failures:
+        *_, raised = again(plan, plan.condition(failures[0]["condition"]), failures[0]["seed"])
+        if raised is not None:
+            complain(f"the first of them, repeated: run {failures[0]['run'][:12]}")
+            complain_traceback(raised)
     complain(f"error: {counted(outcome.failed, 'run')} failed")
     return FAILED

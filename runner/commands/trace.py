@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from ..printing import console, notices, tell, tell_json_text
 from .options import DONE, add_model, load, seconds, seed
 
 if TYPE_CHECKING:
@@ -43,17 +44,19 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     start = to_nanoseconds(seconds("--from", options.start)) if options.start is not None else 0
     end = seconds("--to", options.to) if options.to is not None else None
-    model, _ = load(options)
+    model = load(options)
     actors = _actors(options.actor, model.graph)
     show = _as_json if options.json else _as_text(actors, model.graph)
+    say = tell_json_text if options.json else tell
 
     def report(firing: Firing) -> None:
         if firing.tag.time >= start:
-            print(show(firing))
+            say(show(firing))
 
     if end is not None and model.stop is not None:
         end = min(end, model.stop)
-    Simulation(model, seed=options.seed, tracer=Tracer(actors, report)).run(until=end)
+    with notices(console(stderr=True)):
+        Simulation(model, seed=options.seed, tracer=Tracer(actors, report)).run(until=end)
     return DONE
 
 
@@ -143,32 +146,35 @@ def _as_json(firing: Firing) -> str:
     def tag(at: Tag | None) -> dict[str, float | int] | None:
         return None if at is None else {"time": at.seconds, "microstep": at.microstep}
 
-    return json.dumps(
-        {
-            "time": firing.tag.seconds,
-            "microstep": firing.tag.microstep,
-            "actor": firing.actor,
-            "outside": firing.outside or None,
-            "wakes": [{"asked": tag(asked)} for asked in firing.wakes],
-            "tokens": [
-                {
-                    "port": arrival.port,
-                    "channel": arrival.channel,
-                    "token": plain(arrival.token),
-                    "from": arrival.source,
-                    "sent": tag(arrival.sent),
-                }
-                for arrival in firing.arrivals
-            ],
-            "sends": [
-                {
-                    "event": record.event,
-                    "port": record.port,
-                    "channel": record.channel,
-                    "aspect": record.aspect or None,
-                    "token": plain(record.value),
-                }
-                for record in firing.records
-            ],
-        }
+    return (
+        json.dumps(
+            {
+                "time": firing.tag.seconds,
+                "microstep": firing.tag.microstep,
+                "actor": firing.actor,
+                "outside": firing.outside or None,
+                "wakes": [{"asked": tag(asked)} for asked in firing.wakes],
+                "tokens": [
+                    {
+                        "port": arrival.port,
+                        "channel": arrival.channel,
+                        "token": plain(arrival.token),
+                        "from": arrival.source,
+                        "sent": tag(arrival.sent),
+                    }
+                    for arrival in firing.arrivals
+                ],
+                "sends": [
+                    {
+                        "event": record.event,
+                        "port": record.port,
+                        "channel": record.channel,
+                        "aspect": record.aspect or None,
+                        "token": plain(record.value),
+                    }
+                    for record in firing.records
+                ],
+            }
+        )
+        + "\n"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..printing import complain, tell
 from .options import DONE, add_model, load
 
 DESCRIPTION = "Check a model, or a study with all that it varies, without running it."
@@ -20,8 +21,15 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Load the model, and say how large it is."""
     if is_study(options.model):
         return check_study(options)
-    model, _ = load(options, strict=options.strict)
-    print(f"{options.model} is valid: {model.extent}")
+    model = load(options, strict=options.strict)
+    if model.endless:
+        told = f"warning: {model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
+        if options.strict:
+            from epicycle.actors import EpicycleError
+
+            raise EpicycleError(told.removeprefix("warning: "))
+        complain(told)
+    tell(f"{options.model} is valid: {model.extent}")
     return DONE
 
 
@@ -48,7 +56,7 @@ def check_study(options: argparse.Namespace) -> int:
     types = [Path(file) for file in options.types]
     plan = Plan.made(read_study(options.model, set=options.set, types=types))
     check_figures(plan)
-    print(
+    tell(
         f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
         f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
     )

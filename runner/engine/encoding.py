@@ -7,10 +7,12 @@ of these.  Anything else is logged by its ``repr``; if that tells an address ins
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import re
 import struct
 from collections.abc import Callable, Iterator
+from enum import Enum
 from functools import cache
 from operator import attrgetter
 from typing import Any
@@ -208,27 +210,52 @@ def _text(text: str) -> bytes:
 
 
 def leaves(token: Any, field: str = "") -> Iterator[tuple[str, Any]]:
-    """What a token is made of in the end, with the names of the places, e.g. ``("position[0]", 1.5)``."""
+    """What a token is made of in the end, with the names of the places, e.g. ``("position[0]", 1.5)``.
+
+    What holds nothing, such as an empty list, is a leaf itself.
+    """
+    found: Iterator[tuple[str, Any]] | None = None
     if isinstance(token, np.ndarray) and token.ndim == 0:
         yield field, token.item()
-    elif isinstance(token, (np.ndarray, list, tuple)):
-        for index, item in enumerate(token):
-            yield from leaves(item, f"{field}[{index}]")
+        return
+    if isinstance(token, (np.ndarray, list, tuple)):
+        found = ((f"{field}[{index}]", item) for index, item in enumerate(token))
     elif isinstance(token, dict):
-        for key, item in token.items():
-            yield from leaves(item, f"{field}.{key}" if field else str(key))
+        found = ((f"{field}.{key}" if field else str(key), item) for key, item in token.items())
     elif dataclasses.is_dataclass(token) and not isinstance(token, type):
-        for name in field_names(type(token)):
-            yield from leaves(getattr(token, name), f"{field}.{name}" if field else name)
-    else:
+        names = field_names(type(token))
+        found = ((f"{field}.{name}" if field else name, getattr(token, name)) for name in names)
+    is_leaf = True
+    for place, item in found or ():
+        is_leaf = False
+        yield from leaves(item, place)
+    if is_leaf:
         yield field, token
 
 
-def scalars(token: Any) -> Iterator[tuple[str, float]]:
-    """The numbers among the leaves of a token, as floats."""
-    for place, leaf in leaves(token):
-        if isinstance(leaf, (bool, int, float, np.number, np.bool_)) and not isinstance(leaf, np.complexfloating):
-            try:
-                yield place, float(leaf)
-            except OverflowError:  # an int beyond all floats
-                yield place, float("inf") if leaf > 0 else float("-inf")
+Cell = tuple[str, float | None, str | None]
+
+
+def cell(leaf: Any) -> Cell:
+    """A leaf in the columns of a table: its type, its value as a float, its text.
+
+    Numbers have a value and truth values 0 or 1; a text has itself, a member of an enumeration its name, and anything
+    else what the event log shows of it.  An int that no float is has its digits as text, too.  None has neither.
+    """
+    if leaf is None:
+        return "none", None, None
+    if isinstance(leaf, Enum):
+        return type(leaf).__name__, cell(leaf.value)[1], leaf.name or str(leaf)
+    if isinstance(leaf, (bool, np.bool_)):
+        return "bool", float(leaf), None
+    if isinstance(leaf, (int, np.integer)):
+        try:
+            value = float(leaf)
+        except OverflowError:  # beyond all floats
+            value = math.inf if leaf > 0 else -math.inf
+        return "int", value, None if value == leaf else str(int(leaf))
+    if isinstance(leaf, (float, np.floating)):
+        return "float", float(leaf), None
+    shown = plain(leaf)
+    kind = "text" if isinstance(leaf, str) else type(leaf).__name__
+    return kind, None, shown if isinstance(shown, str) else json.dumps(shown)

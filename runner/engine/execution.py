@@ -15,8 +15,9 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import ActorPoint, Job
 
+from ..model import describe
 from .agenda import Turn
-from .director import ActorError, Director, describe
+from .director import ActorError, Director
 from .local import LocalDirector
 
 
@@ -162,15 +163,18 @@ class Execution:
         for wake in self._asked:
             wake.cancel()
         self._asked = []
-        self.actor.halt()
+        self._call(self.actor.halt, "halt()")
         self.forget()
 
     def restart(self) -> None:
         """Let the actor begin anew."""
+        self._call(self.actor.restart, "restart()")
+
+    def _call(self, method: Callable[[], None], name: str) -> None:
         try:
-            self.actor.restart()
+            method()
         except Exception as error:
-            raise ActorError(self.actor.path, self._director.tag, "restart()", describe(error)) from error
+            raise ActorError(self.actor.path, self._director.tag, name, describe(error)) from error
 
 
 class _StandIn(Actor):

@@ -2,67 +2,32 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, to_seconds
 
 from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
-from .encoding import scalars
+from .batches import Interval
+from .encoding import cell, leaves
 from .log import EventLog
+from .measurement import Outcome
 from .signal import Signal, SignalError
 
 if TYPE_CHECKING:
     import pandas
 
 
-class Reduction:
-    """A number that is kept up to date over tokens: last, first, min, max, sum, mean or count."""
-
-    def __init__(self, take: str) -> None:
-        self.take = take
-        self.count = 0
-        self._value: Any = None
-        self._total: Any = 0
-
-    def add(self, token: Any) -> None:
-        """Take in a token."""
-        self.count += 1
-        if self.take in ("sum", "mean"):
-            self._total += token
-        elif self._value is None or self.take == "last":
-            self._value = token
-        elif self.take == "min":
-            self._value = _nan_or(min, self._value, token)
-        elif self.take == "max":
-            self._value = _nan_or(max, self._value, token)
-
-    @property
-    def value(self) -> Any:
-        """The number; None where no token came and there is nothing to say."""
-        if self.take == "count":
-            return self.count
-        if self.take == "sum":
-            return self._total
-        if self.count == 0:
-            return None
-        if self.take == "mean":
-            return self._total / self.count
-        return self._value
-
-
-def _nan_or(choose: Callable[..., Any], first: Any, second: Any) -> Any:
-    """The lesser or greater of two numbers; if one of them is NaN there is no such thing, whatever the order."""
-    return math.nan if math.isnan(first) or math.isnan(second) else choose(first, second)
+COLUMNS = ("time", "time_ns", "microstep", "signal", "field", "type", "value", "text")  # of recorded signals
 
 
 @dataclass(repr=False)
 class Results:
     """The outcome of one run: ``metrics``, recorded ``signals``, counts and figures of ``aspects``, the ``log``
-    and its ``digest``.
+    and its ``digest``.  ``outcomes`` say more of each metric: its interval, or why it has no value.
 
     >>> results = Simulation(model, seed=7).run()
     >>> results.metrics["mean_wait"], results["server.output"].values
@@ -80,6 +45,12 @@ class Results:
     firings: int
     wall_time: float  # s
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
+    outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
+
+    @property
+    def intervals(self) -> dict[str, Interval]:
+        """The confidence intervals of the metrics that have one."""
+        return {name: each.interval for name, each in self.outcomes.items() if each.interval is not None}
 
     @property
     def events(self) -> int:
@@ -107,20 +78,26 @@ class Results:
         return name in self.signals
 
     def table(self) -> dict[str, list[Any]]:
-        """All recorded numbers in long form, the columns of ``signals.parquet``."""
-        table: dict[str, list[Any]] = {"time": [], "microstep": [], "signal": [], "field": [], "value": []}
-        for name, signal in self.signals.items():
-            for tag, token in zip(signal.tags, signal.tokens, strict=True):
-                for place, value in scalars(token):
-                    table["time"].append(to_seconds(tag.time))
-                    table["microstep"].append(tag.microstep)
-                    table["signal"].append(name)
-                    table["field"].append(place)
-                    table["value"].append(value)
+        """All that was recorded in long form, the columns of ``signals.parquet``: a row for each leaf of each token.
+
+        ``time`` is in s, ``time_ns`` the same as an integer, ``field`` the place in the token, and ``type`` says what
+        was there.  ``value`` is a number, or 0 or 1 for false or true; ``text`` is anything else, and the digits of an
+        int that no float is.
+        """
+        rows = (
+            (to_seconds(tag.time), *tag, name, place, *(("float", leaf, None) if type(leaf) is float else cell(leaf)))
+            for name, signal in self.signals.items()
+            for tag, token in zip(signal.tags, signal.tokens, strict=True)
+            for place, leaf in leaves(token)
+        )
+        table: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+        while some := list(islice(rows, 10_000)):
+            for column, values in zip(table.values(), zip(*some, strict=True), strict=True):
+                column.extend(values)
         return table
 
     def to_pandas(self) -> pandas.DataFrame:
-        """All recorded numbers in long form: ``time`` (s), ``microstep``, ``signal``, ``field``, ``value``."""
+        """All that was recorded in long form, as ``table`` has it."""
         frame: pandas.DataFrame = pandas_module().DataFrame(self.table())
         return frame
 
@@ -157,10 +134,10 @@ class Results:
         ]
         return [
             Table(
-                ("metric", "value", "unit"),
+                ("metric", "value", "unit", ""),
                 [
-                    (name, "-" if value is None else short(value), self.units.get(name, ""))
-                    for name, value in self.metrics.items()
+                    (name, found.shown(short), self.units.get(name, ""), "; ".join(found.remarks))
+                    for name, found in self.outcomes.items()
                 ],
             ),
             Table(("aspect", "figure", "value"), figures),

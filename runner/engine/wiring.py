@@ -20,8 +20,8 @@ from epicycle.actors import (
 )
 from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint, Medium, Unit
 
-from ..model import Clock, Hop, Model, WovenAspect
-from .director import ActorError, Director, LoopError, describe
+from ..model import Clock, Hop, Model, WovenAspect, describe
+from .director import ActorError, CrowdError, Director, LoopError
 from .execution import Execution
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog, Write
@@ -119,7 +119,10 @@ class Wiring:
         for woven in self._wrong_clocks:
             if isinstance(woven.aspect, ClockAspect) and path in woven.actors:
                 random = random_stream(self.director.seed, woven.actors[path], f"aspect {woven.name}")
-                ahead, speed = woven.aspect.error(random)
+                try:
+                    ahead, speed = woven.aspect.error(random)
+                except Exception as error:
+                    raise self._error(woven, f"error() at {path}", error) from error
                 clock = Clock(clock.start + ahead, clock.rate * speed)
         if clock == before:
             return self.director_of(path)
@@ -276,10 +279,17 @@ class Wiring:
             return through
 
         def through_if_active(token: Any) -> None:
-            if woven.aspect.is_due(point.tag.time) and self._holds(woven, point):
-                through(token)
-            else:
-                woven.aspect.pass_by(token, point)
+            doing = "is_due()"
+            try:
+                if woven.aspect.is_due(point.tag.time) and self._holds(woven, point):
+                    through(token)
+                else:
+                    doing = "pass_by()"
+                    woven.aspect.pass_by(token, point)
+            except (ActorError, LoopError):  # of what comes behind it
+                raise
+            except Exception as error:
+                raise self._error(woven, f"{doing} at {path}", error) from error
 
         return through_if_active
 
@@ -342,7 +352,10 @@ class Wiring:
     def _forget(self, path: str) -> None:
         """Tell the aspects at an actor that it has lost its state."""
         for woven in self._woven_at.get(path, ()):
-            woven.aspect.forget(self._points_at[woven.name, path])
+            try:
+                woven.aspect.forget(self._points_at[woven.name, path])
+            except Exception as error:
+                raise self._error(woven, f"forget() at {path}", error) from error
 
     def begin(self) -> None:
         """Let the aspects begin that act of their own accord."""
@@ -384,7 +397,10 @@ class Loom:
 
     def later(self, delay: int, deliver: Deliver, token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
-        self._local.later(delay, partial(self._deliver, deliver), token)
+        try:
+            self._local.later(delay, partial(self._deliver, deliver), token)
+        except CrowdError as error:
+            raise error.of(self._blame(error).path) from None
 
     def _deliver(self, deliver: Deliver, token: Any) -> None:
         try:

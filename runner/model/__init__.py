@@ -2,25 +2,30 @@
 
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
+from .culprit import describe, raised_at
 from .ends import CompositePort, Instance
 from .graph import Hop, ModelGraph, Wire
+from .limits import NORMAL, RAISE_IT, Limits
 from .load import load_model
 from .model import Model
 from .observation import Metric
 from .packaged import is_path, packaged_disturbances, packaged_models, packaged_studies
 from .patterns import PatternError, select
-from .problems import ModelError, Position, Problem, Problems, did_you_mean
+from .problems import ModelError, Position, Problem, Problems, did_you_mean, told_raised
 from .schedule import firing_order
 from .scope import Composite
 from .woven import WovenAspect, extent
 
 __all__ = [
+    "NORMAL",
+    "RAISE_IT",
     "Clock",
     "Composite",
     "CompositeClass",
     "CompositePort",
     "Hop",
     "Instance",
+    "Limits",
     "Metric",
     "Model",
     "ModelError",
@@ -31,6 +36,7 @@ __all__ = [
     "Problems",
     "Wire",
     "WovenAspect",
+    "describe",
     "did_you_mean",
     "extent",
     "firing_order",
@@ -40,5 +46,7 @@ __all__ = [
     "packaged_disturbances",
     "packaged_models",
     "packaged_studies",
+    "raised_at",
     "select",
+    "told_raised",
 ]

@@ -15,11 +15,13 @@ import networkx as nx
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, Request
 
+from .configuration import place_of
 from .declarations import PartText, PointcutText
+from .firing_times import without_port
 from .graph import Detour, ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect
 
 BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
@@ -39,7 +41,7 @@ class ModelWeaving(Weaving):
     def __init__(
         self,
         graph: ModelGraph,
-        ports: PathIndex,
+        paths: Paths,
         name: str,
         path: str,
         scope: str,
@@ -47,7 +49,7 @@ class ModelWeaving(Weaving):
         position: Position,
         cls: type[Aspect] = CompositeAspect,
     ) -> None:
-        super().__init__(graph, ports, name, cls, scope, problems)
+        super().__init__(graph, paths, name, cls, scope, problems)
         self.path = path
         self.position = position
         self.model = AspectModel(path, graph.composites[path], "", {})
@@ -65,16 +67,13 @@ class ModelWeaving(Weaving):
         self.model.response = self._only(self.outputs, "response", "output", self.position)
         if not self.requests and not self._is_unsure:
             self._request(PointcutText("", self.position))
-        if self._is_unsure:
-            self.graph.leave_open(self.path)
         for port in self.requests:
-            for hop in list(self.graph.incoming(port)):
+            for hop in self.graph.incoming(port):
                 self._problem(
                     f"{port} is for the tokens of this aspect, and nothing else can be connected to it",
                     hop.position,
                     "add another input for what else the composite needs",
                 )
-                self.graph.disconnect(hop)
             if isinstance(self.graph.ports.nodes[port]["port"], OutputPort):
                 self._problem(
                     f"{self.path} is the model of another aspect already",
@@ -86,7 +85,11 @@ class ModelWeaving(Weaving):
 
     def connect(self, woven: WovenAspect) -> None:
         """Let the tokens of all places come in, and go on when they are answered."""
+        if self._is_unsure:
+            self.graph.leave_open(self.path)
         for port in self.requests:
+            for hop in list(self.graph.incoming(port)):  # a problem, and told as such
+                self.graph.disconnect(hop)
             self.graph.open_requests(port)
         if self.model.response:
             self.graph.ports.nodes[self.model.response]["type"] = Request
@@ -108,7 +111,12 @@ class ModelWeaving(Weaving):
         outside = [path for path in found if path != self.path and not self._is_inside(path)]
         self._ask(pointcut, outside, found)
         if not pointcut.exclude:
-            self.model.times.update(dict.fromkeys(outside, pointcut.seconds))
+            self.model.times.update(dict.fromkeys(outside, pointcut.firing_time))
+            inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
+            for message, keys, advice in without_port(("time",), pointcut.firing_time, inside, self.graph):
+                time = pointcut.time
+                where = pointcut.position if time is None else place_of(time, keys[1:], of_key=True)
+                self._problem(message, where, advice)
         return outside
 
     def _of(self, pointcut: PointcutText) -> list[str]:

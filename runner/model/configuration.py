@@ -6,12 +6,15 @@ import re
 from collections.abc import Collection
 from pathlib import Path
 
-from epicycle.actors import Configurable, ParameterError, declared_parameters, unknown_parameter
+from epicycle.actors import Configurable, EpicycleError, ParameterError, declared_parameters, unknown_parameter
 
+from .culprit import describe, raised_at
 from .declarations import CompositeText
 from .document import Entry, Mapping, Node
 from .files import data_file
 from .graph import ModelGraph
+from .limits import RAISE_IT
+from .patterns import TooManyError
 from .problems import Position, Problems, did_you_mean, nearest
 from .settings import Setting, Settings
 from .values import Values
@@ -85,7 +88,12 @@ class Configurator:
     def _setting(self, full: str) -> Setting | None:
         """The setting for a parameter, if there is one."""
         self.settable[full] = None
-        return self.settings.find(full)
+        try:
+            return self.settings.find(full)
+        except TooManyError as error:
+            self.problems.add(f"{full}: {error}", self.settings.position, RAISE_IT)
+            self.problems.raise_if_any()
+            raise AssertionError("too many paths are a problem") from None
 
     def _set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
         """The parameters of something that is made already which are set from outside, with their new values."""
@@ -98,7 +106,7 @@ class Configurator:
             try:
                 changed[name] = parameter.convert(value)
             except ParameterError as error:
-                self.problems.add(f"{path}.{name}: {error}", _place(setting.node, error))
+                self.problems.add(f"{path}.{name}: {error}", place_of(setting.node, error.keys, of_key=error.of_key))
         return changed
 
     def _configuration(
@@ -147,8 +155,22 @@ class Configurator:
                 if parameter.type is Path and result[name] is not None:
                     result[name] = data_file(Path(value), node.position)
             except ParameterError as error:
-                self.problems.add(f"{label}.{name}: {error}", _place(node, error), scope=composite)
+                self.problems.add(
+                    f"{label}.{name}: {error}", place_of(node, error.keys, of_key=error.of_key), scope=composite
+                )
+            except Exception as error:  # of a class of a user's
+                self._blame(f"{label}.{name}", error, node.position, composite)
         return result if complete and len(self.problems) == before else None
+
+    def _blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
+        """Tell what the code of a class has against its values, or how it failed."""
+        if isinstance(error, EpicycleError):
+            self.problems.add(f"{label}: {error}", position, scope=scope)
+            return
+        told = str(error) if isinstance(error, ValueError) else ""
+        self.problems.add(
+            f"{label}: {told or describe(error)}", position, scope=scope, raised=raised_at(error), cause=error
+        )
 
     def _add_unused(self, setting: Setting) -> None:
         """A setting that no parameter took, unless it is meant for an array that is empty now."""
@@ -179,12 +201,12 @@ def _in_terms_of(pattern: str, path: str) -> str:
     return ".".join(parts)
 
 
-def _place(node: Node, error: ParameterError) -> Position:
-    """Where in a value, as far as it is written out, an error is."""
-    for number, key in enumerate(error.keys, start=1):
+def place_of(node: Node, keys: tuple[str, ...], *, of_key: bool) -> Position:
+    """Where in a value, as far as it is written out, ``keys`` lead; ``of_key``: to the last of them itself."""
+    for number, key in enumerate(keys, start=1):
         if not isinstance(node, Mapping) or key not in node.entries:
             break
-        if error.of_key and number == len(error.keys):
+        if of_key and number == len(keys):
             return node.entries[key].key.position
         node = node.entries[key].value
     return node.position

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from keyword import iskeyword
 
-from epicycle.actors import Parameter, ParameterError, UnitError, parse_unit
+from epicycle.actors import Parameter, ParameterError, UnitError, declared_parameters, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
+from epicycle.aspects import FiringTime
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
-from .problems import Position, did_you_mean, nearest
+from .measure import TAKES, Measure, take_problem
+from .problems import Position, nearest
 from .reading import NAME, SURE, NodeReader, Text, inside, split
-
-REDUCTIONS = ("last", "first", "min", "max", "sum", "mean", "count")
 
 MODEL_KEYS = (
     "model",
@@ -44,6 +44,7 @@ STUDY_KEYS = (
     "guideline",
     "figures",
 )
+STUDY_METRIC_KEYS = ("value", "unit", "to", "doc")
 RANGE_KEYS = ("from", "to", "step")
 HYPERCUBE_KEYS = ("size", "seed", "ranges")
 UNTIL_KEYS = ("metric", "half_width", "batch", "at_most")
@@ -57,7 +58,7 @@ PORT_KEYS = ("type", "doc")
 CONNECTION_KEYS = ("from", "to", "all", "delay")
 POINTCUT_KEYS = ("at", "type", "tag", "port", "parameter", "request", "time")
 RUN_KEYS = ("stop", "stop_when", "seed", "record")
-METRIC_KEYS = ("of", "take", "unit", "doc")
+METRIC_KEYS = ("of", *declared_parameters(Measure))
 
 
 @dataclass
@@ -91,7 +92,7 @@ class PointcutText:
     """Where an aspect stands: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
 
     For an aspect that is a model, ``request`` is the port by which tokens or firings come in, ``time`` says that it
-    stands at actors and how long their firings take; ``seconds`` is its value.
+    stands at actors and how long their firings take; ``firing_time`` is its value.
     One that holds neither pattern, type nor tag is misshapen, and has been told so.
     """
 
@@ -104,7 +105,7 @@ class PointcutText:
     parameter: Text | None = None
     request: Text | None = None
     time: Node | None = None
-    seconds: float = 0.0
+    firing_time: FiringTime = 0.0
 
     @classmethod
     def of(cls, text: Text) -> PointcutText:
@@ -147,13 +148,11 @@ class ConnectionText:
 
 @dataclass
 class MetricText:
-    """A number taken from what a port sends."""
+    """A number taken from what a port sends; ``values`` are those of a ``Measure``."""
 
     name: str
     port: Text
-    take: str
-    unit: str
-    doc: str
+    values: dict[str, Entry]
     position: Position
 
 
@@ -488,21 +487,14 @@ class DeclarationReader(NodeReader):
         if "of" not in inner or _is_empty(inner["of"].value):
             self.problems.add(f"metric {name!r} does not say of what", entry.key.position, "add 'of: actor.port'")
             return None
-        port = self.text(inner["of"].value, "of")
+        of = inner.pop("of").value
+        port = self.text(of, "of")
         take = self.text(inner["take"].value, "take") if "take" in inner else "last"
-        if take is not None and take not in REDUCTIONS:
-            self.problems.add(
-                f"metric {name!r} cannot take {take!r}{did_you_mean(take, REDUCTIONS)}",
-                inner["take"].value.position,
-                f"valid reductions: {', '.join(REDUCTIONS)}",
-            )
+        if take is not None and (problem := take_problem(name, take)):
+            self.problems.add(problem[0], inner["take"].value.position, problem[1])
+        if port is None or take not in TAKES:
             return None
-        if port is None or take is None:
-            return None
-        unit = self.text(inner["unit"].value, "unit") if "unit" in inner else ""
-        doc = self.text(inner["doc"].value, "doc") if "doc" in inner else ""
-        position = inner["of"].value.position
-        return MetricText(name, Text(port, position), take, unit or "", doc or "", entry.key.position)
+        return MetricText(name, Text(port, of.position), inner, entry.key.position)
 
 
 def _is_empty(node: Node) -> bool:

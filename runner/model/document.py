@@ -23,13 +23,12 @@ from yaml.events import (
     ScalarEvent,
 )
 
-from epicycle.actors import irregular, open_regular
+from epicycle.actors import MAX_DEPTH, irregular, open_regular
 
 from .files import note_file
 from .problems import Position, Problems, did_you_mean
 
 MAX_BYTES = 10_000_000
-MAX_DEPTH = 100
 MAX_NODES = 200_000  # with each alias counted as often as it is used
 _MAX_DIGITS = 1_000
 

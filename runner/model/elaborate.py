@@ -11,7 +11,6 @@ from typing import Any
 
 from epicycle.actors import (
     Actor,
-    EpicycleError,
     Parameter,
     ParameterError,
     counted_in_si,
@@ -91,10 +90,11 @@ class Elaborator(AspectElaborator):
         Observation(model, self.values, self.problems).read(self.text, names)
         for name, part in self.text.figures.items():
             values = {
-                key: counted_in_si(self.values.of(entry.value, names, f"figure {name}.{key}"))
-                for key, entry in part.values.items()
+                key: self.values.of(entry.value, names, f"figure {name}.{key}") for key, entry in part.values.items()
             }
-            model.figures[name] = (part.type.text, values, part.type.position)
+            if not any(value is self.values.missing for value in values.values()):
+                in_si = {key: counted_in_si(value) for key, value in values.items()}
+                model.figures[name] = (part.type.text, in_si, part.type.position)
         return model
 
     def woven(self, graph: ModelGraph) -> list[WovenAspect]:
@@ -164,7 +164,7 @@ class Elaborator(AspectElaborator):
             self.problems.add(
                 f"{path}: there is no actor type {part.type.text!r}{did_you_mean(part.type.text, known)}",
                 part.type.position,
-                self._valid_types("actor", part.type.text),
+                *self._valid_types("actor", part.type.text),
                 scope=composite,
             )
             return None
@@ -345,8 +345,8 @@ class Elaborator(AspectElaborator):
                 self._actors.append(actor)
                 self.graph.add_actor(actor, part.position)
                 return actor
-            except (EpicycleError, ValueError) as error:  # what an actor's own __init__ has against it
-                self.problems.add(f"{path}: {error}", part.position, scope=composite)
+            except Exception as error:  # whatever an actor's own __init__ does
+                self._blame(path, error, part.position, composite)
         self.graph.add_unmade(path, actor_type)
         return None
 

@@ -4,23 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 
-from epicycle.actors import Actor, EpicycleError, Parameter, ParameterError
-from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, class_decorations
+from epicycle.actors import Actor, Parameter, ParameterError
+from epicycle.aspects import (
+    Aspect,
+    CompositeAspect,
+    CompositeExecutionAspect,
+    FiringTimeParameter,
+    class_decorations,
+)
 
 from .catalogue import Catalogue, CatalogueError
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
-from .configuration import Configurator
+from .configuration import Configurator, place_of
 from .declarations import CompositeText, PartText, PointcutText
 from .decorated import arranged, weave_decorations
 from .limits import RAISE_IT
-from .patterns import PathIndex
-from .problems import Problems, did_you_mean
+from .patterns import TooManyError
+from .problems import Position, Problems, did_you_mean
 from .settings import Settings
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .woven import WovenAspect
 
 MAX_SHOWN = 12  # types in one message
+OF_YOUR_OWN = "one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]"
 
 
 class AspectElaborator(Configurator):
@@ -46,9 +54,13 @@ class AspectElaborator(Configurator):
 
     def _weave(self) -> None:
         """Let all aspects stand where they are to, now that all ports exist."""
-        ports = PathIndex(self.graph.ports.nodes)
+        paths = Paths(self.graph)
         for name, scope, part, names in self._to_weave:
-            self._aspect(name, scope, part, names, ports)
+            try:
+                self._aspect(name, scope, part, names, paths)
+            except TooManyError as error:
+                self.problems.add(f"aspect {name}: {error}", part.position, RAISE_IT)
+                self.problems.raise_if_any()
         decorated = {cls for cls in set(map(type, self._actors)) if class_decorations(cls)}
         for actor in self._actors:
             if type(actor) in decorated and self.graph.actors.get(actor.path) is actor:
@@ -58,7 +70,7 @@ class AspectElaborator(Configurator):
         if check_nesting(self.aspects, self.graph, self.problems):
             self.graph.detours = detours(self.graph, self.aspects)
 
-    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], all_ports: PathIndex) -> None:
+    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], paths: Paths) -> None:
         cls = self._aspect_type(name, scope, part)
         if cls is None:
             return
@@ -73,24 +85,22 @@ class AspectElaborator(Configurator):
                 scope=scope,
             )
         self.graph.positions[f"aspect {name}"] = part.position
-        weaving = Weaving(self.graph, all_ports, name, cls, scope, self.problems)
+        weaving = Weaving(self.graph, paths, name, cls, scope, self.problems)
         if is_model and name in self.graph.composites:
-            weaving = ModelWeaving(self.graph, all_ports, name, name, scope, self.problems, part.position, cls)
+            weaving = ModelWeaving(self.graph, paths, name, name, scope, self.problems, part.position, cls)
             part = replace(part, at=[self._timed(pointcut, name, scope, names) for pointcut in part.at])
         is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)
-        except (EpicycleError, ValueError) as error:
-            self.problems.add(f"aspect {name}: {error}", part.position, scope=scope)
+        except Exception as error:  # whatever an aspect's own __init__ does
+            self._blame(f"aspect {name}", error, part.position, scope)
             aspect = None
         if aspect is None:
             weaving.select(part.at)  # for what is wrong with it
             if isinstance(weaving, ModelWeaving):
                 self.graph.leave_open(name)
             return
-        woven = weaving.weave(
-            aspect, part.at, lambda name: part.values[name].value.position if name in part.values else None
-        )
+        woven = weaving.weave(aspect, part.at, partial(_position, part))
         if isinstance(weaving, ModelWeaving):
             weaving.check(woven)
             weaving.connect(woven)
@@ -136,7 +146,7 @@ class AspectElaborator(Configurator):
             self.problems.add(
                 f"aspect {name}: there is no aspect type {wanted!r}{did_you_mean(wanted, [*known, *self.composites])}",
                 part.type.position,
-                self._valid_types("aspect", wanted),
+                *self._valid_types("aspect", wanted),
                 scope=scope,
             )
             return None
@@ -151,17 +161,18 @@ class AspectElaborator(Configurator):
         return cls
 
     def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
-        """The pointcut with its execution time in s."""
+        """The pointcut with its execution time."""
         if pointcut.time is None:
             return pointcut
         label = f"aspect {name}: time"
         value = self.values.of(pointcut.time, names, label, scope)
         try:
-            seconds = 0.0 if value is self.values.missing else Parameter(float, unit="s", min=0.0).convert(value)
+            time = 0.0 if value is self.values.missing else FiringTimeParameter().convert(value)
         except ParameterError as error:
-            self.problems.add(f"{label}: {error}", pointcut.time.position, scope=scope)
+            position = place_of(pointcut.time, error.keys, of_key=error.of_key)
+            self.problems.add(f"{label}: {error}", position, scope=scope)
             return pointcut
-        return replace(pointcut, seconds=seconds or 0.0)
+        return replace(pointcut, firing_time=time or 0.0)
 
     def _is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
         if part.enabled is None:
@@ -174,16 +185,23 @@ class AspectElaborator(Configurator):
             self.problems.add(f"{label}: {error}", part.enabled.position, scope=scope)
             return True
 
-    def _valid_types(self, kind: str, asked: str) -> str:
-        """Which types there are: their names, or how to see them if they are too many for a message."""
+    def _valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
+        """Which types there are: their names, or how to see them if they are too many; and how there can be more."""
         is_actor = kind == "actor"
         types: Collection[str] = self.catalogue.actors if is_actor else self.catalogue.aspects
         others: Collection[str] = self.catalogue.aspects if is_actor else self.catalogue.actors
         if asked in others:
             other = "aspect" if is_actor else "actor"
-            return f"{asked} is an {other}: it belongs under '{other}s'"
+            return (f"{asked} is an {other}: it belongs under '{other}s'",)
         composites = sorted(self.composites) if is_actor else []
         if len(composites) + len(types) <= MAX_SHOWN:
-            return f"valid types: {', '.join(sorted([*composites, *types]))}"
-        own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
-        return f"valid types: {f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+            valid = ", ".join(sorted([*composites, *types]))
+        else:
+            own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
+            valid = f"{f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+        return f"valid types: {valid}", OF_YOUR_OWN
+
+
+def _position(part: PartText, name: str, *keys: str) -> Position | None:
+    """Where a declaration sets a parameter, or a key in it."""
+    return place_of(part.values[name].value, keys, of_key=True) if name in part.values else None

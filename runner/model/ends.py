@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
-from epicycle.aspects import Aspect
+from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from .problems import ModelError, Position, Problem, Problems
 
@@ -75,12 +75,12 @@ def check_aspect(aspect: object, kinds: tuple[type, ...], position: Position, pr
         problems.add(f"{shown} is no aspect", position, "give an object, such as PacketLoss(probability=0.1)")
 
 
-def seconds_of(time: float | str | None, aspect: object, position: Position, problems: Problems) -> float | None:
-    """An execution time in s; None: the aspect does not stand at actors, or not as a model."""
+def firing_time_of(time: object, aspect: object, position: Position, problems: Problems) -> FiringTime | None:
+    """How long firings take; None: the aspect does not stand at actors, or not as a model."""
     if time is not None and isinstance(aspect, Aspect):
         problems.add(f"{type(aspect).__name__} is no composite, so 'time' is not for weave() to say", position)
     try:
-        return None if time is None else Parameter(float, unit="s", min=0.0).convert(time)
+        return None if time is None else FiringTimeParameter().convert(time)
     except ParameterError as error:
         problems.add(f"time: {error}", position)
         return None

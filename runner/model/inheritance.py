@@ -15,6 +15,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from .declarations import CompositeText, ConnectionText, PartText, PointcutText, PortText
+from .limits import NORMAL, RAISE_IT, Limits
 from .problems import Position, Problems, did_you_mean
 from .reading import Text
 
@@ -22,11 +23,15 @@ MAX_BASES = 50
 
 
 def inherit(
-    composites: dict[str, CompositeText], actor_types: Collection[str], problems: Problems
+    composites: dict[str, CompositeText],
+    actor_types: Collection[str],
+    problems: Problems,
+    limits: Limits = NORMAL,
 ) -> tuple[dict[str, CompositeText], set[str]]:
     """The classes with what they inherit, and the names of those that cannot be made for lack of a base."""
     whole = {name: text for name, text in composites.items() if text.extends is None}
     broken: set[str] = set()
+    inherited = 0
     for each in composites:
         name = each
         # From the class up to the first base that is done with, then back down: no recursion, however long the way.
@@ -46,8 +51,19 @@ def inherit(
             if base.text in broken:
                 broken.add(text.name)
             if text.name not in broken:
+                inherited += _size(whole[base.text])
+                if inherited > limits.inherited:
+                    most = f"{limits.inherited:,} actors, aspects, connections, ports and parameters"
+                    problems.add(f"{text.name}: the classes take over more than {most}", base.position, RAISE_IT)
+                    problems.raise_if_any()
                 whole[text.name] = _Heir(whole[base.text], text, problems).composite()
     return {name: whole[name] for name in composites if name in whole}, broken
+
+
+def _size(text: CompositeText) -> int:
+    """How much there is to be taken over from a class."""
+    parts = (text.actors, text.aspects, text.connections, text.inputs, text.outputs, text.parameters)
+    return sum(map(len, parts))
 
 
 def _is_sound(

@@ -60,7 +60,7 @@ def load_model(
     model may name beside the installed ones.  ``max_actors`` is how many actors and composites are not taken for a
     mistake, and a fifth of how many connections.  What is odd but not wrong is in ``Model.warnings``.
     """
-    problems = Problems()
+    problems, limits = Problems(), Limits(max_actors)
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += _settings(set, problems)
     with without_collection():
@@ -68,7 +68,7 @@ def load_model(
         declared = included_composites(text, path, reader, problems)
         catalogue = installed().with_types(types)
         disturbances = load_disturbances(map(str, _several(disturb)), declared, problems)
-        composites, broken = inherit(declared, catalogue.actors, problems)
+        composites, broken = inherit(declared, catalogue.actors, problems, limits)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What disturbances set comes first, for the last one wins.
         settings = add_disturbances(text, disturbances, problems) + settings
@@ -76,10 +76,15 @@ def load_model(
             without(text, change, problems)
         for change in aspects:
             change_aspect(text, change, problems)
-        elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken, Limits(max_actors))
+        elaborator = Elaborator(text, composites, Settings(settings, limits), problems, catalogue, broken, limits)
         model = elaborator.model()
-        try_classes(composites, elaborator.made, problems, catalogue, broken)
+        try_classes(composites, elaborator, broken)
+        if model.figures:
+            from ..show import figures_of  # here, for what is shown stands on what is run, and this on models
+
+            figures_of(model, problems)
         problems.raise_if_any()
+        model.warnings = problems.warnings
         model.is_checked = True
         return model
 

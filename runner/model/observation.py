@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import Parameter, ParameterError, accepts, to_nanoseconds, type_name
+from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, to_nanoseconds, type_name
 
 from .declarations import DeclarationReader, MetricText, ModelText
-from .patterns import PathIndex, PatternError
-from .problems import Problems
+from .document import Node, Scalar, plain
+from .limits import RAISE_IT
+from .measure import Measure
+from .patterns import PathIndex, PatternError, TooManyError
+from .problems import Position, Problems, did_you_mean
 from .reading import Text
 from .values import Values
 
@@ -22,13 +26,16 @@ MAX_SEED = 2**63 - 1
 
 @dataclass
 class Metric:
-    """A number taken from what some ports send: ``take`` is a reduction over all their tokens."""
+    """A number taken from what some ports send together."""
 
     name: str
     ports: list[str]
-    take: str
-    unit: str
-    doc: str
+    measure: Measure
+
+    @property
+    def unit(self) -> str:
+        """What it counts in."""
+        return self.measure.to or self.measure.own_unit
 
 
 class Observation:
@@ -40,17 +47,20 @@ class Observation:
         self.values = values
         self.problems = problems
         ports = self.graph.ports.nodes(data="direction")
-        self._outputs = PathIndex(path for path, direction in ports if direction == "output")
+        outputs = (path for path, direction in ports if direction == "output")
+        self._outputs = PathIndex(outputs, self.graph.limits)
+        self._recorded = set(model.recorded)
+        self._watched = 0
 
     def read(self, text: ModelText, names: dict[str, object]) -> None:
         """Everything that the model file says about it."""
         reader = DeclarationReader(self.problems)
         for key, entry in text.run.items():
             if key == "record":
-                for each in reader.texts(entry.value, key):
+                for each in _different(reader.texts(entry.value, key)):
                     self.record(each)
             elif key == "stop_when":
-                for each in reader.texts(entry.value, key):
+                for each in _different(reader.texts(entry.value, key)):
                     self.stop_when(each)
             else:
                 value = self.values.of(entry.value, names, key)
@@ -64,11 +74,26 @@ class Observation:
                 except (ParameterError, ValueError) as error:
                     self.problems.add(f"{key}: {error}", entry.value.position)
         for metric in text.metrics:
-            self.metric(metric)
+            self._read_metric(metric, names)
+
+    def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
+        """A metric as the file gives it."""
+        values: dict[str, object] = {}
+        for key, entry in text.values.items():
+            # What is only read by people holds no expressions.
+            if key in ("take", "unit", "to", "doc"):
+                values[key] = _words(entry.value)
+            else:
+                values[key] = self.values.of(entry.value, names, f"metric {text.name}, {key}")
+        places = {key: entry.value.position for key, entry in text.values.items()}
+        if self.values.missing not in values.values():
+            self.metric(text.name, text.port, values, text.position, places)
 
     def record(self, text: Text) -> None:
         """Keep what the ports behind a pattern send."""
-        self.model.recorded = list(dict.fromkeys([*self.model.recorded, *self._select(text, "record")]))
+        found = [path for path in self._select(text, "record") if path not in self._recorded]
+        self._recorded.update(found)
+        self.model.recorded += found
 
     def stop_when(self, text: Text) -> None:
         """End the run when a port behind the pattern sends something true."""
@@ -84,24 +109,61 @@ class Observation:
                     )
                     return
 
-    def metric(self, metric: MetricText) -> None:
-        """Reduce what the ports behind a pattern send to one number."""
-        what = f"metric {metric.name}"
-        self.graph.positions[what] = metric.position
-        paths = self._select(metric.port, what)
-        self.model.metrics.append(Metric(metric.name, paths, metric.take, metric.unit, metric.doc))
-        if metric.take == "count":
+    def metric(
+        self,
+        name: str,
+        of: Text,
+        options: Mapping[str, object],
+        position: Position,
+        places: Mapping[str, Position] | None = None,
+    ) -> None:
+        """Take one number from what the ports behind a pattern send; ``places``: where its options stand."""
+        what = f"metric {name}"
+        measure = self._measure(what, options, position, places or {})
+        if measure is None:
             return
-        wanted: Any = float | bool if metric.take not in ("first", "last") else float | bool | str
+        self.graph.positions[what] = position
+        paths = self._select(of, what)
+        self._watched += len(paths)
+        limit = self.graph.limits.watched
+        if self._watched > limit:
+            self.problems.add(f"{what}: metrics are taken from more than {limit:,} ports", position, RAISE_IT)
+            self.problems.raise_if_any()
+        self.model.metrics.append(Metric(name, paths, measure))
+        if measure.kind.of == "any":
+            return
+        wanted: Any = float | bool if measure.kind.of == "numbers" else float | bool | str
         for path in paths:
             for port in self.graph.source_of(path):
                 if port.type in (Any, object) or not accepts(wanted, port.type):
                     self.problems.add(
-                        f"{what}: {path} sends {type_name(port.type)}, of which there is no {metric.take!r}",
-                        metric.port.position,
+                        f"{what}: {path} sends {type_name(port.type)}, of which there is no {measure.take!r}",
+                        of.position,
                         "name a port that sends numbers, or take 'count'",
                     )
                     return
+
+    def _measure(
+        self, what: str, options: Mapping[str, object], position: Position, places: Mapping[str, Position]
+    ) -> Measure | None:
+        """What is taken; None, and problems, if that cannot be."""
+        before = len(self.problems)
+        values: dict[str, object] = {}
+        declared = declared_parameters(Measure)
+        for key, value in options.items():
+            if key not in declared:
+                self.problems.add(f"{what}: there is no option {key!r}{did_you_mean(key, declared)}", position)
+                continue
+            try:
+                values[key] = declared[key].convert(value)
+            except ParameterError as error:
+                self.problems.add(f"{what}, {key}: {error}", places.get(key, position))
+        if len(self.problems) > before:
+            return None
+        measure = Measure(**values)
+        for option, problem, advice in measure.misfits():
+            self.problems.add(f"{what}: {problem}", places.get(option, position), *([advice] if advice else []))
+        return measure
 
     def _select(self, text: Text, what: str) -> list[str]:
         """The output ports that a pattern selects, composites' included."""
@@ -110,6 +172,10 @@ class Observation:
         except PatternError as error:
             self.problems.add(f"{what}: {text.text!r} is no pattern: {error}", text.position)
             return []
+        except TooManyError as error:
+            self.problems.add(f"{what}: {error}", text.position, RAISE_IT)
+            self.problems.raise_if_any()
+            raise AssertionError("too many paths are a problem") from None
         if found or self.graph.is_excused(text.text):
             return found
         guess = self._outputs.did_you_mean(text.text)
@@ -124,6 +190,19 @@ class Observation:
                 *self._outputs.advice(text.text),
             )
         return []
+
+
+def _different(texts: list[Text]) -> list[Text]:
+    """The texts, each once: a pattern may select all of a model."""
+    found: dict[str, Text] = {}
+    for each in texts:
+        found.setdefault(each.text, each)
+    return list(found.values())
+
+
+def _words(node: Node) -> object:
+    """A text, which may look like something else: ``unit: 1``."""
+    return node.text if isinstance(node, Scalar) and node.value is not None else plain(node)
 
 
 def nanoseconds(duration: object) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import isabstract
 from pathlib import Path
@@ -57,11 +58,14 @@ def _imported(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # whatever the user's module does
-        del sys.modules[name]
+    except BaseException as error:  # whatever the user's module does
+        sys.modules.pop(name, None)
+        if type(error) is KeyboardInterrupt:  # Ctrl-C
+            raise
         raise TypesError(f"--types {path}: {type(error).__name__}: {error}{_line(error, file)}") from error
     finally:
-        sys.path.remove(str(file.parent))
+        with suppress(ValueError):
+            sys.path.remove(str(file.parent))
     return module
 
 

@@ -5,9 +5,9 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from epicycle.actors import EpicycleError, did_you_mean, nearest
+from epicycle.actors import EpicycleError, did_you_mean, nearest, shortened, visible, visible_character
 
-# The runner takes the last two from here, as it does all that makes a message.
+# The runner takes the functions from here, as it does all that makes a message.
 __all__ = ["ModelError", "Position", "Problem", "Problems", "did_you_mean", "nearest", "visible"]
 
 MAX_PROBLEMS = 100
@@ -35,17 +35,17 @@ class Problem:
     position: Position | None = None
     help: tuple[str, ...] = ()
     severity: str = "error"  # or "warning"
+    raised: Position | None = None  # the line of a user's program that raised an exception
 
     def __str__(self) -> str:
-        head = f"{self.severity}: {visible(self.message)}"
+        head = f"{self.severity}: {visible(shortened(self.message))}"
         lines = [head]
         if (at := self.position) is not None:
             lines = [f"{visible(at.file)}:{at.line}:{at.column}: {head}"]
-            if at.length:  # the lines of a Python prompt cannot be had
-                source, carets = _excerpt(at)
-                gutter = max(5, len(str(at.line)))
-                lines += [f"{at.line:>{gutter}} | {source}".rstrip(), f"{'':>{gutter}} | {carets}"]
-        lines += [f"   help: {visible(line)}" for line in self.help]
+            lines += marked(at)
+        if self.raised is not None:
+            lines += told_raised(self.raised)
+        lines += [f"   help: {visible(shortened(line))}" for line in self.help]
         return "\n".join(lines)
 
 
@@ -76,6 +76,7 @@ class Problems:
         self._warnings: dict[tuple[str, Position | None], Problem] = {}
         self._unsaid = 0
         self._spoilt: set[Position] = set()
+        self._cause: BaseException | None = None  # the first exception that was not ours
         self.muted = False  # while true, problems count for len() alone: they repeat what has been said
 
     def __len__(self) -> int:
@@ -101,10 +102,19 @@ class Problems:
             key = _INDEX.sub("[]", message), position
             self._warnings.setdefault(key, Problem(message, position, hints, "warning"))
 
-    def add(self, message: str, position: Position | None = None, *hints: str, scope: str = "") -> None:
+    def add(
+        self,
+        message: str,
+        position: Position | None = None,
+        *hints: str,
+        scope: str = "",
+        raised: Position | None = None,
+        cause: BaseException | None = None,
+    ) -> None:
         """Note a problem; each hint becomes a line of help.  One too many raises all that there are as a ModelError.
 
         ``scope`` is the path, within the message, of the instance of a composite class that stands for them all.
+        ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
         """
         if self.muted or position in self._spoilt:
             self._unsaid += 1
@@ -113,8 +123,11 @@ class Problems:
         if key in self._kept:
             return
         if len(self._kept) == MAX_PROBLEMS:
-            raise self._error(more=True)  # to find them all, and what each was meant to be, may take very long
-        self._kept[key] = Problem(message, position, hints)
+            raise self._error(
+                more=True
+            ) from self._cause  # to find them all, and what each was meant to be, may take very long
+        self._kept[key] = Problem(message, position, hints, raised=raised)
+        self._cause = self._cause or cause
 
     def spoil(self, position: Position) -> None:
         """Let nothing more be said of what stands there: it would only be a consequence of what has been said."""
@@ -123,7 +136,7 @@ class Problems:
     def raise_if_any(self) -> None:
         """Raise all problems as one ModelError, if there are any."""
         if self._kept:
-            raise self._error()
+            raise self._error() from self._cause
 
     def _error(self, *, more: bool = False) -> ModelError:
         return ModelError(sorted(self.found, key=self._place), more)
@@ -136,22 +149,25 @@ class Problems:
         return files.index(at.file), at.line, at.column
 
 
-def visible(text: str) -> str:
-    """Return the text with everything a terminal would obey or hide written as an escape."""
-    return text if text.isprintable() else "".join(map(_visible_character, text))
+def told_raised(at: Position) -> list[str]:
+    """The lines of a message that say where an exception comes from."""
+    return [f"   raised at {visible(at.file)}:{at.line}:{at.column}", *marked(at)]
 
 
-def _visible_character(character: str) -> str:
-    if character.isprintable():
-        return character
-    return character.encode("unicode_escape").decode("ascii")
+def marked(at: Position) -> list[str]:
+    """The line of a place and the carets below it; nothing if it cannot be had, as those of a Python prompt."""
+    if not at.length:
+        return []
+    source, carets = _excerpt(at)
+    gutter = max(5, len(str(at.line)))
+    return [f"{at.line:>{gutter}} | {source}".rstrip(), f"{'':>{gutter}} | {carets}"]
 
 
 def _cell(character: str) -> tuple[str, int]:
     """Return how one character of a source line is shown, and how many columns that takes."""
     if character == "\t":
         return "    ", 4
-    shown = _visible_character(character)
+    shown = visible_character(character)
     if len(shown) > 1 or shown.isascii():
         return shown, len(shown)
     if unicodedata.category(shown) in ("Mn", "Me"):

@@ -36,6 +36,7 @@ class PortReference:
     required: bool
     depends_on: tuple[str, ...] | None
     doc: str
+    triggers: bool = True  # of an input: whether a token there makes the actor do its work
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,7 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
                 getattr(port, "required", False),
                 getattr(port, "depends_on", None),
                 port.doc,
+                getattr(port, "triggers", True),
             )
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),

@@ -14,13 +14,14 @@ from keyword import kwlist
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import Actor, Configurable, Parameter, declared_parameters
+from epicycle.actors import Actor, Configurable, MappingParameter, Parameter, declared_parameters
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
-from epicycle.aspects import Aspect
+from epicycle.aspects import Aspect, FiringTimeParameter
 
 from . import declarations as language
 from .catalogue import Catalogue
 from .limits import NORMAL
+from .measure import TAKES, Measure
 from .observation import MAX_SEED
 from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
 from .schema_parts import QUANTITY, TEXT, Schema, mapping, one_or_more, ref, text
@@ -53,6 +54,7 @@ def json_schema(
         "text": TEXT,
         "texts": one_or_more({"type": "string"}),
         "expression": {"type": "string", "pattern": EXPRESSION},
+        "firing_time": _value(FiringTimeParameter()),
         "port": {
             "type": "string",
             **text(
@@ -184,7 +186,7 @@ _BODY: dict[str, tuple[Schema, str]] = {
     ),
     "aspects": (_named("aspect"), "What is woven around ports: 'name: {type, at, enabled, <parameter>: <value>}'."),
     "run": (ref("run"), "How long a run takes, and what it records."),
-    "metrics": (_named("metric"), "Numbers taken from what ports send: 'name: {of, take, unit, doc}'."),
+    "metrics": (_named("metric"), "Numbers taken from what ports send: 'name: {of, take, after, unit, ...}'."),
     "figures": (_named("figure"), "Pictures of a run: 'name: {type, ...}'."),
 }
 _RUN: dict[str, tuple[Schema, str]] = {
@@ -222,13 +224,7 @@ _POINTCUT: dict[str, tuple[Schema, str]] = {
     "port": (ref("text"), "The name of the port; none: all ports where it can stand."),
     "parameter": (ref("text"), "The name of a parameter of the actors, for an aspect that alters numbers."),
     "request": (ref("text"), "For an aspect that is a composite: the input by which these tokens come in."),
-    "time": (_number("number", 0.0, unit="s"), "For a composite at actors: how long their firings take."),
-}
-_METRIC: dict[str, tuple[Schema, str]] = {
-    "of": (_PATTERN, "The output port (or a pattern for several)."),
-    "take": ({"enum": list(language.REDUCTIONS)}, "What is taken from the numbers that it sends (default: last)."),
-    "unit": (ref("text"), "What the number counts in."),
-    "doc": (ref("text"), "What it is."),
+    "time": (ref("firing_time"), "For a composite at actors: how long their firings take."),
 }
 # What stands beside the parameters of an actor, aspect or figure.
 _BESIDE: dict[str, tuple[Schema, str]] = {
@@ -243,21 +239,6 @@ _BESIDE: dict[str, tuple[Schema, str]] = {
     ),
     "tags": (one_or_more(ref("text")), "Names by which aspects can choose it: 'at: {tag: ...}'."),
     "enabled": (_FLAG, "Whether it does anything (default: true)."),
-}
-# A key of the language that is missing here is allowed to hold anything; a test says so.
-RULES = {
-    "MODEL_KEYS": _BODY,
-    "COMPOSITE_KEYS": _BODY,
-    "DISTURBANCE_KEYS": _BODY,
-    "LIBRARY_KEYS": _BODY,
-    "RUN_KEYS": _RUN,
-    "DIRECTOR_KEYS": _DIRECTOR,
-    "PARAMETER_KEYS": _PARAMETER,
-    "CONNECTION_KEYS": _CONNECTION,
-    "PORT_KEYS": _PORT,
-    "POINTCUT_KEYS": _POINTCUT,
-    "METRIC_KEYS": _METRIC,
-    **STUDY_RULES,
 }
 
 
@@ -317,7 +298,7 @@ def _connection() -> Schema:
 
 def _metric() -> Schema:
     return {
-        **mapping(language.METRIC_KEYS, _METRIC, "A number taken from what a port sends."),
+        **mapping(language.METRIC_KEYS, RULES["METRIC_KEYS"], "A number taken from what a port sends."),
         "type": "object",
         "required": ["of"],
     }
@@ -411,6 +392,9 @@ def _value(parameter: Parameter[Any]) -> Schema:
 def _plain_value(parameter: Parameter[Any]) -> Schema:
     if parameter.forms:
         return {"anyOf": [_plain_value(form) for form in parameter.forms]}
+    if isinstance(parameter, MappingParameter):
+        found = {"type": ["object", "string"], "additionalProperties": _plain_value(parameter.item)}
+        return found | text(EXPRESSION, f"expected a {parameter.describe_type()}")
     if type(parameter).convert is not Parameter.convert:
         return {}  # what a parameter with a conversion of its own takes, only the conversion knows
     if is_part(parameter):
@@ -457,3 +441,28 @@ def _about(parameter: Parameter[Any]) -> str:
         facts.append(f"default {shown(as_written(parameter.default))}")
     doc = parameter.doc[:1].upper() + parameter.doc[1:]
     return f"{doc} ({', '.join(facts)})" if doc else ", ".join(facts).capitalize()
+
+
+def _metric_rules() -> dict[str, tuple[Schema, str]]:
+    found = {key: (_value(each), _about(each)) for key, each in declared_parameters(Measure).items()}
+    found |= {key: (ref("text"), found[key][1]) for key in ("unit", "to", "doc")}
+    takes = {"enum": list(TAKES), "enumDescriptions": [f"{each.doc} ({each.over})" for each in TAKES.values()]}
+    found["take"] = takes, found["take"][1]
+    return {"of": (_PATTERN, "The output port (or a pattern for several)."), **found}
+
+
+# A key of the language that is missing here is allowed to hold anything; a test says so.
+RULES = {
+    "MODEL_KEYS": _BODY,
+    "COMPOSITE_KEYS": _BODY,
+    "DISTURBANCE_KEYS": _BODY,
+    "LIBRARY_KEYS": _BODY,
+    "RUN_KEYS": _RUN,
+    "DIRECTOR_KEYS": _DIRECTOR,
+    "PARAMETER_KEYS": _PARAMETER,
+    "CONNECTION_KEYS": _CONNECTION,
+    "PORT_KEYS": _PORT,
+    "POINTCUT_KEYS": _POINTCUT,
+    "METRIC_KEYS": _metric_rules(),
+    **STUDY_RULES,
+}

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from epicycle.actors import MAX_DEPTH, is_too_deep
+
 from .document import Entry, Mapping, Node, Scalar, Sequence
-from .problems import Position
+from .problems import ModelError, Position, Problem
 
 
 def call_site() -> Position:
@@ -27,16 +29,22 @@ def call_site() -> Position:
 
 
 def node_of(value: Any, position: Position) -> Node:
-    """A Python value as a model file would hold it."""
+    """A Python value as a model file would hold it; raises ``ModelError`` if it is nested too deeply for one."""
+    if is_too_deep(value):
+        raise ModelError([Problem(f"nested deeper than {MAX_DEPTH} levels", position)])
+    return _node(value, position)
+
+
+def _node(value: Any, position: Position) -> Node:
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
-        return Sequence(tuple(node_of(item, position) for item in value), position)
+        return Sequence(tuple(_node(item, position) for item in value), position)
     if isinstance(value, AnyMapping):
         return Mapping(
-            {str(key): Entry(_key(str(key), position), node_of(item, position)) for key, item in value.items()},
+            {str(key): Entry(_key(str(key), position), _node(item, position)) for key, item in value.items()},
             position,
         )
     # Anything else is handed on as it is, such as an object that a parameter of an actor takes.

@@ -26,6 +26,17 @@ _HYPERCUBE: dict[str, tuple[Schema, str]] = {
     ),
 }
 _METRICS: Schema = {"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]}
+_STUDY_METRIC: dict[str, tuple[Schema, str]] = {
+    "value": (TEXT, "The expression, over metrics of the model and what else a run tells."),
+    "unit": (ref("text"), "What it counts in; a metric of the model has its own."),
+    "to": (ref("text"), "The unit in which the table holds it (default: the same)."),
+    "doc": (ref("text"), "What it is."),
+}
+_METRIC_OF_STUDY: Schema = {
+    **mapping(language.STUDY_METRIC_KEYS, _STUDY_METRIC, "A number that is kept of each run."),
+    "type": "object",
+    "required": ["value"],
+}
 _LEVELS: Schema = {
     "type": "object",
     "minProperties": 1,
@@ -75,11 +86,15 @@ _STUDY: dict[str, tuple[Schema, str]] = {
     "metrics": (
         {
             "anyOf": [
-                {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": TEXT},
+                {
+                    "type": ["object", "null"],
+                    "propertyNames": ref("name"),
+                    "additionalProperties": {"anyOf": [TEXT, _METRIC_OF_STUDY]},
+                },
                 {"type": "array", "items": ref("name")},
             ]
         },
-        "What is kept of each run: names of the model's metrics, or 'name: expression' (default: all of the model's).",
+        "What is kept of each run: names of the model's metrics, or 'name: expression', or 'name: {value, unit, ...}'.",
     ),
     "claims": (
         {
@@ -107,6 +122,7 @@ _STUDY: dict[str, tuple[Schema, str]] = {
 STUDY_RULES = {
     "STUDY_KEYS": _STUDY,
     "UNTIL_KEYS": _UNTIL,
+    "STUDY_METRIC_KEYS": _STUDY_METRIC,
     "RANGE_KEYS": _RANGE,
     "HYPERCUBE_KEYS": _HYPERCUBE,
     "CLAIM_KEYS": _CLAIM,

@@ -4,43 +4,70 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from .catalogue import Catalogue
+from epicycle.actors import counted
+
 from .checks import check
 from .declarations import CompositeText, ModelText, PartText
 from .elaborate import Elaborator, TooLargeError
-from .problems import Problems
+from .limits import RAISE_IT
 from .settings import Settings
+from .values import Values
 
-MAX_INSTANCES = 10_000  # of one class; what is wrong shows in the first ones
+_OVERHEAD = 3  # what a class takes beside what is in it, as many actors
 
 
-def try_classes(
-    composites: Mapping[str, CompositeText],
-    used: Collection[str],
-    problems: Problems,
-    catalogue: Catalogue,
-    broken: Collection[str] = (),
-) -> None:
-    """Check what can be checked of every class of which the model has no instance."""
-    tried = set(used)
+def try_classes(composites: Mapping[str, CompositeText], model: Elaborator, broken: Collection[str] = ()) -> None:
+    """Check what can be checked of every class of which the model has no instance.
+
+    All trials together may cost as much as a model of the largest size; of classes that are left over, a warning tells.
+    """
+    problems, limits = model.problems, model.graph.limits
+    tried = set(model.made)
     inner = {
         part.type.text
         for composite in composites.values()
         for part in (*composite.actors.values(), *composite.aspects.values())
     }
+    left = limits.actors
+    untried: list[str] = []
     # Those that stand in no other come first, for the others are then tried as their parts.
     for name in sorted(composites, key=lambda name: name in inner):
-        if name not in tried:
-            trial = _Trial(ModelText(composites[name]), dict(composites), Settings(), problems, catalogue, broken)
-            trial.unfold(composites[name])
+        if name in tried:
+            continue
+        is_whole = False
+        if left > 0:
+            trial = _Trial(ModelText(composites[name]), dict(composites), Settings(), problems, model.catalogue, broken)
+            trial.values = Values(problems, model.values.budget)
+            trial.most = left
+            is_whole = trial.unfold(composites[name])
+            left -= trial.cost
             tried |= trial.made
+        if not is_whole:
+            untried.append(name)
+    if untried:
+        names = (
+            f"{untried[0]} is" if len(untried) == 1 else f"{untried[0]} and {counted(len(untried) - 1, 'other')} are"
+        )
+        problems.warn(
+            f"{names} not checked in full: the model has no instance of such a class, and to try all that it has none "
+            f"of takes more than {limits.actors:,} actors and composites",
+            composites[untried[0]].position,
+            RAISE_IT,
+        )
 
 
 class _Trial(Elaborator):
     """Unfolds one instance of a class, called as the class is, with nothing around it."""
 
-    def unfold(self, composite: CompositeText) -> None:
-        """Add what is wrong with a class, whatever its parameters are."""
+    most = 0
+
+    @property
+    def cost(self) -> int:
+        """What it has taken, counted in actors."""
+        return _OVERHEAD + self._instances + (len(self.graph.ports.edges) + self._places) // 5
+
+    def unfold(self, composite: CompositeText) -> bool:
+        """Add what is wrong with a class, whatever its parameters are; whether all of it was looked at."""
         path = composite.name
         names: dict[str, object] = {}
         for name, declared in composite.parameters.items():
@@ -54,15 +81,16 @@ class _Trial(Elaborator):
         try:
             self._unfold(path, composite, names, None, ())
         except TooLargeError:
-            return
+            return False
         for direction in ("input", "output"):
             for port in composite.ports(direction):
                 self.graph.ports.nodes[f"{path}.{port}"]["unmade"] = True  # anything may be connected to it
         self._weave()
         check(self.graph, self.problems, whole=False)
+        return True
 
     def _enlist(self, path: str, part: PartText) -> None:
         self._instances += 1
-        if self._instances > MAX_INSTANCES:
+        if self._instances > self.most:
             self.problems.muted = False
             raise TooLargeError

@@ -42,7 +42,8 @@ def check_usage(
     if not text.root.spoilt:
         around = (entry.value for entry in text.run.values())
         figures = (entry.value for part in text.figures.values() for entry in part.values.values())
-        names = _names([*_nodes(text.root), *around, *figures])
+        metrics = (entry.value for metric in text.metrics for entry in metric.values.values())
+        names = _names([*_nodes(text.root), *around, *metrics, *figures])
         _add_unused(text.root, text.root.parameters, names, composites, actor_types, problems)
 
 

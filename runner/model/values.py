@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Container
+from collections.abc import Callable, Collection, Container
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, Quantity
+from epicycle.actors import MAX_DEPTH, Parameter, ParameterError, Quantity, UnitError, is_too_deep
 from epicycle.actors.expression import Budget, BudgetError, ExpressionError, check_names, interpolate, names_in
 
 from .declarations import ParameterText
@@ -25,10 +25,10 @@ class Values:
 
     missing = _Missing()
 
-    def __init__(self, problems: Problems) -> None:
+    def __init__(self, problems: Problems, budget: Budget | None = None) -> None:
         self.problems = problems
+        self.budget = budget or Budget(MAX_STEPS, "the values of the model take")
         self.outside: dict[str, object] = {}  # the names that a value knows which is set from outside: none
-        self._budget = Budget(MAX_STEPS, "the values of the model take")
         self.of_model: Container[str] = ()  # the model's own parameters, which composites do not see
 
     def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Collection[str] = ()) -> Any:
@@ -37,13 +37,20 @@ class Values:
         ``label`` is whose value it is, ``scope`` the composite in which it stands; ``later`` are the names that are
         declared but have no value yet.
         """
+        value = self._of(node, names, label, scope, later)
+        if not isinstance(node, Scalar) and is_too_deep(value):
+            self.problems.add(f"{label}: nested deeper than {MAX_DEPTH} levels", node.position, scope=scope)
+            return self.missing
+        return value
+
+    def _of(self, node: Node, names: dict[str, object], label: str, scope: str, later: Collection[str]) -> Any:
         if not isinstance(node, Scalar):
             self._pay(node, len(node.items if isinstance(node, Sequence) else node.entries) // 3, label, scope)
         if isinstance(node, Sequence):
-            items = [self.of(item, names, label, scope, later) for item in node.items]
+            items = [self._of(item, names, label, scope, later) for item in node.items]
             return self.missing if any(item is self.missing for item in items) else items
         if isinstance(node, Mapping):
-            entries = {k: self.of(entry.value, names, label, scope, later) for k, entry in node.entries.items()}
+            entries = {k: self._of(entry.value, names, label, scope, later) for k, entry in node.entries.items()}
             return self.missing if any(item is self.missing for item in entries.values()) else entries
         if not isinstance(node.value, str) or "${" not in node.value:
             return node.value
@@ -61,22 +68,22 @@ class Values:
                     scope=scope,
                 )
                 return self.missing
-            value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self._budget)
+            value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self.budget)
         except ExpressionError as error:
             self.problems.add(
                 f"{label}: {error.message}", _inside(node, error), *self._unseen(node.value, names), scope=scope
             )
-            if self._budget.is_spent:
+            if self.budget.is_spent:
                 self.problems.raise_if_any()
             return self.missing
         if isinstance(value, (list, dict)):
-            self._pay(node, len(value) // 3, label, scope)
+            self._pay(node, len(value), label, scope)
         return value
 
     def _pay(self, node: Node, steps: int, label: str, scope: str) -> None:
         """Take steps off what all values may cost together; when that is spent, there is no going on."""
         try:
-            self._budget.spend(steps)
+            self.budget.spend(steps)
         except BudgetError as error:
             self.problems.add(f"{label}: {error}", node.position, scope=scope)
             self.problems.raise_if_any()
@@ -99,7 +106,7 @@ class Values:
             return self.missing
         try:
             return self._convert(parameter, value)
-        except ParameterError as error:
+        except (ParameterError, UnitError) as error:
             self.problems.add(f"{full}: {error}", position, scope=scope)
         return self.missing
 
@@ -110,33 +117,47 @@ class Values:
             if not isinstance(value, kind):
                 missing = f"a value is missing, expected a {word}"
                 raise ParameterError(missing if value is None else f"{value!r} is not a {word}")
-            return self._each(parameter, None, value)
+            return _each(self._reader(parameter, None), value)
         literal = None if default is None else default.value
         if value is None and default is not None and literal is None:
             return None  # a parameter that may be left empty
         if isinstance(literal, (int, float)):
-            return self._scalar(parameter, literal, value)
-        return self._each(parameter, literal, value)
+            return self._reader(parameter, literal)(value)
+        return _each(self._reader(parameter, literal), value)
 
-    def _each(self, parameter: ParameterText, default: object, value: Any) -> Any:
-        if isinstance(value, list):
-            return [self._each(parameter, default, item) for item in value]
-        return self._scalar(parameter, default, value)
-
-    def _scalar(self, parameter: ParameterText, default: object, value: Any) -> Any:
+    def _reader(self, parameter: ParameterText, default: object) -> Callable[[Any], Any]:
+        """What makes a value, or each one in a list, what the parameter holds."""
         if parameter.choices:
-            return Parameter(str, choices=parameter.choices).convert(value)
+            return Parameter(str, choices=parameter.choices).convert
         bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}
         if parameter.unit:
-            number = Parameter(float, unit=parameter.unit, **bounds).convert(value)
-            return number if number is None or parameter.unit == "1" else Quantity(number, parameter.unit)
+            number, unit = Parameter(float, unit=parameter.unit, **bounds), parameter.unit
+            return number.convert if unit == "1" else lambda value: _quantity(number.convert(value), unit)
         if isinstance(default, bool):
-            return Parameter(bool).convert(value)
+            return Parameter(bool).convert
         if isinstance(default, int):
-            return Parameter(int, unit="1", **bounds).convert(value)
+            return Parameter(int, unit="1", **bounds).convert
         if isinstance(default, float) or parameter.min is not None or parameter.max is not None:
-            return Parameter(float, unit="1", **bounds).convert(value)
-        return value
+            return Parameter(float, unit="1", **bounds).convert
+        return _as_it_is
+
+
+def _each(read: Callable[[Any], Any], value: Any) -> Any:
+    if isinstance(value, list):
+        return value if read is _as_it_is else [_each(read, item) for item in value]
+    return read(value)
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+def _quantity(number: float | None, unit: str) -> Quantity | None:
+    if number is None:
+        return None
+    made = Quantity(number, unit)
+    made.si  # noqa: B018  raises what would be raised wherever it counts in SI units
+    return made
 
 
 def _inside(node: Scalar, error: ExpressionError) -> Position:

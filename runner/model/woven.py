@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import counted
 from epicycle.actors.expression import PortFormula
-from epicycle.aspects import Aspect, CompositeExecutionAspect, ExecutionAspect, Reading, Selection
+from epicycle.aspects import Aspect, CompositeExecutionAspect, ExecutionAspect, FiringTime, Reading, Selection
 
 from .graph import ModelGraph
 from .problems import Problems
@@ -21,7 +21,7 @@ class AspectModel:
     kind: str
     response: str
     requests: dict[str, str]
-    times: dict[str, float] = field(default_factory=dict)  # how long the firings of an actor take, in s
+    times: dict[str, FiringTime] = field(default_factory=dict)  # how long the firings of an actor take
 
     def at(self, place: str) -> dict[str, object]:
         """What a model file would say of a place: the request port, if there are several, and the time."""

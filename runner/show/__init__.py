@@ -1,19 +1,23 @@
 """What people see: of a run summary, figures, results folder; of what is installed, the reference."""
 
-from .drawing import figures_of
+from .drawing import FigureError, draw, figures_of
 from .figures import Figure, Histogram, TimeSeries, Trajectories
-from .folder import write_folder
+from .folder import check_folder, draw_figures, write_folder
 from .reference import aspects_at, described, detail, figure_types, markdown, overview, parts_described, weaving
 from .summary import summary_object, summary_table
 
 __all__ = [
     "Figure",
+    "FigureError",
     "Histogram",
     "TimeSeries",
     "Trajectories",
     "aspects_at",
+    "check_folder",
     "described",
     "detail",
+    "draw",
+    "draw_figures",
     "figure_types",
     "figures_of",
     "markdown",

@@ -1,17 +1,45 @@
-"""From a model's ``figures`` section to figures that can be drawn."""
+"""From a model's ``figures`` section to figures that can be drawn, and to what is drawn."""
 
 from __future__ import annotations
 
-from epicycle.actors import ParameterError, declared_parameters, unknown_parameter, variants
+from pathlib import Path
 
-from ..model import Model, Problems, did_you_mean
+from epicycle.actors import EpicycleError, ParameterError, declared_parameters, readable, unknown_parameter, variants
+
+from ..engine import Results
+from ..model import Model, Position, Problems, describe, did_you_mean, raised_at, told_raised
 from ..model.patterns import PatternError, select
+from .canvas import plain_text
 from .figures import Figure
+
+
+class FigureError(EpicycleError):
+    """A figure cannot be drawn; ``raised`` is the line of a user's class from which the exception comes."""
+
+    def __init__(self, name: str, reason: str, raised: Position | None = None) -> None:
+        super().__init__(name, reason, raised)
+        self.name = name
+        self.reason = reason
+        self.raised = raised
+
+    def __str__(self) -> str:
+        lines = [readable(f"figure {self.name} cannot be drawn: {self.reason}")]
+        return "\n".join([*lines, *(told_raised(self.raised) if self.raised is not None else [])])
+
+
+def draw(name: str, figure: Figure, results: Results, path: Path) -> None:
+    """Draw a figure into a file; raises ``FigureError`` for whatever its class raises."""
+    try:
+        with plain_text():
+            figure.draw(results, path)
+    except Exception as error:
+        raise FigureError(name, describe(error), raised_at(error)) from error
 
 
 def figures_of(model: Model, problems: Problems) -> dict[str, Figure]:
     """The figures of a model by name; what is wrong with them is added to ``problems``."""
     known = variants(Figure)
+    is_sound = not len(problems)  # else a signal may not be recorded because it is wrong
     found: dict[str, Figure] = {}
     for name, (type_name, values, position) in model.figures.items():
         cls = known.get(type_name)
@@ -35,7 +63,7 @@ def figures_of(model: Model, problems: Problems) -> dict[str, Figure]:
             figure: Figure = cls(**values)
             for pattern in figure.signal_patterns():
                 # A pattern over an array may rightly select nothing, a plain name may not.
-                if not select(pattern, model.recorded) and "*" not in pattern:
+                if is_sound and not select(pattern, model.recorded) and "*" not in pattern:
                     problems.add(
                         f"figure {name}: {pattern!r} is not recorded{did_you_mean(pattern, list(model.recorded))}",
                         position,
@@ -43,6 +71,10 @@ def figures_of(model: Model, problems: Problems) -> dict[str, Figure]:
                     )
         except (ParameterError, PatternError) as error:
             problems.add(f"figure {name}: {error}", position)
+            continue
+        except Exception as error:  # of a class of a user's
+            told = f"figure {name}: {describe(error)}"
+            problems.add(told, position, raised=raised_at(error), cause=error)
             continue
         found[name] = figure
     return found

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from array import array
+from collections import Counter
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Configurable, Parameter, array_parameter, texts_parameter
+from epicycle.actors import Configurable, Parameter, array_parameter, shortened, texts_parameter
+from epicycle.aspects import STAMP
 
-from ..engine import Results, Signal
-from ..engine.encoding import scalars
+from ..engine import Results, Signal, cell, leaves
 from ..model.patterns import select
+from ..tables import short
 
+MAX_TEXT = 200  # characters of a label
 COLOURS = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")
+MAX_STATES = 24  # in a legend
+
+Columns: TypeAlias = dict[str, tuple[list[float], list[Any]]]  # times and values
 
 
 class Figure(Configurable):
@@ -130,7 +139,10 @@ class Trajectories(Figure):
 
 
 class TimeSeries(Figure):
-    """Signals over time, each number in their tokens a line."""
+    """Signals over time: each number in their tokens a line, each text, truth value or enumeration a strip of states.
+
+    A strip has the colour of the state of the moment; None leaves a gap, and so does what is no state of anything.
+    """
 
     signals = texts_parameter(doc="which signals (patterns)")
     style = Parameter(
@@ -147,18 +159,17 @@ class TimeSeries(Figure):
         return self.signals
 
     def draw(self, results: Results, path: Path) -> None:
-        lines = {
-            f"{name}.{place}" if place else name: points
-            for name in _selected(self.signals, results)
-            for place, points in _numbers(results.signals[name]).items()
-        }
+        lines = _numbers(self.signals, results)
+        strips = _states(self.signals, results)
         canvas, axes = _sheet(results, 7.0, 3.4)
+        if strips:
+            axes = self._strips(canvas, axes, strips, results.end, is_alone=not lines)
         look = {"steps": {"drawstyle": "steps-post"}, "line": {}, "points": {"linestyle": "none", "marker": "."}}
         for index, (name, (times, values)) in enumerate(lines.items()):
             if self.style == "steps" and times:
                 # What is over at the moment at which it comes is not seen; the last value holds to the run's end.
-                latest = {**dict(zip(times, values, strict=True)), max(results.end, times[-1]): values[-1]}
-                times, values = list(latest), list(latest.values())
+                latest = dict(zip(times, values, strict=True)) | {max(results.end, times[-1]): values[-1]}
+                times, values = array("d", latest), array("d", latest.values())
             colour = COLOURS[index % len(COLOURS)]
             axes.plot(times, values, color=colour, linewidth=1.2, markersize=4, label=name, **look[self.style])
         axes.set_xlabel("time (s)")
@@ -168,11 +179,58 @@ class TimeSeries(Figure):
             axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, fontsize=8, frameon=False)
         save(canvas, path)
 
+    def _strips(self, canvas: Any, axes: Any, strips: Columns, end: float, *, is_alone: bool) -> Any:
+        """Draw strips of states on a part of the sheet of their own, below the lines if there are any.
+
+        Returns where lines are to be drawn.
+        """
+        from matplotlib.patches import Patch
+
+        height = 0.3 + 0.3 * len(strips)  # inches
+        below = axes
+        if is_alone:
+            canvas.set_figheight(height + 0.7)
+        else:
+            canvas.set_figheight(3.4 + height)
+            title = axes.get_title()
+            axes.remove()
+            axes, below = canvas.subplots(2, sharex=True, height_ratios=(3.0, height))
+            axes.set_title(title, fontsize=10)
+            axes.grid(color="0.9", linewidth=0.6)
+            below.set_xlabel("time (s)")
+        spans: dict[str, dict[int, list[tuple[float, float]]]] = {}
+        for row, (times, found) in enumerate(strips.values()):
+            # What is over at the moment at which it comes is not seen.
+            for begin, until, state in zip(times, [*times[1:], max(end, times[-1])], found, strict=True):
+                if state is not None:
+                    spans.setdefault(state, {}).setdefault(row, []).append((begin, until - begin))
+        for index, rows in enumerate(spans.values()):
+            for row, ranges in rows.items():
+                below.broken_barh(ranges, (row - 0.4, 0.8), color=COLOURS[index % len(COLOURS)], linewidth=0)
+        below.set_yticks(range(len(strips)), list(strips), fontsize=8, parse_math=False)
+        below.set_ylim(len(strips) - 0.5, -0.5)
+        below.grid(visible=False, axis="y")
+        handles = [
+            Patch(color=COLOURS[index % len(COLOURS)], label=_legible(state))
+            for index, state in enumerate(islice(spans, MAX_STATES))
+        ]
+        if len(spans) > MAX_STATES:
+            handles.append(Patch(visible=False, label=f"and {len(spans) - MAX_STATES:,} more"))
+        legend = below.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, fontsize=8, frameon=False
+        )
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+        return axes
+
 
 class Histogram(Figure):
-    """How often values of a signal come, in bins of equal width; of several signals, one over the other."""
+    """How often values of a signal come, in bins of equal width; of several signals, one over the other.
 
-    signals = texts_parameter(doc="which signals of numbers (patterns)")
+    Where there are no numbers, but states (texts, truth values, enumerations), how often each of them comes.
+    """
+
+    signals = texts_parameter(doc="which signals (patterns)")
     bins = Parameter(int, 40, min=1, max=10_000, doc="how many bins there are")
     label = Parameter(str, "", doc="what the values are, with their unit; the signal's name if left out")
 
@@ -181,17 +239,28 @@ class Histogram(Figure):
 
     def draw(self, results: Results, path: Path) -> None:
         columns = {
-            f"{name}.{place}" if place else name: [value for value in values if np.isfinite(value)]
-            for name in _selected(self.signals, results)
-            for place, (_, values) in _numbers(results.signals[name]).items()
+            name: np.array(values)[np.isfinite(values)] for name, (_, values) in _numbers(self.signals, results).items()
         }
         canvas, axes = _sheet(results, 6.0, 3.4)
-        everything = [value for values in columns.values() for value in values]
-        edges = np.histogram_bin_edges(everything or [0.0], self.bins)
+        if not columns and (strips := _states(self.signals, results)):
+            counts = Counter(_legible(state) for _, found in strips.values() for state in found if state is not None)
+            often = counts.most_common(MAX_STATES)
+            axes.barh(range(len(often)), [count for _, count in often], color=COLOURS[0], alpha=0.55)
+            axes.set_yticks(range(len(often)), [state for state, _ in often], fontsize=8, parse_math=False)
+            axes.invert_yaxis()
+            more = f"; {len(counts) - MAX_STATES:,} rarer states are left out" if len(counts) > MAX_STATES else ""
+            axes.set_xlabel(f"{self.label or ', '.join(strips)}: how often{more}")
+            save(canvas, path)
+            return
+        ends = [end for values in columns.values() if len(values) for end in (values.min(), values.max())]
+        edges = np.histogram_bin_edges(ends or [0.0], self.bins)
         for index, (name, values) in enumerate(columns.items()):
-            label = f"{name}, mean {np.mean(values):.4g}" if values else f"{name}, no values"
+            label = f"{name}, mean {np.mean(values):.4g}" if len(values) else f"{name}, no values"
             colour = COLOURS[index % len(COLOURS)]
-            axes.hist(values, edges, density=bool(values), color=colour, alpha=0.55, label=label)
+            heights, _ = np.histogram(values, edges)
+            axes.hist(
+                edges[:-1], edges, weights=heights, density=bool(len(values)), color=colour, alpha=0.55, label=label
+            )
         axes.set_xlabel(self.label or (next(iter(columns)) if len(columns) == 1 else ""))
         axes.set_ylabel("share per unit")
         axes.legend(fontsize=8, frameon=False)
@@ -203,15 +272,43 @@ def _selected(patterns: tuple[str, ...], results: Results) -> list[str]:
     return list(dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals)))
 
 
-def _numbers(signal: Signal) -> dict[str, tuple[list[float], list[float]]]:
-    """Times and values of each number inside the tokens, by its place."""
-    found: dict[str, tuple[list[float], list[float]]] = {}
-    for tag, token in zip(signal.tags, signal.tokens, strict=True):
-        for place, value in scalars(token):
-            times, values = found.setdefault(place, ([], []))
-            times.append(tag.seconds)
+def _leaves(patterns: tuple[str, ...], results: Results) -> Iterator[tuple[str, float, Any]]:
+    """The place, time and value of each leaf of the tokens, but for those that say of when a token is."""
+    for name in _selected(patterns, results):
+        signal = results.signals[name]
+        for tag, token in zip(signal.tags, signal.tokens, strict=True):
+            for place, leaf in leaves(token):
+                if place.rpartition(".")[2] != STAMP:
+                    yield f"{name}.{place}" if place else name, tag.seconds, leaf
+
+
+def _numbers(patterns: tuple[str, ...], results: Results) -> dict[str, tuple[array[float], array[float]]]:
+    """Times and values of all numbers, by signal and place in the tokens."""
+    found: dict[str, tuple[array[float], array[float]]] = {}
+    for place, time, leaf in _leaves(patterns, results):
+        kind, value, _ = cell(leaf)
+        if kind in ("int", "float") and value is not None:
+            times, values = found.setdefault(place, (array("d"), array("d")))  # 16 bytes a number, not 100
+            times.append(time)
             values.append(value)
     return found
+
+
+def _states(patterns: tuple[str, ...], results: Results) -> Columns:
+    """Times and names of states, by signal and place in the tokens; None where there is something else."""
+    found: Columns = {}
+    for place, time, leaf in _leaves(patterns, results):
+        kind, value, text = cell(leaf)
+        is_state = kind not in ("int", "float", "none") and (isinstance(leaf, str) or not hasattr(leaf, "__len__"))
+        times, states = found.setdefault(place, ([], []))
+        times.append(time)
+        states.append((text if kind != "bool" else "true" if value else "false") if is_state else None)
+    return {place: column for place, column in found.items() if any(state is not None for state in column[1])}
+
+
+def _legible(state: str) -> str:
+    """A state in a legend, which leaves out what is empty or begins with an underscore."""
+    return short(state) if state.strip() and not state.startswith("_") else repr(state)
 
 
 def _sheet(results: Results, width: float, height: float) -> tuple[Any, Any]:
@@ -231,7 +328,11 @@ def _sheet(results: Results, width: float, height: float) -> tuple[Any, Any]:
 def save(canvas: Any, path: Path) -> None:
     """Write a matplotlib figure so that the same one gives the same file."""
     import matplotlib
+    from matplotlib.text import Text
 
+    for text in canvas.findobj(Text):  # whatever a model is called: a sheet grows with the texts on it
+        if len(text.get_text()) > MAX_TEXT:
+            text.set_text(shortened(text.get_text(), MAX_TEXT))
     with matplotlib.rc_context({"svg.hashsalt": "epicycle"}):
         metadata = {"Date": None} if path.suffix == ".svg" else {}
         canvas.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)

@@ -4,33 +4,49 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from epicycle.actors import EpicycleError, read_regular
+
+from ..columns import categories, numbers, texts
 from ..engine import Results
 from ..provenance import versions
-from .columns import categories, numbers
+from .drawing import FigureError, draw
 from .figures import Figure
 from .summary import summary_object
 
 
-def write_folder(
-    folder: Path, results: Results, figures: dict[str, Figure], command: Iterable[str], error: str = ""
-) -> list[Path]:
-    """Write ``manifest.json``, ``signals.parquet`` and a PNG for each figure; the files that were written.
+def check_folder(folder: Path, model: str, command: list[str]) -> str:
+    """What is to be said before a command writes to a folder, as it replaces the results of another one.
+
+    Raises ``EpicycleError`` where there are results of another model, or of something else.
+    """
+    path = folder / "manifest.json"
+    choose = "\n   help: choose another folder with --out, or delete this one"
+    try:
+        found = json.loads(read_regular(path))
+        before, known = found["command"], found["model"]
+        shown = shlex.join(before)
+    except FileNotFoundError:
+        return ""
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        raise EpicycleError(f"{folder} holds other results than those of a run{choose}") from None
+    if known != model:
+        raise EpicycleError(f"{folder} holds results of the model {known!r}, not of {model!r}: {shown}{choose}")
+    return "" if before == command else f"replacing the results of '{shown}' in {folder}"
+
+
+def write_folder(folder: Path, results: Results, command: Iterable[str], error: str = "") -> list[Path]:
+    """Write ``manifest.json`` and ``signals.parquet``; the files that were written.
 
     Each file is written aside and then moved into place, so a folder never holds half a file.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in figures.items():
-        written.append(folder / f"{name}.png")
-        aside = folder / f".{name}.png"
-        figure.draw(results, aside)
-        os.replace(aside, written[-1])
-    written.append(folder / "signals.parquet")
+    written = [folder / "signals.parquet"]
     write_signals(results, written[-1])
     written.append(folder / "manifest.json")
     manifest = {**summary_object(results), "command": list(command), "versions": versions()}
@@ -42,21 +58,42 @@ def write_folder(
     return written
 
 
+def draw_figures(folder: Path, results: Results, figures: dict[str, Figure]) -> tuple[list[Path], list[FigureError]]:
+    """Draw a PNG for each figure, when all else is safe; the files that were written, and what could not be drawn."""
+    written, failed = [], []
+    for name, figure in figures.items():
+        aside = folder / f".{name}.png"
+        try:
+            draw(name, figure, results, aside)
+        except FigureError as error:
+            failed.append(error)
+            aside.unlink(missing_ok=True)
+        else:
+            written.append(folder / f"{name}.png")
+            os.replace(aside, written[-1])
+    return written, failed
+
+
 def write_signals(results: Results, path: Path) -> None:
-    """The recorded signals in long form: time, microstep, signal, field, value."""
+    """The recorded signals as ``Results.table`` has them."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    made = {"time": np.float64, "time_ns": np.int64, "microstep": np.int64, "value": np.float64}
     columns = results.table()
     table = pa.table(
         {
-            "time": numbers(columns["time"], np.float64),
-            "microstep": numbers(columns["microstep"], np.int64),
-            "signal": categories(columns["signal"]),
-            "field": categories(columns["field"]),
-            "value": numbers(columns["value"], np.float64),
+            name: numbers(values, made[name])
+            if name in made
+            else texts(values)
+            if name == "text"
+            else categories(values)
+            for name, values in columns.items()
         }
     )
     aside = path.with_name(f".{path.name}")
-    pq.write_table(table, aside)
+    # Numbers are mostly near to the one before: told that, Parquet takes two thirds of the place for both times.
+    encoding = dict.fromkeys(("time", "value"), "BYTE_STREAM_SPLIT") | {"time_ns": "DELTA_BINARY_PACKED"}
+    few = [name for name in columns if name not in encoding]
+    pq.write_table(table, aside, compression="zstd", use_dictionary=few, column_encoding=encoding)
     os.replace(aside, path)

@@ -14,6 +14,7 @@ from epicycle.actors import Configurable, variants
 
 from ..model import Model
 from ..model.catalogue import Catalogue
+from ..model.measure import TAKES, Measure
 from ..model.reference import (
     ParameterReference,
     PortReference,
@@ -131,6 +132,14 @@ and `epicycle aspects` print the same for what is installed, with the types of o
 """
 
 
+METRICS = """\
+## Metrics
+
+One number of a run: `name: {of: port, take: ..., ...}`. What counts *tokens* weighs each of them the same; what counts
+*time* weighs each value by how long it stands. Of a state, such as the size of a queue, the mean over time is meant.
+"""
+
+
 def markdown(
     catalogue: Catalogue, figures: Mapping[str, type[Figure]], study_figures: Mapping[str, type[Configurable]]
 ) -> str:
@@ -150,21 +159,42 @@ def markdown(
             f"## {base}\n\nThe value of a parameter, such as `{{type: {known[0].name}, ...}}`.\n" if known else ""
         )
         lines += [block for each in known for block in _markdown(each)]
+    lines += _metrics()
     for title, types in (("Figures", figures), ("Figures of studies", study_figures)):
         lines.append(f"## {title}\n")
         lines += [block for each in described(types) for block in _markdown(each)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
+def _metrics() -> list[str]:
+    """What a metric can take, and what else is said of one."""
+    takes = [
+        [f"`{name}`", each.over, each.doc, ", ".join(f"`{option}`" for option in each.options), each.unit]
+        for name, each in TAKES.items()
+    ]
+    options = [
+        [f"`{row[0]}`", *row[1:]]
+        for row in map(_parameter_row, describe("metric", Measure).parameters)
+        if row[0] != "take"
+    ]
+    return [
+        METRICS,
+        _rows(("take", "counts", "what it is", "options", "unit"), takes),
+        _rows(("option", "type", "unit", "default", "what it is"), options),
+    ]
+
+
+def _rows(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    return "\n".join(f"| {' | '.join(row)} |" for row in (heading, ["---"] * len(heading), *cells)) + "\n"
+
+
 def _markdown(reference: TypeReference) -> list[str]:
     """One type under a heading of its own."""
     blocks = [f"### {reference.name}\n", f"{reference.doc}\n"]
     for heading, rows in sections(reference):
-        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
-        for row in cells:
-            row[0] = f"`{row[0]}`"
-        lines = [f"| {' | '.join(row)} |" for row in (heading, ["---"] * len(heading), *cells)]
-        blocks.append("\n".join(lines) + "\n")
+        blocks.append(_rows(heading, [[f"`{row[0]}`", *row[1:]] for row in rows]))
     return [*blocks, *(f"{line}\n" for line in facts(reference))]
 
 
@@ -202,6 +232,7 @@ def _port_row(port: PortReference) -> list[str]:
     notes = []
     if port.direction == "input":
         notes += [] if port.required else ["optional"]
+        notes += [] if port.triggers else ["does not trigger"]
     elif port.depends_on is not None:  # the port may stand in a loop
         notes.append(f"depends at once on {' and '.join(port.depends_on) or 'no input'}")
     notes += ["any number of connections"] if port.multi else []

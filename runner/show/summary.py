@@ -9,8 +9,12 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from epicycle.actors import shortened, visible
+
 from ..engine import Results, plain
 from ..model import Model, extent
+
+WIDEST = 400  # characters of a text in the table
 
 
 def summary_object(results: Results) -> dict[str, Any]:
@@ -21,6 +25,7 @@ def summary_object(results: Results) -> dict[str, Any]:
             "seed": results.seed,
             "parameters": {name: plain(value) for name, value in results.parameters.items()},
             "metrics": {name: plain(value) for name, value in results.metrics.items()},
+            "outcomes": {name: said for name, each in results.outcomes.items() if (said := each.plain())},
             "aspects": results.aspects,
             "stopped": results.stopped,
             "end": results.end,
@@ -46,26 +51,34 @@ def finite(value: Any) -> Any:
 def summary_table(model: Model, results: Results) -> Group:
     """What a person sees at the end of a run."""
     head = Text.assemble(
-        (results.model, "bold"),
-        f"  seed {results.seed}, {results.end:g} s of model time, ended by {results.stopped}",
+        (visible(results.model), "bold"),
+        f"  seed {results.seed}, {results.end:g} s of model time, ended by {visible(results.stopped)}",
     )
     table = Table(box=None, pad_edge=False, header_style="dim")
-    table.add_column("metric")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    table.add_column("", style="dim")
+    table.add_column("metric", overflow="fold")
+    table.add_column("value", justify="right", overflow="fold")
+    table.add_column("unit", overflow="fold")
+    table.add_column("", style="dim", overflow="fold")
     for metric in model.metrics:
-        table.add_row(metric.name, shown(results.metrics[metric.name]), metric.unit, metric.doc)
+        found = results.outcomes[metric.name]
+        said = "; ".join([metric.measure.doc, *found.remarks] if metric.measure.doc else found.remarks)
+        unit = "" if metric.unit == "1" else metric.unit
+        table.add_row(*map(_cell, (metric.name, found.shown(shown), unit, said)))
     for name, figures in results.aspects.items():
         woven = next(each for each in model.aspects if each.name == name)
         for what, figure in figures.items():
             where = f"by {woven.kind} at {extent([woven])}"
-            table.add_row(f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where)
+            table.add_row(*map(_cell, (f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where)))
     table.add_row("events", f"{results.events}", "", "sends and acts of aspects in the event log")
     table.add_row("firings", f"{results.firings}", "", "of actors")
     table.add_row("wall time", f"{results.wall_time:.3f}", "s", "of initialisation and run")
     table.add_row("digest", results.digest[:16] + "...", "", "SHA-256 of the event log, shortened")
     return Group(head, table)
+
+
+def _cell(text: str) -> Text:
+    """Text as it is, whatever a terminal or rich would take it for."""
+    return Text(visible(shortened(text, WIDEST)))
 
 
 def shown(value: Any) -> str:

@@ -2,12 +2,13 @@
 
 from .declaration import Study, find_study, is_study, read_study
 from .executor import WorkerError
+from .manifest import StoreError
 from .metrics import MetricError, StudyMetric
 from .plan import Condition, Plan
 from .results import StudyResults, open_study
 from .schedule import Schedule
 from .session import Outcome, TooManyRunsError, available_cores, check_size, plan_of_folder, run_study
-from .store import StoreError, WriteError
+from .store import WriteError
 
 __all__ = [
     "Condition",

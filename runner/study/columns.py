@@ -33,9 +33,10 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
             # A number with a unit is in the table in SI units, one without in the parameter's own.
             unit = si_unit(written[1]) if written is not None and written[1] else declared.unit
             found[setting.path] = Column(unit, declared.doc)
-    own = {metric.name: Column(metric.unit, metric.doc) for metric in model.metrics}
+    own = {metric.name: Column(metric.unit, metric.measure.doc) for metric in model.metrics}
     for metric in metrics:
-        found[metric.name] = own.get(metric.source.strip(), Column())
+        known = own.get(metric.source.strip(), Column())
+        found[metric.name] = Column(metric.to or known.unit or metric.unit, metric.doc or known.doc)
     return found
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..model import Position, Problems, did_you_mean
-from ..model.declarations import STUDY_KEYS, UNTIL_KEYS, DeclarationReader, PartText
+from ..model.declarations import STUDY_KEYS, STUDY_METRIC_KEYS, UNTIL_KEYS, DeclarationReader, PartText
 from ..model.disturbance import find_disturbance
 from ..model.document import Entry, Mapping, Node, Scalar, parse, read
 from ..model.observation import MAX_SEED
@@ -281,18 +281,35 @@ class _StudyReader(NodeReader):
         found = []
         if isinstance(node, Mapping):
             for name, entry in self.named({"metrics": Entry(Scalar("", "", True, node.position), node)}, "metrics"):
-                if not isinstance(entry.value, Scalar):
-                    self.problems.add(f"metric {name!r} is not an expression", entry.value.position)
-                elif metric := checked_metric(name, entry.value.text, entry.value, self.problems):
+                if (metric := self.metric(name, entry)) is not None:
                     found.append(metric)
             return found
         for item in self.items(node, "metrics") or ():
             metric_name = self.name(item, "the metric")
             if metric_name is None or not isinstance(item, Scalar):
                 continue
-            if (metric := checked_metric(metric_name, metric_name, item, self.problems)) is not None:
+            if (metric := checked_metric(metric_name, item, self.problems)) is not None:
                 found.append(metric)
         return found
+
+    def metric(self, name: str, entry: Entry) -> StudyMetric | None:
+        """An expression, or ``{value: expression, unit: s, to: min, doc: ...}``."""
+        if isinstance(entry.value, Scalar):
+            return checked_metric(name, entry.value, self.problems)
+        if not isinstance(entry.value, Mapping):
+            self.problems.add(f"metric {name!r} is not an expression", entry.value.position)
+            return None
+        inner = self.entries(entry.value, f"metric {name!r}", STUDY_METRIC_KEYS) or {}
+        if "value" not in inner or is_empty(inner["value"].value):
+            self.problems.add(f"metric {name!r} has no value", entry.key.position, "add 'value: ...', an expression")
+            return None
+        value = inner.pop("value").value
+        said = {key: text for key, each in inner.items() if (text := self.text(each.value, key)) is not None}
+        places = {key: each.value.position for key, each in inner.items()}
+        if not isinstance(value, Scalar):
+            self.problems.add(f"metric {name!r} is not an expression", value.position)
+            return None
+        return checked_metric(name, value, self.problems, said, places)
 
     def until(self, node: Node, study: Study) -> Until | None:
         """``{metric: mean_wait, half_width: 0.1, batch: 10, at_most: 1000}``."""

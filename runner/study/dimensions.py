@@ -92,6 +92,11 @@ class Ranged(Dimension):
         node = number_node(value, self._unit, self._at)
         return Level((Setting(self.name, node, self.position),), {self.name: in_si(value, self._unit)})
 
+    def is_distinct(self) -> bool:
+        """Whether no two levels are the same number: those are nearest to it, at the ends, that are far from zero."""
+        ends = {0, max(0, self._size - 2)} if self._size > 1 else set()
+        return all(self.level(at).values != self.level(at + 1).values for at in ends)
+
     def find(self, values: Mapping[str, Factor]) -> int | None:
         first, second, wanted = (
             float(each or 0) for each in (*(self.level(at).values[self.name] for at in (0, 1)), values[self.name])

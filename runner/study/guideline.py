@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING, Any
 from .dimensions import Factor
 from .questions import Guideline
 from .samples import MISSING, Place, Samples
-from .statistics import LEVEL, Estimate, mean, paired_difference
+from .statistics import LEVEL, Estimate, mean, paired_difference, resampled_sums
 
 if TYPE_CHECKING:
     from .results import StudyResults
 
 RESAMPLES = 9_999
-SEED = 0
 
 
 @dataclass(frozen=True)
@@ -154,15 +153,12 @@ def _confidence(numbers: list[dict[int, float]], sign: float) -> list[float]:
         return [0.0] * len(numbers)
     import numpy as np
 
-    values = sign * np.array([[each[replication] for replication in common] for each in numbers])
-    draws = np.random.default_rng(SEED).multinomial(len(common), [1 / len(common)] * len(common), RESAMPLES)
-    sums = np.zeros((RESAMPLES, len(numbers)))
-    for drawn, value in zip(draws.T, values.T, strict=True):  # in this order, whatever the processor
-        sums += drawn[:, np.newaxis] * value
+    values = ([sign * each[replication] for replication in common] for each in numbers)
+    sums = np.array([resampled_sums(each, RESAMPLES) for each in values])
     means = np.round(sums / len(common), 12)
-    is_best = means == means.min(axis=1, keepdims=True)
-    shares = is_best / np.count_nonzero(is_best, axis=1, keepdims=True)
-    return [math.fsum(share) / RESAMPLES for share in shares.T.tolist()]
+    is_best = means == means.min(axis=0)
+    ties = np.count_nonzero(is_best, axis=0)
+    return [math.fsum((1.0 / ties[best]).tolist()) / RESAMPLES for best in is_best]
 
 
 def _finite(value: Any) -> Any:

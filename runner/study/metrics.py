@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
-from epicycle.actors import EpicycleError, did_you_mean
+from epicycle.actors import EpicycleError, Quantity, did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula, operand
 
 from ..engine import Results, Signal
-from ..model import Model, Problems
+from ..model import Model, Position, Problems
 from ..model.document import Scalar
+from ..model.measure import conversion_problem
 from ..model.reading import inside
 
 ASPECTS, SIGNALS = "aspects", "signals"
@@ -34,6 +36,10 @@ class StudyMetric:
     name: str
     source: str
     node: Scalar | None = None  # where it stands; none if the study takes all metrics of its model
+    unit: str = ""  # what the expression counts in; a metric of the model has its own
+    to: str = ""  # the unit in which the table holds it, if that is another one
+    doc: str = ""
+    places: dict[str, Position] = field(default_factory=dict, compare=False)  # of the unit and what follows
     figures: tuple[tuple[str, str], ...] = field(init=False)
     signals: tuple[str, ...] = field(init=False)
 
@@ -86,6 +92,16 @@ class StudyMetric:
         for signal in self.signals:
             if signal not in recorded:
                 self._complain(f"{signal!r} is not recorded", signal, recorded, "recorded by the model", problems)
+        units = {metric.name: metric.unit for model in models for metric in model.metrics}
+        own = units.get(self.source.strip(), "")
+        if own and self.unit and self.unit != own:
+            problems.add(
+                f"metric {self.name}: {self.source.strip()} counts in {own}, not in {self.unit}",
+                self.places.get("unit"),
+                "leave 'unit' out; 'to: ...' converts",
+            )
+        elif found := conversion_problem(own or self.unit, self.to):
+            problems.add(f"metric {self.name}: {found[0]}", self.places.get("to"), *([found[1]] if found[1] else []))
 
     def value(self, results: Results) -> float | None:
         """The number for the table; None if there is none, as what it asks for is missing in this run.
@@ -109,7 +125,8 @@ class StudyMetric:
             return None
         if not isinstance(value, (bool, int, float)):
             raise MetricError(f"metric {self.name} is no number: {value!r}")
-        return float(value)
+        unit = results.units.get(self.source.strip()) or self.unit
+        return Quantity(float(value), unit).to(self.to) if self.to else float(value)
 
     def _place(self, source: str, part: str) -> tuple[int, int]:
         return max(source.find(part), 0), len(part)
@@ -135,10 +152,17 @@ def _as_operand(signal: Signal) -> dict[str, list[Any]]:
     return {"time": signal.times.tolist(), "value": [operand(token) for token in signal.tokens]}
 
 
-def checked_metric(name: str, source: str, node: Scalar, problems: Problems) -> StudyMetric | None:
-    """A metric as a study file gives it."""
+def checked_metric(
+    name: str,
+    node: Scalar,
+    problems: Problems,
+    said: Mapping[str, str] = MappingProxyType({}),
+    places: Mapping[str, Position] = MappingProxyType({}),
+) -> StudyMetric | None:
+    """A metric as a study file gives it; ``said`` are its unit and the like."""
+    source = node.text
     try:
-        return StudyMetric(name, source, node)
+        return StudyMetric(name, source, node, **said, places=dict(places))
     except ExpressionError as error:
         at = inside(node, source, error.offset, source[error.offset : error.offset + max(error.length, 1)])
         problems.add(f"metric {name}: {error}", at)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
 from pathlib import Path
 from typing import Any
+
+from epicycle.actors import EpicycleError
+from epicycle.actors.expression import ExpressionError
 
 from ..model import Model, ModelError, Problems, did_you_mean, load_model
 from ..model.document import plain
@@ -20,6 +24,8 @@ from .columns import Column, columns_of
 from .declaration import RESERVED, Study, study_of_text
 from .dimensions import Factor, Level
 from .metrics import StudyMetric
+
+_LOGGER = logging.getLogger("epicycle")
 
 MAX_TRIED = 20  # levels of a dimension with which the model is loaded before anything runs
 
@@ -32,6 +38,10 @@ def epicycle_version() -> str:
         return version("epicycle")
     except PackageNotFoundError:  # run from its folder, without an install
         return "unknown"
+
+
+class PlanError(EpicycleError):
+    """A manifest of which no plan can be made."""
 
 
 @dataclass(frozen=True)
@@ -114,11 +124,18 @@ class Plan:
         study.questions.check([metric.name for metric in metrics], problems)
         problems.raise_if_any()
         columns = columns_of(study.dimensions, metrics, read.models[0])
+        if endless := read.models[0].endless:
+            _LOGGER.warning(
+                "warning: %s\n   help: set 'stop' in its section 'run'; --run-timeout gives up runs", endless
+            )
         return cls(study, metrics, sources, extra, read.texts, columns, epicycle_version(), read.files)
 
     @classmethod
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
-        """The plan of a results folder; no file but the manifest is needed."""
+        """The plan of a results folder; no file but the manifest is needed.
+
+        Raises ``ModelError``, and ``PlanError`` if what the manifest says does not fit together.
+        """
         study = study_of_text(
             manifest["text"],
             Path(manifest["file"]),
@@ -127,8 +144,24 @@ class Plan:
             manifest["replications"],
             None if (lender := manifest.get("lender")) is None else (lender[0], lender[1]),
         )
-        metrics = [StudyMetric(name, source) for name, source in manifest["metrics"].items()]
-        extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
+        try:
+            said = {(metric.name, metric.source): metric for metric in study.metrics or ()}
+            metrics = [said.get(each) or StudyMetric(*each) for each in manifest["metrics"].items()]
+            extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
+        except (ValueError, ExpressionError) as error:
+            raise PlanError(f"the manifest of {study.name} is damaged: {error}") from error
+        unlike = {
+            "study": study.name != manifest["study"],
+            "factors": study.factors != manifest["factors"],
+            "metrics": not _are_metrics(metrics, study),
+            "level_sources": len(extra) != len(study.dimensions),
+        }
+        if wrong := [name for name, is_wrong in unlike.items() if is_wrong]:
+            found = ", ".join(map(repr, wrong))
+            raise PlanError(f"the manifest of {study.name} is damaged: {found} is not as its study's text says")
+        problems = Problems()
+        study.questions.check([metric.name for metric in metrics], problems)
+        problems.raise_if_any()
         columns = {name: Column(**said) for name, said in manifest["columns"].items()}
         return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
 
@@ -184,7 +217,10 @@ class Plan:
             "sources": sorted(sources.items()),
             "set": [[setting.path, plain(setting.node)] for setting in settings],
             "disturb": [Path(name).name for name in disturb],
-            "metrics": [[metric.name, metric.source] for metric in self.metrics],
+            "metrics": [
+                [metric.name, metric.source, *([metric.unit, metric.to] if metric.to else [])]
+                for metric in self.metrics
+            ],
         }
         values = {name: value for level in levels for name, value in level.values.items()}
         return Condition(index, settings, disturb, values, _hash(identity))
@@ -219,6 +255,17 @@ class Plan:
     def load(self, condition: Condition) -> Model:
         """The model as it is in a condition; raises ``ModelError``."""
         return _load(self.study, condition.settings, condition.disturb)
+
+
+def _are_metrics(found: list[StudyMetric], study: Study) -> bool:
+    """Whether these can be the metrics of a study, which declares some or takes those of its model."""
+    declared = study.metrics or [StudyMetric(metric.name, metric.name) for metric in found]
+    names = {metric.name for metric in found}
+    if study.until is not None and study.until.metric not in names:
+        return False
+    if [(metric.name, metric.source) for metric in found] != [(metric.name, metric.source) for metric in declared]:
+        return False
+    return not names & {*RESERVED, *study.factors}
 
 
 def _hash(value: object) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from ..printing import complain, console
 from .schedule import OK, Schedule
 from .session import duration
 
@@ -40,18 +40,16 @@ class Pulse:
 @contextmanager
 def progress(name: str) -> Iterator[Callable[[Schedule], None]]:
     """What a session calls now and then."""
-    from rich.console import Console
-
     pulse = Pulse()
-    console = Console(stderr=True)
-    if console.is_terminal:
+    terminal = console(stderr=True)
+    if terminal.is_terminal:
         from rich.progress import BarColumn, Progress, TextColumn
 
         with Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
-            TextColumn("{task.fields[line]}"),
-            console=console,
+            TextColumn("{task.fields[line]}", markup=False),
+            console=terminal,
             transient=True,
         ) as bar:
             task = bar.add_task(name, total=None, line="")
@@ -65,6 +63,6 @@ def progress(name: str) -> Iterator[Callable[[Schedule], None]]:
         nonlocal last
         if time.monotonic() - last >= EVERY:
             last = time.monotonic()
-            print(f"{time.strftime('%H:%M:%S')} {name}: {pulse.line(schedule)}", file=sys.stderr, flush=True)
+            complain(f"{time.strftime('%H:%M:%S')} {name}: {pulse.line(schedule)}")
 
     yield tell

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import math
 from collections import Counter
@@ -11,14 +12,15 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, counted, did_you_mean
+from epicycle.actors import EpicycleError, counted, did_you_mean, read_regular
 
 from ..tables import pandas_module
 from .dimensions import Factor
+from .manifest import StoreError
 from .plan import Plan
 from .schedule import OK
 from .statistics import LEVEL, holm, mean, paired_difference
-from .store import BEST_FIRST, Store, StoreError, replace_file
+from .store import BEST_FIRST, Store, replace_file
 
 if TYPE_CHECKING:
     import pandas
@@ -44,6 +46,7 @@ class StudyResults:
         self.manifest = self._store.manifest
         self.plan = Plan.of_manifest(self.manifest)
         self._frozen: pa.Table | None = None
+        self._left_out = 0
 
     def freeze(self) -> StudyResults:
         """Keep to the rows that are there now, however many may come; reading is quicker then.  Returns itself."""
@@ -63,8 +66,9 @@ class StudyResults:
     def table(self, *, times: bool = False) -> pa.Table:
         """A row for each run that is over, by condition and replication; ``times``: with the wall time of each.
 
-        Without times the table of a study is the same bit for bit, whatever happened while it was made.  Rows of runs
-        that the study no longer has, as its file or model has changed, are left out.
+        Without times the table of a study is the same bit for bit, whatever happened while it was made.  Replications
+        beyond those that the study asks for now are in it, too.  Runs of another seed, model or study than the folder
+        is of now are left out; ``left_out`` counts them.
         """
         table = self._frozen if self._frozen is not None else self._read()
         return table if times else table.drop_columns(list(TIMES))
@@ -81,8 +85,8 @@ class StudyResults:
         ranks = pc.index_in(table["status"], value_set=pa.array(BEST_FIRST))
         table = table.set_column(table.schema.get_field_index("condition"), "condition", places)
         table = table.append_column("_rank", ranks)
-        wanted = pc.and_(pc.is_valid(places), pc.less(table["replication"], self.plan.replications))
-        table = table.filter(wanted).sort_by(
+        runs = pc.count_distinct(table["run"]).as_py()
+        table = self._replicated(table.filter(pc.is_valid(places))).sort_by(
             [(name, "ascending") for name in ("condition", "replication", "_rank", "run")]
         )
         if table.num_rows:  # of a run that was written more than once, the best row is the first
@@ -91,7 +95,36 @@ class StudyResults:
                 for name in ("condition", "replication")
             )
             table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
-        return table.drop_columns(["_rank"]).combine_chunks().replace_schema_metadata(None)
+        self._left_out = runs - table.num_rows
+        return self._described(table.drop_columns(["_rank"]).combine_chunks())
+
+    def _described(self, table: pa.Table) -> pa.Table:
+        """The table with the unit and the doc of each column as metadata of its field."""
+        import pyarrow as pa
+
+        about = self.plan.columns
+        fields = []
+        for each in table.schema:
+            said = {} if (column := about.get(each.name)) is None else {"unit": column.unit, "doc": column.doc}
+            fields.append(each.with_metadata({key: text for key, text in said.items() if text}))
+        return table.cast(pa.schema(fields))
+
+    def _replicated(self, table: pa.Table) -> pa.Table:
+        """The rows whose seeds are the plan's, by the replications that these seeds have there."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        study, before = self.plan.study, table["replication"]
+        if not study.paired:
+            found = zip(table["condition"].to_pylist(), before.to_pylist(), strict=True)
+            conditions = {index: self.plan.condition(index) for index in set(table["condition"].to_pylist())}
+            seeds = [self.plan.seed(conditions[index], replication) for index, replication in found]
+            return table.filter(pc.equal(table["seed"], pa.array(seeds, pa.int64())))
+        # Another seed in the study's file moves the replications; those beyond what is asked for are of this seed.
+        now = pc.subtract(table["seed"], study.seed)
+        is_meant = pc.or_(pc.less(now, self.plan.replications), pc.equal(now, before))
+        table = table.set_column(table.schema.get_field_index("replication"), "replication", now)
+        return table.filter(pc.and_(pc.greater_equal(now, 0), is_meant))
 
     def _order(self, table: pa.Table) -> dict[str, int]:
         """The numbers of the plan's conditions by their keys; a plan may be too large to be gone through."""
@@ -108,6 +141,17 @@ class StudyResults:
             for row in batch.to_pylist():
                 digest.update(json.dumps(row).encode())
         return digest.hexdigest()
+
+    @property
+    def left_out(self) -> int:
+        """How many runs of the folder are not of the study as it is now, and so not in the table."""
+        if self._frozen is None:
+            self._read()
+        return self._left_out
+
+    def beyond(self) -> int:
+        """How many runs of the table are replications beyond those that the study asks for now."""
+        return sum(each >= self.plan.replications for each in self.table()["replication"].to_pylist())
 
     def counts(self) -> Counter[str]:
         """How many runs are over, by status."""
@@ -211,14 +255,34 @@ class StudyResults:
         found: xarray.Dataset = xarray.Dataset.from_dataframe(frame)
         return found
 
+    @property
+    def path(self) -> Path:
+        """Where the table is."""
+        return self.folder / "table.parquet"
+
     def write_table(self) -> Path:
         """Write ``table.parquet``."""
         import pyarrow.parquet as pq
 
-        path = self.folder / "table.parquet"
         table = self.table()
-        replace_file(path, lambda aside: pq.write_table(table, aside))
-        return path
+        replace_file(self.path, lambda aside: pq.write_table(table, aside))
+        return self.path
+
+    def is_written(self) -> bool:
+        """Whether ``table.parquet`` has the bytes that ``write_table`` would write now, or another pyarrow might."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        buffer = io.BytesIO()
+        pq.write_table(self.table(), buffer)
+        try:
+            if (data := read_regular(self.path)) == buffer.getvalue():
+                return True
+            file = pq.ParquetFile(pa.BufferReader(data))
+            is_of_another = file.metadata.created_by != pq.read_metadata(buffer).created_by
+            return is_of_another and bool(file.read().equals(self.table()))
+        except (OSError, pa.ArrowException):
+            return False
 
 
 def open_study(folder: str | Path) -> StudyResults:

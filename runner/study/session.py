@@ -16,10 +16,11 @@ from ..engine import Simulation
 from ..provenance import git_revision, machine, versions
 from .executor import Executor
 from .local import LocalExecutor
+from .manifest import FORMAT, StoreError, read_manifest
 from .plan import Plan, epicycle_version
 from .results import StudyResults
 from .schedule import OK, Schedule
-from .store import FORMAT, Store, StoreError, collect, is_wanted, lock, prepare, read_manifest
+from .store import Store, collect, is_wanted, lock, prepare
 
 LOCAL, DASK = "local", "dask"  # executors
 MANY = 100_000  # runs that nobody asks for by mistake

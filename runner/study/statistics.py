@@ -7,8 +7,18 @@ Source: A. M. Law, *Simulation Modeling and Analysis*, chapters 4, 9 and 10.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from epicycle.actors import normal_quantile, normal_share, random_stream
+
+from ..student import student_quantile, student_tail
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 LEVEL = 0.95
 
@@ -28,18 +38,18 @@ def half_width(values: Sequence[float], level: float = LEVEL) -> float:
     """Half the width of Student's confidence interval of the mean; infinite for fewer than two values."""
     if len(values) < 2:
         return math.inf
-    from scipy.stats import t
-
-    return float(t.ppf((1 + level) / 2, len(values) - 1)) * standard_error(values)
+    return student_quantile((1 + level) / 2, len(values) - 1) * standard_error(values)
 
 
 def standard_error(values: Sequence[float]) -> float:
     """The standard error of the mean; NaN for fewer than two values."""
-    count = len(values)
-    if count < 2:
-        return math.nan
-    mean = math.fsum(values) / count
-    return math.sqrt(math.fsum((value - mean) * (value - mean) for value in values) / (count - 1) / count)
+    return _deviation(values) / math.sqrt(len(values)) if len(values) > 1 else math.nan
+
+
+def _deviation(values: Sequence[float]) -> float:
+    mean = math.fsum(values) / len(values)
+    gaps = [value - mean for value in values]
+    return math.sqrt(math.fsum(gap * gap for gap in gaps) / (len(values) - 1))
 
 
 def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
@@ -51,34 +61,55 @@ def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
     return Estimate(value, standard_error(values), value - half, value + half, count)
 
 
-def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, seed: int = 0, resamples: int = 9_999) -> Estimate:
-    """The mean with the bias-corrected and accelerated bootstrap interval, which may lie unevenly around it."""
-    if len(values) < 2 or min(values) == max(values):
-        return mean(values, level)
-    import numpy as np
-    from scipy.stats import bootstrap
+def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: int = 9_999) -> Estimate:
+    """The mean with the bias-corrected and accelerated bootstrap interval, which may lie unevenly around it.
 
-    found = bootstrap(
-        (np.asarray(values, dtype=float),),
-        np.mean,
-        confidence_level=level,
-        n_resamples=resamples,
-        batch=max(1, 1_000_000 // len(values)),
-        random_state=np.random.default_rng(seed),
-    )
-    low, high = found.confidence_interval
-    return Estimate(math.fsum(values) / len(values), float(found.standard_error), float(low), float(high), len(values))
+    Source: B. Efron, Better Bootstrap Confidence Intervals, J. American Statistical Association 82, 1987.
+    """
+    plain, count = mean(values, level), len(values)
+    if count < 2 or min(values) == max(values):
+        return plain
+    means = sorted((resampled_sums(values, resamples) / count).tolist())
+    gaps = [value - plain.value for value in values]
+    squares = math.fsum(gap * gap for gap in gaps)
+    acceleration = math.fsum(gap * gap * gap for gap in gaps) / (6.0 * squares * math.sqrt(squares))
+    rounding = 1e-12 * max(map(abs, values))  # of few values, many a resample has each of them once: the same mean
+    at_or_below = bisect_left(means, plain.value - rounding) + bisect_right(means, plain.value + rounding)
+    below = at_or_below / (2.0 * resamples)
+    bias = normal_quantile(min(max(below, 0.5 / resamples), 1.0 - 0.5 / resamples))
+    ends = []
+    for share in ((1.0 - level) / 2.0, (1.0 + level) / 2.0):
+        shifted = bias + normal_quantile(share)
+        place = (resamples - 1) * normal_share(bias + shifted / (1.0 - acceleration * shifted))
+        low = min(int(place), resamples - 2)
+        ends.append(means[low] + (place - low) * (means[low + 1] - means[low]))
+    return Estimate(plain.value, _deviation(means), ends[0], ends[1], count)
+
+
+def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:
+    """Sums of bootstrap samples, in order; as many values are drawn alike wherever this is called."""
+    import numpy as np
+
+    count, known, sums = len(values), np.asarray(values, float), np.zeros(number)
+    stream, rows = random_stream(0, "resampling"), max(1, 1_000_000 // len(values))
+    for start in range(0, number, rows):
+        part = sums[start : start + rows]
+        for column in stream.integers(count, size=(len(part), count)).T:
+            part += known[column]
+    return sums
 
 
 def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
     """A share with Wilson's interval, which holds for rare events and few runs, too."""
     if count == 0:
         return Estimate(math.nan, math.nan, 0.0, 1.0, 0)
-    from scipy.stats import binomtest
-
-    found = binomtest(successes, count).proportion_ci(level, method="wilson")
-    share = successes / count
-    return Estimate(share, math.sqrt(share * (1 - share) / count), float(found.low), float(found.high), count)
+    share, z = successes / count, normal_quantile((1.0 + level) / 2.0)
+    error = share * (1.0 - share) / count
+    scale = 1.0 + z * z / count
+    middle = (share + z * z / (2.0 * count)) / scale
+    half = z * math.sqrt(error + z * z / (4.0 * count * count)) / scale
+    low, high = max(0.0, middle - half) if successes else 0.0, min(1.0, middle + half) if successes < count else 1.0
+    return Estimate(share, math.sqrt(error), low, high, count)
 
 
 @dataclass(frozen=True)
@@ -102,10 +133,8 @@ def paired_difference(first: dict[int, float], second: dict[int, float], level: 
     if len(gaps) < 2:
         return Difference(estimate, math.nan)
     if min(gaps) == max(gaps):
-        return Difference(estimate, 1.0 if gaps[0] == 0 else math.ldexp(2.0, -len(gaps)))
-    from scipy.stats import t
-
-    return Difference(estimate, float(2 * t.sf(abs(estimate.value) / estimate.error, len(gaps) - 1)))
+        return Difference(estimate, 1.0 if gaps[0] == 0 else math.ldexp(1.0, 1 - len(gaps)))
+    return Difference(estimate, 2.0 * student_tail(abs(estimate.value) / estimate.error, len(gaps) - 1))
 
 
 def without_rounding(values: Iterable[float], scale: float) -> list[float]:

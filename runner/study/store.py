@@ -3,19 +3,27 @@
 ::
 
     manifest.json          what the study is, and what its results were made with
-    parts/<name>.parquet   rows of runs; a part appears all at once, and is never changed
-    journals/<name>.jsonl  one writer's rows since its last part, a line each
+    parts/<name>-<checksum>.parquet
+                           rows of runs; a part appears all at once, and is never changed
+    journals/<name>.jsonl  one writer's rows since its last part, a line each: checksum, row
     table.parquet          all rows in the order of the plan, made at the end
     lock                   held by the process that writes
+    damaged/               files that were not any more what was written
 
 A run counts as finished when its line is in a journal, that is before anybody is told: the line is handed to the
 operating system at once, where no ``kill`` can reach it, and brought to the disk at most once a second.  The next to
 open the folder makes a part of every journal that a writer has left behind.  A row that is in two places is one row.
+
+The manifest has a checksum in it, a part in its name, a row of a journal before it, and no byte is believed before its
+checksum is seen to be right.  Who only reads is told of damage; who goes on with the study puts the damaged file aside,
+and makes the runs that are not there any more.
 """
 
 from __future__ import annotations
 
+import io
 import json
+import logging
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -24,8 +32,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import counted, irregular, read_regular
 
+from .manifest import DamagedError, StoreError, checksum, manifest_text, read_manifest, schema_of
 from .schedule import FAILED, KILLED, OK, RETRIED, TIMEOUT, Done
 
 if TYPE_CHECKING:
@@ -36,7 +45,8 @@ try:
 except ImportError:  # Windows: nothing tells two processes that they write to one folder
     fcntl = None  # type: ignore[assignment]
 
-FORMAT = 2
+_LOGGER = logging.getLogger("epicycle")
+
 ROWS_OF_A_PART = 1_000
 SECONDS_TO_THE_DISK = 1.0
 BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of one run, the better one counts
@@ -44,25 +54,8 @@ BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of one run, the better
 Row = dict[str, Any]
 
 
-class StoreError(EpicycleError):
-    """A results folder that cannot be used."""
-
-
 class WriteError(StoreError):
     """A results folder that takes nothing more."""
-
-
-def schema_of(manifest: Mapping[str, Any]) -> pa.Schema:
-    """The columns of a part."""
-    import pyarrow as pa
-
-    kinds = {"bool": pa.bool_(), "int": pa.int64(), "float": pa.float64(), "text": pa.string()}
-    fields = [("run", pa.string()), ("condition", pa.string()), ("replication", pa.int64())]
-    fields += [(name, kinds[kind]) for name, kind in manifest["factors"].items()]
-    fields += [("seed", pa.int64()), ("status", pa.string())]
-    fields += [(name, pa.float64()) for name in manifest["metrics"]]
-    fields += [("events", pa.int64()), ("digest", pa.string()), ("error", pa.string()), ("wall_time", pa.float64())]
-    return pa.schema(fields)
 
 
 class Store:
@@ -81,7 +74,10 @@ class Store:
             yield from self._part(path, columns)
         for path in sorted((self.folder / "journals").glob("*.jsonl")):
             with suppress(FileNotFoundError):  # its writer has just made a part of it
-                if rows := read_journal(path):
+                rows, damaged = read_journal(path)
+                if damaged:
+                    raise DamagedError(f"{path} {damaged}{self._help()}")
+                if rows:
                     batch = pa.RecordBatch.from_pylist(rows, self.schema)
                     yield batch if columns is None else batch.select(columns)
 
@@ -89,19 +85,16 @@ class Store:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        try:
-            with pq.ParquetFile(path) as file:
-                if not file.schema_arrow.equals(self.schema):
-                    raise StoreError(
-                        f"{path} has not the columns of {self.folder}/manifest.json: it is of another study"
-                    )
-                yield from file.iter_batches(columns=columns)
-        except (pa.ArrowException, OSError) as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise StoreError(
-                f"{path} is broken: {reason}\n"
-                f"   help: delete it, and 'epicycle resume {self.folder}' makes its runs anew"
-            ) from error
+        data, damaged = read_part(path)
+        if damaged:
+            raise DamagedError(f"{path} {damaged}{self._help()}")
+        with pq.ParquetFile(pa.BufferReader(data)) as file:
+            if not file.schema_arrow.equals(self.schema):
+                raise StoreError(f"{path} has not the columns of {self.folder}/manifest.json: it is of another study")
+            yield from file.iter_batches(columns=columns)
+
+    def _help(self) -> str:
+        return f"\n   help: 'epicycle resume {self.folder}' puts it aside and makes the runs anew that are lost with it"
 
     def known(self, value: str | None = None) -> dict[str, Done]:
         """The runs that are there, by key; ``value`` names the metric that is wanted of each."""
@@ -122,34 +115,7 @@ def rank(status: str) -> int:
     return BEST_FIRST.index(status)
 
 
-# -- the manifest -----------------------------------------------------------------------------------------------------
-
-
-# What a plan is made of again.
-_NEEDED = (
-    "epicycle", "study", "file", "text", "set", "types", "replications", "factors", "metrics", "columns", "model",
-    "sources", "level_sources",
-)  # fmt: skip
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """What a results folder says of itself; raises ``StoreError``."""
-    path = folder / "manifest.json"
-    if not folder.is_dir():
-        raise StoreError(f"there is no folder {folder}")
-    if not path.is_file():
-        raise StoreError(f"{folder} holds no results of a study: it has no manifest.json")
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise StoreError(f"{path} is broken: {error}") from error
-    if not isinstance(manifest, dict) or "level_sources" not in manifest:
-        raise StoreError(f"{folder} holds other results, not those of a study")
-    if (found := manifest.get("format")) != FORMAT:
-        raise StoreError(f"{folder} has format {found}, this Epicycle reads format {FORMAT}")
-    if missing := [key for key in _NEEDED if key not in manifest]:
-        raise StoreError(f"{path} is broken: it has no {', '.join(map(repr, missing))}")
-    return manifest
+# -- opening it to write ----------------------------------------------------------------------------------------------
 
 
 def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
@@ -158,8 +124,22 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
     Raises ``StoreError``.  The caller holds the lock.
     """
     path = folder / "manifest.json"
-    if path.is_file():
-        before = read_manifest(folder)
+    before: Mapping[str, Any] | None = None
+    if path.exists():
+        try:
+            before = read_manifest(folder)
+        except DamagedError:
+            if not (folder / "parts").is_dir():  # it may never have been ours
+                raise
+            _LOGGER.warning("%s is damaged: it is written anew", path)
+    elif folder.is_dir() and any(
+        each.name not in ("lock", "parts", "journals", "damaged") and not each.name.startswith(".manifest.json")
+        for each in folder.iterdir()
+    ):
+        raise StoreError(
+            f"{folder} is not empty, and holds no results of a study\n   help: choose another folder with --out"
+        )
+    if before is not None:
         if before["study"] != manifest["study"]:
             raise StoreError(
                 f"{folder} holds results of the study {before['study']!r}, not of {manifest['study']!r}\n"
@@ -171,21 +151,17 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
                     f"{folder} was made when {manifest['study']} had other {what}: {_shown(before[what])}, "
                     f"not {_shown(manifest[what])}\n   help: choose another folder with --out"
                 )
-    elif folder.is_dir() and any(
-        each.name not in ("lock", "parts", "journals") and not each.name.startswith(".manifest.json")
-        for each in folder.iterdir()
-    ):
-        raise StoreError(
-            f"{folder} is not empty, and holds no results of a study\n   help: choose another folder with --out"
-        )
     with writing(folder):
         for name in ("parts", "journals"):
             (folder / name).mkdir(exist_ok=True)
-        _replace(path, lambda aside: aside.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8"))
+        _replace(path, lambda aside: aside.write_text(manifest_text(manifest), encoding="utf-8"))
         store = Store(folder)
         for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*"):
             for aside in folder.glob(pattern):
                 aside.unlink()  # what somebody was writing when killed
+        for part in sorted((folder / "parts").glob("*.parquet")):
+            if damaged := read_part(part)[1]:
+                _put_aside(part, f"{damaged}; its runs are made anew")
     collect(store)
     return store
 
@@ -206,6 +182,8 @@ def lock(folder: Path) -> Iterator[None]:
     """Keep others from writing to a results folder; the lock ends with the process, however it ends."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
+        if (folder / "lock").exists() and (kind := irregular(folder / "lock")):
+            raise StoreError(f"{folder / 'lock'} is {kind}: delete it")
         file = (folder / "lock").open("a+")
     with file:
         if fcntl is not None:
@@ -271,7 +249,8 @@ class Writer:
             if fcntl is not None:
                 fcntl.flock(self._journal, fcntl.LOCK_EX)
             _sync_folder(self._path.parent)
-        line = (json.dumps(row) + "\n").encode()
+        text = json.dumps(row).encode()
+        line = b"%s %s\n" % (checksum(text).encode(), text)
         size = os.fstat(self._journal).st_size
         try:
             if os.write(self._journal, line) < len(line):  # the disk is full: the next try says so
@@ -306,31 +285,61 @@ def write_part(store: Store, name: str, rows: list[Row]) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    table = pa.Table.from_pylist(rows, store.schema)
-    _replace(store.folder / "parts" / f"{name}.parquet", lambda aside: pq.write_table(table, aside))
+    buffer = io.BytesIO()
+    pq.write_table(pa.Table.from_pylist(rows, store.schema), buffer)
+    data = buffer.getvalue()
+    _replace(store.folder / "parts" / f"{name}-{checksum(data)}.parquet", lambda aside: aside.write_bytes(data))
 
 
-def read_journal(path: Path) -> list[Row]:
-    """The rows of a journal; a last line that is not whole was not finished."""
-    lines = path.read_bytes().split(b"\n")[:-1]
-    found = []
-    for line in lines:
-        with suppress(ValueError):  # the machine went down before the line came to the disk
-            found.append(json.loads(line))
-    return found
+def read_part(path: Path) -> tuple[bytes, str]:
+    """The contents of a part, and what is wrong with them."""
+    try:
+        data = read_regular(path)
+    except OSError as error:
+        return b"", f"cannot be read: {error.strerror}"
+    return data, "" if path.stem.endswith(f"-{checksum(data)}") else "is damaged: it is not what was written"
+
+
+def read_journal(path: Path) -> tuple[list[Row], str]:
+    """The rows of a journal, and what is wrong with others; a last line that is not whole was not finished."""
+    try:
+        lines = read_regular(path).split(b"\n")[:-1]
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        return [], f"cannot be read: {error.strerror}"
+    halves = [line.partition(b" ") for line in lines]
+    whole = [json.loads(text) for digest, _, text in halves if digest == checksum(text).encode()]
+    lost = len(lines) - len(whole)
+    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} are not what was written" if lost else ""
 
 
 def _recover(journal: Path, store: Store) -> None:
     """Make a part of a journal whose writer is gone."""
+    if kind := irregular(journal):
+        _put_aside(journal, f"is {kind}")
+        return
     with journal.open("rb") as file:
         if fcntl is not None:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 return  # a worker that outlived its study is just ending: rows are read from the journal as it is
-        if rows := read_journal(journal):
+        rows, damaged = read_journal(journal)
+        if rows:
             write_part(store, journal.stem, rows)
-        journal.unlink()
+        if damaged:
+            _put_aside(journal, f"{damaged}; their runs are made anew")
+        else:
+            journal.unlink()
+
+
+def _put_aside(path: Path, damage: str) -> None:
+    """Keep a damaged file where it does no harm, and say so."""
+    aside = path.parent.parent / "damaged"
+    aside.mkdir(exist_ok=True)
+    os.replace(path, aside / path.name)
+    _LOGGER.warning("%s %s\n   what is damaged is kept in %s", path, damage, aside)
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from epicycle.actors import UnitError, parse_unit
+from epicycle.actors import UnitError, parse_unit, random_stream
 
 from ..model import Position
 from ..model.declarations import HYPERCUBE_KEYS, RANGE_KEYS
@@ -134,7 +134,20 @@ class DimensionReader(NodeReader):
         if size > MAX_LEVELS:
             self.problems.add(f"the range of {name!r} has more than {MAX_LEVELS:,} values", at)
             return None
-        return Ranged(name, position, start, step, size, next(iter(units)), node.position)
+        found = Ranged(name, position, start, step, size, next(iter(units)), node.position)
+        try:
+            is_distinct = found.is_distinct()
+        except UnitError as error:
+            self.problems.add(f"the range of {name!r}: {error}", at)
+            return None
+        if not is_distinct:
+            self.problems.add(
+                f"the range of {name!r} has values that cannot be told apart as floats: "
+                f"from {start} to {end} in steps of {step}",
+                at,
+            )
+            return None
+        return found
 
     def quantity(self, node: Node, what: str) -> tuple[Decimal, str] | None:
         """A number, perhaps with a unit."""
@@ -180,15 +193,15 @@ class DimensionReader(NodeReader):
                 bounds[path] = float(ends[0][0]), float(ends[1][0]), ends[0][1], entry.key.position
         if len(self.problems) > before:
             return None
-        import numpy as np
-        from scipy.stats import qmc
-
-        points = qmc.LatinHypercube(d=len(bounds), seed=np.random.default_rng(seed)).random(size)
+        shares = []
+        for path in bounds:
+            stream = random_stream(seed, path, "latin hypercube")
+            shares.append([(slice_ + stream.random()) / size for slice_ in stream.permutation(size).tolist()])
         levels = []
-        for point in points:
+        for point in zip(*shares, strict=True):
             settings, values = [], {}
             for (path, (low, high, unit, at)), share in zip(bounds.items(), point, strict=True):
-                value = float(low + share * (high - low))
+                value = low + share * (high - low)
                 settings.append(Setting(path, number_node(value, unit, at), at))
                 values[path] = in_si(value, unit)
             levels.append(Level(tuple(settings), dict(values)))

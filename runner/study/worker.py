@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..collection import seldom_collecting
+from ..leaving import leave
 from .one_run import Runner
 from .plan import Plan
 from .schedule import Done
@@ -39,6 +40,7 @@ def work(folder: str, connection: Connection, lifeline: Connection) -> None:
                 writer.add(row)
                 connection.send((OVER, Done(row["status"], row[decides] if decides else None)))
         writer.flush()
+        leave(0)
     except EOFError:
         return
     except OSError as error:

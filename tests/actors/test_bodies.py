@@ -21,8 +21,8 @@ from epicycle.actors import (
 from tests.actors.harness import Harness
 
 
-def body(x: float, y: float) -> BodyState:
-    return BodyState(np.array([x, y]), np.zeros(2))
+def body(x: float, y: float, time: float = 0.0, velocity: tuple[float, float] = (0.0, 0.0)) -> BodyState:
+    return BodyState(np.array([x, y]), np.array(velocity), time)
 
 
 def test_clock_ticks_without_drift() -> None:
@@ -124,7 +124,7 @@ def test_vehicle_ignores_a_control_that_is_not_finite() -> None:
 
 def test_tokens_cannot_be_changed() -> None:
     given = np.zeros(2)
-    state = BodyState(given, given)
+    state = BodyState(given, given, 0.0)
     given[0] = 1.0
     assert state.position[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):
@@ -134,9 +134,9 @@ def test_tokens_cannot_be_changed() -> None:
 def test_goal_monitor_tells_the_first_arrival_once() -> None:
     harness = Harness(GoalMonitor("m", tolerance=0.5))
     for step, x in enumerate([3.0, 1.0, 0.4, 2.0, 0.1]):
-        harness.fire(step / 10, state=body(x, 0.0))
-    assert harness.sent["arrived"] == [(0.2, True)]
-    assert harness.sent["time"] == [(0.2, 0.2)]
+        harness.fire(step / 10 + 0.05, state=body(x, 0.0, time=step / 10))
+    assert harness.sent["arrived"] == [(0.25, True)]
+    assert harness.sent["time"] == [(0.25, 0.2)]  # the body was there then, though it is told later
     assert harness.tokens("path_length") == pytest.approx([0.0, 2.0, 2.6, 4.2, 6.1])
     assert harness.tokens("distance") == pytest.approx([3.0, 1.0, 0.4, 2.0, 0.1])
 
@@ -144,20 +144,39 @@ def test_goal_monitor_tells_the_first_arrival_once() -> None:
 def test_distance_monitor_needs_both() -> None:
     harness = Harness(DistanceMonitor("m"))
     harness.fire(0.0, a=body(0, 0))
-    harness.fire(0.1, a=body(0, 0), b=body(3, 4))
+    harness.fire(0.1, a=body(0, 0, 0.1), b=body(3, 4, 0.1))
     assert harness.sent["distance"] == [(0.1, 5.0)]
+
+
+def test_bodies_out_of_phase_have_a_distance() -> None:
+    """Each state is compared with where the other body has gone since it was last seen."""
+    harness = Harness(DistanceMonitor("m"))
+    harness.fire(0.0, a=body(0, 0, 0.0, (10, 0)))
+    harness.fire(0.05, b=body(3.5, 4, 0.05, (0, -20)))  # a is at (0.5, 0)
+    harness.fire(0.1, a=body(1, 0, 0.1, (10, 0)))  # b is at (3.5, 3)
+    assert harness.tokens("distance") == pytest.approx([5.0, math.hypot(2.5, 3.0)])
+    harness.fire(0.12, a=body(9, 9, 0.08))  # overtaken by a later one
+    assert harness.last("distance") == harness.tokens("distance")[1]
+
+
+def test_separation_of_bodies_out_of_phase() -> None:
+    harness = Harness(SeparationMonitor("m"))
+    harness.fire(0.0, bodies=[body(0, 0, 0.0, (10, 0)), None, None])
+    harness.fire(0.05, bodies=[None, body(3.5, 4, 0.05, (0, -20)), None])
+    harness.fire(0.1, bodies=[None, None, body(1, 1.5, 0.1)])
+    assert harness.sent["distance"] == [(0.05, pytest.approx(5.0)), (0.1, pytest.approx(1.5))]
 
 
 def test_separation_monitor_takes_the_smallest_pair_and_no_duplicates() -> None:
     harness = Harness(SeparationMonitor("m"))
     harness.fire(0.0, bodies=[body(0, 0)])
-    harness.fire(0.1, bodies=[body(0, 0), body(3, 4), body(3, 6)])
+    harness.fire(0.1, bodies=[body(0, 0, 0.1), body(3, 4, 0.1), body(3, 6, 0.1)])
     assert harness.sent["distance"] == [(0.1, 2.0)]
     port = harness.actor.inputs["bodies"]
     put, put_channel = port.entry()
-    put(body(9, 0))
+    put(body(9, 0, 0.2))
     put_channel(0)
-    harness.fire(0.2, bodies=[body(9, 0), body(0, 0)])
+    harness.fire(0.2, bodies=[body(9, 0, 0.2), body(0, 0, 0.2), body(90, 0, 0.2)])
     assert harness.last("distance") == 9.0
 
 

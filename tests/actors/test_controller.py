@@ -1,7 +1,11 @@
 """The controller: timing, memory, and that nothing makes it fail."""
 
+import functools
 import logging
+import math
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -12,25 +16,30 @@ from epicycle.actors import (
     EpicycleError,
     Estimate,
     Inform,
+    Measurement,
     ParameterError,
     Plan,
     ReachGoal,
     RobustController,
+    UnscentedEstimator,
 )
+from epicycle.actors.robotics.numerics import warm_up
 from tests.actors.harness import Harness
 from tests.actors.scenario import _Recorder, play
 
-
-def state(x: float = 30.0, y: float = 0.0, vx: float = 0.0, vy: float = 0.0) -> BodyState:
-    return BodyState(np.array([x, y]), np.array([vx, vy]))
+COMPILING = "compiling the numeric kernels (once, about 20 s) ..."
 
 
-def estimate(x: float = 12.0, y: float = 2.0, spread: float = 0.1) -> Estimate:
-    return Estimate(np.array([x, y, -1.0, 0.0]), spread * np.eye(4), ("main",))
+def state(x: float = 30.0, y: float = 0.0, vx: float = 0.0, vy: float = 0.0, *, time: float = 0.0) -> BodyState:
+    return BodyState(np.array([x, y]), np.array([vx, vy]), time)
+
+
+def estimate(x: float = 12.0, y: float = 2.0, spread: float = 0.1, *, time: float = 0.0) -> Estimate:
+    return Estimate(np.array([x, y, -1.0, 0.0]), spread * np.eye(4), time, ("main",))
 
 
 def plan(robot: str, time: float, x: float = 20.0, y: float = 2.0, controls: object = None) -> Plan:
-    return Plan(robot, time, state(x, y), np.zeros((11, 2)) if controls is None else np.array(controls))
+    return Plan(robot, time, state(x, y, time=time), np.zeros((11, 2)) if controls is None else np.array(controls))
 
 
 def make(**parameters: object) -> tuple[Harness, _Recorder]:
@@ -52,7 +61,7 @@ def test_it_drives_to_the_goal_and_says_so() -> None:
     assert sent.controls[1].tolist() == control.tolist()
     assert (harness.last("violation"), harness.last("infeasible")) == (0.0, 0)
     assert harness.last("iterations") > 0
-    harness.fire(0.1, trigger=1, state=state())
+    harness.fire(0.1, trigger=1, state=state(time=0.1))
     assert harness.last("plan").controls[0].tolist() == control.tolist()
 
 
@@ -60,7 +69,7 @@ def test_without_trigger_it_listens_only() -> None:
     harness, recorder = make()
     harness.fire(0.0, state=state(), estimate=estimate(), peer_plans=[plan("b", 0.0)])
     assert recorder.records == []
-    harness.fire(0.1, trigger=1, state=state())
+    harness.fire(0.1, trigger=1, state=state(time=0.1))
     problem = recorder.records[0][0]
     assert len(problem.obstacle_mean) == len(problem.peer_mean) == 1
     # The estimate is one period old, so step 1 lies two periods ahead of it.
@@ -81,7 +90,7 @@ def test_first_state_of_the_problem_follows_the_applied_control() -> None:
     harness, recorder = make()
     harness.fire(0.0, trigger=0, state=state())
     applied = harness.last("control")
-    harness.fire(0.1, trigger=1, state=state(29.0, 1.0, 2.0, 3.0))
+    harness.fire(0.1, trigger=1, state=state(29.0, 1.0, 2.0, 3.0, time=0.1))
     problem = recorder.records[1][0]
     assert problem.position == pytest.approx([29.2, 1.3])
     assert problem.velocity == pytest.approx(np.array([2.0, 3.0]) + 0.1 * applied)
@@ -99,7 +108,7 @@ def test_peers_present_at_the_very_first_firing_count() -> None:
 def test_distance_to_a_silent_peer_grows_from_the_second_period_on(now: float, lost: int) -> None:
     harness, recorder = make()
     controls = np.tile([[1.0, 0.0]], (11, 1))
-    harness.fire(now, trigger=0, state=state(), peer_plans=[plan("b", 0.0, controls=controls)])
+    harness.fire(now, trigger=0, state=state(time=now), peer_plans=[plan("b", 0.0, controls=controls)])
     problem = recorder.records[0][0]
     assert problem.peer_distance[0] == pytest.approx(2.0 + 2.0 * (0.2 + 0.4 * np.arange(1, 11) + 0.4 * lost))
     place, speed, driven = np.array([20.0, 2.0]), np.zeros(2), []
@@ -110,23 +119,40 @@ def test_distance_to_a_silent_peer_grows_from_the_second_period_on(now: float, l
     assert problem.peer_mean[0] == pytest.approx(np.array(driven[age : age + 10]))
 
 
+@pytest.mark.parametrize("age", [0.03, 0.08, 0.24, -0.04])
+def test_a_peer_between_two_of_its_steps_is_on_its_way(age: float) -> None:
+    harness, recorder = make()
+    controls = np.array([[1.0, 0.0], [0.0, 3.0], *[[2.0, 1.0]] * 9])
+    known = Plan("b", 1.0 - age, state(20.0, 2.0, 5.0, -1.0, time=1.0 - age), controls)
+    harness.fire(1.0, trigger=0, state=state(time=1.0), peer_plans=[known])
+    place, speed, steps = np.array([20.0, 2.0]), np.array([5.0, -1.0]), []
+    for k in range(20):
+        steps.append((place, speed))
+        place, speed = place + 0.1 * speed, speed + 0.1 * (controls[k] if k < 11 else np.zeros(2))
+    expected = []
+    for step in range(1, 11):
+        whole = math.floor((age + 0.1 * step) / 0.1 + 1e-9)
+        expected.append(steps[whole][0] + (age + 0.1 * step - 0.1 * whole) * steps[whole][1])
+    assert recorder.records[0][0].peer_mean[0] == pytest.approx(np.array(expected))
+
+
 def test_the_latest_plan_counts_whatever_the_order_of_arrival() -> None:
     harness, recorder = make()
-    harness.fire(0.2, trigger=0, state=state(), peer_plans=[plan("b", 0.1, y=7.0), plan("b", 0.0, y=2.0)])
+    harness.fire(0.2, trigger=0, state=state(time=0.2), peer_plans=[plan("b", 0.1, y=7.0), plan("b", 0.0, y=2.0)])
     assert recorder.records[0][0].peer_mean[0, 0, 1] == 7.0
 
 
 def test_its_own_plan_is_ignored() -> None:
     harness, recorder = make()
-    harness.fire(0.1, trigger=0, state=state(), peer_plans=[plan("main", 0.0)])
+    harness.fire(0.1, trigger=0, state=state(time=0.1), peer_plans=[plan("main", 0.0)])
     assert len(recorder.records[0][0].peer_mean) == 0
 
 
 def test_tube_binds_where_the_standing_plan_reaches() -> None:
     harness, recorder = make()
     harness.fire(0.0, trigger=0, state=state())
-    harness.fire(0.1, trigger=1, state=state())
-    harness.fire(0.4, trigger=4, state=state())
+    harness.fire(0.1, trigger=1, state=state(time=0.1))
+    harness.fire(0.4, trigger=4, state=state(time=0.4))
     first, second, third = (record[0] for record in recorder.records)
     assert np.isinf(first.tube_radius).all()
     assert second.tube_radius[:9] == pytest.approx(0.2 + 0.4 * np.arange(1, 10))
@@ -147,7 +173,8 @@ def test_steps_counted_from_the_decision() -> None:
 
     harness, recorder = make(horizon_from="decision")
     for tick in range(2):
-        harness.fire(0.1 * tick, trigger=tick, state=state(), estimate=estimate(), peer_plans=[plan("b", 0.0)])
+        now = 0.1 * tick
+        harness.fire(now, trigger=tick, state=state(time=now), estimate=estimate(), peer_plans=[plan("b", 0.0)])
     first, second = recorder.records[0][0], recorder.records[1][0]
     # One row more than N: tau is 0 at t + period, and N steps on at the last.
     assert first.peer_distance.shape == (1, 11)
@@ -177,6 +204,68 @@ def test_covariance_noise_widens_the_prediction() -> None:
     assert b[9, 0] > a[9, 0] + 0.5
 
 
+@pytest.mark.parametrize("noise", [False, True])
+def test_kappa_and_process_noise_are_those_of_the_filter_in_eq_5_too(noise: bool) -> None:
+    from epicycle.actors.robotics.numerics import ukf
+
+    harness, recorder = make(objective=Inform(), kappa=1.0, covariance_noise=noise)
+    known = estimate()
+    harness.fire(0.0, trigger=0, state=state(), estimate=known)
+    problem = recorder.records[0][0]
+    mean, covariance = known.mean, known.covariance
+    for _ in range(10):
+        added = np.diag([0.002, 0.002, 0.4, 0.4]) if noise else np.zeros((4, 4))
+        mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.1), added)
+    weights, points = problem.sigma_weights, problem.sigma_positions
+    assert weights == pytest.approx([0.2, *[0.1] * 8])
+    assert weights @ points == pytest.approx(mean[:2])
+    spread = (points - mean[:2]).T @ np.diag(weights) @ (points - mean[:2])
+    assert spread == pytest.approx(covariance[:2, :2])
+    assert problem.obstacle_covariance[0, 9] == pytest.approx([spread[0, 0], spread[0, 1], spread[1, 1]])
+
+
+def test_an_estimate_that_comes_late_counts_as_old() -> None:
+    """0.4 s late: the controller plans with what the filter would have predicted for now, without a measurement."""
+    filter_ = Harness(UnscentedEstimator("main.estimator"))
+    seen = Measurement("main", np.array([30.0, 0.0]), "relative_position", np.array([-18.0, 2.0]), 0.2, 2.0, 0.0)
+    filter_.fire(0.0, trigger=0, measurements=[seen])
+    for tick in range(1, 5):
+        filter_.fire(tick / 10, trigger=tick)
+    problems = []
+    for known in (filter_.tokens("estimate")[0], filter_.last("estimate")):
+        harness, recorder = make(objective=Inform())
+        harness.fire(0.4, trigger=0, state=state(time=0.4), estimate=known)
+        problems.append(recorder.records[0][0])
+    late, fresh = problems
+    assert late.obstacle_mean == pytest.approx(fresh.obstacle_mean)
+    assert late.obstacle_covariance == pytest.approx(fresh.obstacle_covariance)
+    assert late.sigma_positions == pytest.approx(fresh.sigma_positions)
+
+
+@pytest.mark.parametrize("age", [0.04, -0.03, 0.25])
+def test_an_estimate_between_two_ticks_is_brought_to_the_time_of_the_state(age: float) -> None:
+    harness, recorder = make()
+    harness.fire(0.5, trigger=0, state=state(time=0.5), estimate=estimate(time=0.5 - age))
+    problem = recorder.records[0][0]
+    assert problem.obstacle_mean[0, 0] == pytest.approx([12.0 - (age + 0.1), 2.0])
+
+
+def test_solving_late_and_hearing_late_change_no_age() -> None:
+    """What the controller works with is of its own time, whenever it fires; what is overtaken is not taken up."""
+    in_time, late = make(), make()
+    for (harness, _), delay in ((in_time, 0.0), (late, 0.07)):
+        harness.fire(0.1 + delay, trigger=0, state=state(time=0.1))
+        harness.fire(0.15 + delay, estimate=estimate(11.0, time=0.2), peer_plans=[plan("b", 0.1)])
+        harness.fire(0.16 + delay, estimate=estimate(19.0, time=0.1))
+        harness.fire(0.2 + delay, trigger=1, state=state(time=0.2))
+        sent = harness.tokens("plan")
+        assert [each.time for each in sent] == [each.state.time for each in sent] == [0.1, 0.2]
+    for one, other in zip(in_time[1].records, late[1].records, strict=True):
+        for here, there in zip(one[0], other[0], strict=True):
+            assert np.array_equal(here, there)
+    assert late[1].records[1][0].obstacle_mean[0, 0] == pytest.approx([10.9, 2.0])
+
+
 def test_inform_counts_the_others_only_if_joint() -> None:
     for joint in (True, False):
         harness, recorder = make(objective=Inform(joint=joint))
@@ -198,7 +287,7 @@ def test_what_is_not_finite_is_ignored_and_the_last_good_stays(bad: float) -> No
         Plan("b", 0.1, state(), np.zeros((0, 2))),
         Plan("b", 0.1, state(), np.zeros(2)),
     ]
-    harness.fire(0.1, trigger=1, state=state(), estimate=estimate(bad), peer_plans=worse)
+    harness.fire(0.1, trigger=1, state=state(time=0.1), estimate=estimate(bad), peer_plans=worse)
     problem = recorder.records[1][0]
     assert problem.obstacle_mean[0, 0] == pytest.approx([12.0 - 0.2, 2.0])
     assert problem.peer_mean[0, 0] == pytest.approx([20.0, 2.0])
@@ -209,12 +298,12 @@ def test_what_is_not_finite_is_ignored_and_the_last_good_stays(bad: float) -> No
 def test_without_a_finite_own_state_the_control_is_zero(bad: float) -> None:
     harness, _ = make()
     harness.fire(0.0, trigger=0, state=state())
-    harness.fire(0.1, trigger=1, state=state(vx=bad))
+    harness.fire(0.1, trigger=1, state=state(vx=bad, time=0.1))
     assert harness.last("control").tolist() == [0.0, 0.0]
     assert len(harness.tokens("plan")) == 1
     harness.fire(0.2, trigger=2)
     assert harness.last("control").tolist() == [0.0, 0.0]
-    harness.fire(0.3, trigger=3, state=state())
+    harness.fire(0.3, trigger=3, state=state(time=0.3))
     assert harness.last("plan").controls[0].tolist() == [0.0, 0.0]
     assert np.isfinite(harness.last("control")).all()
 
@@ -231,9 +320,9 @@ def test_wild_but_finite_input_gives_a_finite_control_within_the_limit(objective
             harness.fire(
                 step / 10,
                 trigger=step,
-                state=BodyState(numbers[:2], numbers[2:4]),
-                estimate=Estimate(numbers[4:], root @ root.T),
-                peer_plans=[Plan("b", 0.0, BodyState(numbers[2:4], numbers[4:6]), random.normal(size=(11, 2)))],
+                state=BodyState(numbers[:2], numbers[2:4], step / 10),
+                estimate=Estimate(numbers[4:], root @ root.T, step / 10),
+                peer_plans=[Plan("b", 0.0, BodyState(numbers[2:4], numbers[4:6], 0.0), random.normal(size=(11, 2)))],
             )
             control = harness.last("control")
             assert np.isfinite(control).all()
@@ -279,10 +368,26 @@ def test_parts_can_be_given_as_mappings() -> None:
         RobustController("c", horizon=2)
 
 
-def test_compiling_is_announced_only_if_it_takes_long(caplog: pytest.LogCaptureFixture) -> None:
-    from epicycle.actors.robotics.numerics.warm_up import compile_kernels
-
+@pytest.mark.parametrize(("patience", "said"), [(0.001, [COMPILING]), (60.0, [])])
+def test_compiling_is_announced_only_if_it_takes_long(
+    patience: float, said: list[str], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     caplog.set_level(logging.INFO, "epicycle")
-    compile_kernels()  # done already in this process, or quick from the cache
-    compile_kernels()
-    assert len(caplog.records) <= 1
+    calls = []
+
+    def work() -> None:
+        calls.append(1)
+        deadline = time.monotonic() + 10.0
+        while patience < 1.0 and not caplog.messages and time.monotonic() < deadline:
+            time.sleep(0.001)
+
+    monkeypatch.setattr(warm_up, "_call_every_kernel", work)
+    monkeypatch.setattr(warm_up, "_PATIENCE", patience)
+    before = threading.active_count()
+    compile_once = functools.cache(warm_up.compile_kernels.__wrapped__)
+    compile_once()
+    compile_once()  # is done
+    assert (calls, caplog.messages) == ([1], said)
+    while threading.active_count() > before:  # nobody is left who would speak later
+        time.sleep(0.001)
+    assert caplog.messages == said

@@ -1,5 +1,6 @@
 """Sensor, broadcast channel and estimators."""
 
+import importlib
 import math
 from itertools import permutations
 
@@ -11,6 +12,7 @@ from epicycle.actors import (
     BodyState,
     BroadcastChannel,
     ChannelError,
+    Estimate,
     FilterError,
     FilterPyEstimator,
     Measurement,
@@ -28,8 +30,8 @@ FILTERS = (
 )
 
 
-def body(x: float, y: float) -> BodyState:
-    return BodyState(np.array([x, y]), np.zeros(2))
+def body(x: float, y: float, time: float = 0.0) -> BodyState:
+    return BodyState(np.array([x, y]), np.zeros(2), time)
 
 
 def sense(count: int, *, seed: int = 1, path: str = "main.sensor", **parameters: object) -> list[Measurement]:
@@ -126,7 +128,7 @@ def drive(harness: Harness, steps: int, *, kind: str = "relative_position", gap:
             value = offset + 0.2 * e[0] * along + 2.0 * e[1] * across
             if kind == "range":
                 value = np.array([distance + 0.2 * e[0]])
-            measurements.append(Measurement(name, np.array(place), kind, value, 0.2, 2.0))
+            measurements.append(Measurement(name, np.array(place), kind, value, 0.2, 2.0, step / 10))
         harness.fire(step / 10, trigger=step, measurements=measurements if step not in gap else [])
         velocity = -1.256 * np.array([math.cos(turned), math.sin(turned)])
         rows.append([harness.last("estimate").mean, np.concatenate([target, velocity])])
@@ -174,29 +176,120 @@ def test_estimator_starts_from_its_prior() -> None:
     assert np.diag(harness.last("estimate").covariance).tolist() == [400.0, 400.0, 4.0, 4.0]
 
 
-@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
-def test_a_late_measurement_is_fused_at_the_next_trigger_once(make: type) -> None:
-    def measured(robot: str, x: float) -> Measurement:
-        return Measurement(robot, np.zeros(2), "relative_position", np.array([x, 1.0]), 0.2, 2.0)
+def measured(robot: str, time: float, x: float = 8.0) -> Measurement:
+    return Measurement(robot, np.zeros(2), "relative_position", np.array([x, 1.0]), 0.2, 2.0, time)
 
-    late, in_time = Harness(make("e")), Harness(make("e"))
-    late.fire(0.02, measurements=[measured("a", 7.0)])  # by another one from the same robot it is replaced
-    late.fire(0.03, measurements=[measured("a", 8.0), measured("b", 9.0)])
-    assert late.tokens("estimate") == []
-    late.fire(0.1, trigger=0, measurements=[measured("b", 8.5), measured("c", 8.2)])
-    in_time.fire(0.1, trigger=0, measurements=[measured("a", 8.0), measured("b", 8.5), measured("c", 8.2)])
-    for harness in (late, in_time):
-        assert harness.last("estimate").sources == ("a", "b", "c")
-        harness.fire(0.2, trigger=1)
-    for ours, theirs in zip(late.tokens("estimate"), in_time.tokens("estimate"), strict=True):
-        assert ours.mean.tolist() == theirs.mean.tolist()
-        assert ours.covariance.tolist() == theirs.covariance.tolist()
+
+def numbers(estimate: Estimate) -> list[object]:
+    return [estimate.time, estimate.mean.tolist(), estimate.covariance.tolist()]
+
+
+@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
+def test_late_measurements_are_fused_at_their_own_time_to_the_last_bit(make: type) -> None:
+    """In whatever order they come, and whether between triggers or at one, in the end nothing tells that they did."""
+    random = np.random.default_rng(3)
+    made = [measured(robot, tick / 10, 8.0 + random.normal()) for tick in range(12) for robot in ("a", "b", "c")]
+    in_time, late = Harness(make("e")), Harness(make("e"))
+    came = [(each.time + float(random.choice([0.0, 0.03, 0.1, 0.4, 0.75])), each) for each in made]
+    for tick in range(20):
+        now = tick / 10
+        for between, each in came:
+            if now - 0.1 < between - 1e-9 < now - 1e-3:
+                late.fire(between, measurements=[each])
+        late.fire(now, trigger=tick, measurements=[each for at, each in came if abs(at - now) < 1e-6])
+        in_time.fire(now, trigger=tick, measurements=[each for each in made if each.time == now])
+    assert [numbers(each) for each in late.tokens("estimate")[:8]] != [
+        numbers(each) for each in in_time.tokens("estimate")[:8]
+    ]
+    assert numbers(late.last("estimate")) == numbers(in_time.last("estimate"))
+    assert late.tokens("too_late") == []
+
+
+@pytest.mark.parametrize("filter_name", FILTERS)
+def test_every_filter_goes_back(filter_name: str) -> None:
+    in_time, late = (Harness(FilterPyEstimator("e", filter=filter_name)) for _ in range(2))
+    for tick in range(6):
+        now = tick / 10
+        in_time.fire(now, trigger=tick, measurements=[measured("a", now), measured("b", now, 9.0)])
+        late.fire(now, trigger=tick, measurements=[measured("a", now), measured("b", now - 0.2, 9.0)][: 1 + (tick > 1)])
+    for tick in (6, 7):
+        late.fire(tick / 10, trigger=tick, measurements=[measured("b", tick / 10 - 0.2, 9.0)])
+        in_time.fire(tick / 10, trigger=tick)
+    assert late.last("estimate").mean == pytest.approx(in_time.last("estimate").mean, abs=1e-9)
+    assert late.last("estimate").covariance == pytest.approx(in_time.last("estimate").covariance, abs=1e-9)
+    assert late.last("estimate").sources == ("b",)
+
+
+def test_a_measurement_between_two_triggers_is_fused_at_its_own_time() -> None:
+    """As the kernels do it one after the other: prediction to its time, fusion, prediction to the trigger."""
+    ukf = importlib.import_module("epicycle.actors.robotics.numerics.ukf")
+    harness = Harness(UnscentedEstimator("e"))
+    harness.fire(0.0, trigger=0)
+    harness.fire(0.07, measurements=[measured("a", 0.04)])
+    harness.fire(0.1, trigger=1)
+    noise = np.diag([0.002, 0.002, 0.4, 0.4])
+    row = np.array([[ukf.RELATIVE_POSITION, 0.0, 0.0, 8.0, 1.0, 0.2, 2.0]])
+    prior = np.array([10.0, 0.0, 0.0, 0.0]), np.diag([400.0, 400.0, 4.0, 4.0])
+    mean, covariance, _ = ukf.predict_and_fuse(
+        *prior, ukf.constant_velocity(0.04), noise * (0.04 / 0.1), 0.0, row, True
+    )
+    mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.06), noise * (0.06 / 0.1))
+    assert harness.last("estimate").mean == pytest.approx(mean, abs=1e-12)
+    assert harness.last("estimate").covariance == pytest.approx(covariance, abs=1e-12)
+    assert harness.last("estimate").sources == ("a",)
+
+
+@pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
+def test_what_comes_too_late_is_counted(make: type) -> None:
+    harness = Harness(make("e", max_delay="300 ms"))
+    for tick in range(1, 6):
+        harness.fire(tick / 10, trigger=tick, measurements=[measured("a", tick / 10)])
+    before = harness.last("estimate")
+    harness.fire(0.5, microstep=2, trigger=6, measurements=[measured("b", 0.1), measured("c", 0.2)])
+    assert harness.last("estimate").sources == ("c",)
+    assert harness.last("estimate").mean.tolist() != before.mean.tolist()
+    assert harness.sent["too_late"] == [(0.5, 1)]
+    harness.fire(0.55, measurements=[measured("b", 0.1), measured("b", 0.2), measured("b", 0.3)])
+    harness.fire(0.6, trigger=7, measurements=[measured("b", 0.299)])
+    assert harness.last("estimate").sources == ("b",)
+    assert harness.sent["too_late"] == [(0.5, 1), (0.55, 3), (0.6, 4)]
+
+
+def test_it_remembers_no_more_than_it_may_need() -> None:
+    """Waiting measurements are bounded, too, though the trigger that they wait for should never come."""
+    harness = Harness(UnscentedEstimator("e", max_delay=1.0))
+    for tick in range(100):
+        harness.fire(tick / 10, trigger=tick, measurements=[measured("a", tick / 10)])
+    assert len(harness.actor._steps) == 11
+    for tick in range(100, 200):
+        harness.fire(tick / 10, measurements=[measured("a", tick / 10)])
+    assert len(harness.actor._waiting) == 11
+    assert harness.last("too_late") == 89
+
+
+def test_a_copy_is_not_fused_again_and_the_future_is_now() -> None:
+    harness, plain = (Harness(UnscentedEstimator("e")) for _ in range(2))
+    plain.fire(0.0, trigger=0, measurements=[measured("a", 0.0)])
+    harness.fire(0.0, trigger=0, measurements=[measured("a", 5.0), measured("a", 5.0)])
+    assert numbers(harness.last("estimate")) == numbers(plain.last("estimate"))
+    plain.fire(0.1, trigger=1)
+    harness.fire(0.1, trigger=1, measurements=[measured("a", 0.0)])
+    assert numbers(harness.last("estimate")) == numbers(plain.last("estimate"))
+    assert harness.last("estimate").sources == ()
+
+
+def test_estimate_and_measurement_are_of_the_time_of_what_they_describe() -> None:
+    sensor, estimator = Harness(Sensor("main.sensor")), Harness(UnscentedEstimator("main.estimator"))
+    sensor.fire(0.35, robot=body(0.0, 0.0, 0.3), target=body(3.0, 4.0, 0.31))
+    assert sensor.last("measurement").time == 0.3
+    estimator.fire(0.4, trigger=0, measurements=[sensor.last("measurement")])
+    assert estimator.last("estimate").time == 0.4
 
 
 @pytest.mark.parametrize("make", [UnscentedEstimator, FilterPyEstimator])
 def test_order_of_arrival_is_immaterial_to_the_last_bit(make: type) -> None:
     measurements = [
-        Measurement(name, np.array([x, 1.0]), "relative_position", np.array([12.0 - x, 2.0]), 0.2, 2.0)
+        Measurement(name, np.array([x, 1.0]), "relative_position", np.array([12.0 - x, 2.0]), 0.2, 2.0, 0.0)
         for name, x in (("a", 0.0), ("b", 5.0), ("c", 30.0))
     ]
     found = set()
@@ -212,13 +305,13 @@ def test_order_of_arrival_is_immaterial_to_the_last_bit(make: type) -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
 def test_estimator_never_sends_what_is_not_finite(make: type, bad: float) -> None:
     harness = Harness(make("e"))
-    good = Measurement("a", np.zeros(2), "relative_position", np.array([12.0, 2.0]), 0.2, 2.0)
+    kind, origin, near = "relative_position", np.zeros(2), np.array([12.0, 2.0])
     for step, measurement in enumerate(
         [
-            good,
-            Measurement("b", np.zeros(2), "relative_position", np.array([bad, 0.0]), 0.2, 2.0),
-            Measurement("b", np.array([0.0, bad]), "relative_position", np.zeros(2), 0.2, 2.0),
-            good,
+            Measurement("a", origin, kind, near, 0.2, 2.0, 0.0),
+            Measurement("b", origin, kind, np.array([bad, 0.0]), 0.2, 2.0, 0.1),
+            Measurement("b", np.array([0.0, bad]), kind, origin, 0.2, 2.0, 0.2),
+            Measurement("a", origin, kind, near, 0.2, 2.0, 0.3),
         ]
     ):
         harness.fire(step / 10, trigger=step, measurements=[measurement])
@@ -246,6 +339,6 @@ def test_filterpy_with_ranges_is_near_ours(filter_name: str) -> None:
 @pytest.mark.parametrize("filter_name", FILTERS[:2])
 def test_linear_filter_with_ranges_is_an_error_with_a_way_out(filter_name: str) -> None:
     harness = Harness(FilterPyEstimator("main.estimator", filter=filter_name))
-    measurement = Measurement("a", np.zeros(2), "range", np.array([5.0]), 0.2, 2.0)
+    measurement = Measurement("a", np.zeros(2), "range", np.array([5.0]), 0.2, 2.0, 0.0)
     with pytest.raises(FilterError, match=r"main\.estimator: .*ExtendedKalmanFilter"):
         harness.fire(0.0, trigger=0, measurements=[measurement])

@@ -150,7 +150,11 @@ def structure(model: Model) -> dict[str, Any]:
         "members": graph.members,
         "priorities": {path: priority for path, priority in graph.priorities.items() if priority},
         "aspects": {woven.name: (repr(woven.aspect), woven.ports) for woven in model.aspects},
-        "watched": (model.recorded, model.stop_ports, model.metrics),
+        "watched": (
+            model.recorded,
+            model.stop_ports,
+            [(each.name, each.ports, vars(each.measure)) for each in model.metrics],
+        ),
         "run": (model.name, model.stop, model.seed, model.parameters),
     }
 
@@ -478,7 +482,7 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
    help: give this another name
 
 error: metric 'total' cannot take 'men', did you mean 'mean'?
-   help: valid reductions: last, first, min, max, sum, mean, count
+   help: valid: last, first, count, min, max, sum, mean, std, quantile, rate, time_mean, time_std, time_quantile, share
 2 errors""",
     ),
 }

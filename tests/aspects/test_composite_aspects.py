@@ -427,7 +427,8 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
         (
             "net: {type: Desks, at: a.input}",
             """m.yaml:33:23: error: aspect net: there is no aspect type 'Desks', did you mean 'Desk'?
-   help: valid types: those that 'epicycle aspects' lists""",
+   help: valid types: those that 'epicycle aspects' lists
+   help: one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]""",
         ),
         (
             "net: {type: Crossing, at: a.input}",
@@ -458,7 +459,18 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
             "net: {type: Desk, at: {at: a.input, time: -1}}",
             """m.yaml:33:38: error: aspect net: Desk stands at actors, but a.input is a port
    help: write 'a', without the port
-m.yaml:33:53: error: aspect net: time: -1 is out of bounds, expected a number in s >= 0""",
+m.yaml:33:53: error: aspect net: time: -1 is out of bounds, expected a time in s >= 0, a distribution, \
+or these by input port""",
+        ),
+        (
+            "net: {type: Desk, at: {at: a, time: {inptu: 1, input: 1 m}}}",
+            "m.yaml:33:65: error: aspect net: time: input: '1 m' is a length, expected a time in s",
+        ),
+        (
+            "net: {type: Desk, at: {at: a, time: {inptu: 1}}}",
+            """m.yaml:33:48: error: aspect net: time: no actor that this is for has an input 'inptu', did you mean \
+'input'?
+   help: their inputs: input""",
         ),
         (
             "net: {type: PacketLoss, probability: 0, at: {at: a.input, time: 1}}",

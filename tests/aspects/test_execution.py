@@ -340,7 +340,7 @@ def test_measured_once_and_replayed(tmp_path: Path) -> None:
 
     from epicycle.runner.show import write_folder
 
-    write_folder(tmp_path, results, {}, [])
+    write_folder(tmp_path, results, [])
     model = text.format("type: ExecutionTime, times: signals.parquet, at: a")
     (tmp_path / "m.yaml").write_text(f"model: m\n{model}", encoding="utf-8")
     runs = [

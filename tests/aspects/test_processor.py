@@ -270,16 +270,24 @@ run: {{stop: 1 s}}
         (
             "more: {type: Processor, at: a, times: {a: 1 m}}",
             (
-                "7:41: error: aspect more.times: a: '1 m' is a length, expected a time in s"
+                "7:45: error: aspect more.times: a: '1 m' is a length, expected a time in s"
             ),
         ),
         (
             "more: {type: Processor, at: a, times: {a: soon}}",
-            "7:41: error: aspect more.times: a: 'soon' is not a time in s, nor a distribution {type: ..., ...}",
+            "7:45: error: aspect more.times: a: 'soon' is not a time in s, nor a distribution {type: ..., ...}",
         ),
         (
             "more: {type: Processor, at: a, times: {a: -1}}",
-            "7:41: error: aspect more.times: a: -1 is out of bounds, expected a time in s >= 0, or a distribution",
+            (
+                "7:45: error: aspect more.times: a: -1 is out of bounds, expected a time in s >= 0, a distribution, "
+                "or these by input port"
+            ),
+        ),
+        (
+            "more: {type: Processor, at: a, times: {a: {trigger: 1}}}",
+            """7:46: error: aspect more: times: a: no actor that this is for has an input 'trigger'
+   help: their inputs: input""",
         ),
         (
             "more: {type: Processor, at: a, priorities: [1]}",

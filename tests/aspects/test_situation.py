@@ -312,4 +312,5 @@ def test_mistakes(aspect: str, message: str) -> None:
 
 def test_a_pattern_may_select_what_there_is_none_of() -> None:
     text = MODEL.replace("count: 3", "count: 0").replace("  - robot[*].said => robot[*].hear", "")
-    load(text.format("loss: {type: RangeLoss, positions: 'robot[*].place', range: 3, at: 'robot[*].hear'}"))
+    model = load(text.format("loss: {type: RangeLoss, positions: 'robot[*].place', range: 3, at: 'robot[*].hear'}"))
+    assert [(each.name, each.ports) for each in model.aspects] == [("loss", [])]

@@ -152,13 +152,25 @@ def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None
     [
         (
             ("actors", "Clok"),
-            "error: there is no actor type 'Clok', did you mean 'Clock'?\n   help: 'epicycle actors' lists them\n",
+            (
+                "error: there is no actor type 'Clok', did you mean 'Clock'?\n   help: 'epicycle actors' lists them\n"
+                "   help: one of your own is known after '--types FILE.py'\n"
+            ),
+        ),
+        (
+            ("actors", "Throttle"),
+            "error: Throttle is an aspect, not an actor\n   help: 'epicycle aspects Throttle' describes it\n",
+        ),
+        (
+            ("aspects", "Clock"),
+            "error: Clock is an actor, not an aspect\n   help: 'epicycle actors Clock' describes it\n",
         ),
         (
             ("aspects", "PacketLos"),
             (
                 "error: there is no aspect type or packaged model 'PacketLos', did you mean 'PacketLoss'?\n"
                 "   help: 'epicycle aspects' lists them\n"
+                "   help: one of your own is known after '--types FILE.py'\n"
             ),
         ),
         (

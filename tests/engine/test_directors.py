@@ -375,8 +375,11 @@ def test_an_error_inside_names_the_actor_and_the_time_of_the_model(monkeypatch: 
     monkeypatch.setattr(Time, "fire", lambda actor: actor.input.nothing)
     with pytest.raises(ActorError) as caught:
         local(TICKS, "start: 2")
-    first, second = str(caught.value).splitlines()
+    first, at, line, carets, second = str(caught.value).splitlines()
     assert first == "c.time failed in fire() at (0 s, 1): AttributeError: 'InputPort' object has no attribute 'nothing'"
+    assert at.startswith("   raised at ")
+    assert line.endswith('monkeypatch.setattr(Time, "fire", lambda actor: actor.input.nothing)')
+    assert line[carets.index("^") :] == "actor.input.nothing)"
     assert second.startswith("   declared at ")
     assert second.endswith("m.yaml:10:36")
 

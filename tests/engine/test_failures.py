@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 from collections.abc import Generator
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
+from epicycle.actors import Actor, Clock, InputPort, OutputPort, Parameter, Process, Scale
 from epicycle.aspects import Aspect, JoinPoint
+from epicycle.runner import Model
 from epicycle.runner.engine import ActorError, Simulation
 from tests.engine.engine_parts import load
 
@@ -29,7 +33,7 @@ class Broken(Actor):
     def fire(self) -> None:
         if self.where == "fire" and self.now >= 1:
             raise RuntimeError("no more")
-        things = {"text": "1.5", "array": np.zeros(2), "nameless": object(), "number": 1.0}
+        things = {"array": np.zeros(2), "nameless": object(), "number": 1.0}
         if self.where in things:
             self.output.send(things[self.where])
         if self.where == "channel":
@@ -51,7 +55,7 @@ class Worker(Process):
         yield self.wait(1) if self.how == "wait" else self.environment.timeout(10**9)
         self.output.send(1.0)
         if self.how == "fail":
-            raise RuntimeError("no more")
+            raise RuntimeError("no more work")
         yield self.wait(1)
 
 
@@ -62,6 +66,17 @@ class Trap(Aspect):
         raise RuntimeError("trapped")
 
 
+def raised(code: str) -> str:
+    """What is said of an exception that comes from a line of this file."""
+    (place,) = [place for place, line in enumerate(SOURCE, 1) if line.strip() == code]
+    source = SOURCE[place - 1]
+    before = len(source) - len(code)
+    file = __file__.removeprefix(os.getcwd() + os.sep)
+    carets = f"{'':>{before}}{'^' * len(code)}"
+    return f"\n   raised at {file}:{place}:{before + 1}\n{place:>5} | {source}\n      | {carets}\n   "
+
+
+SOURCE = Path(__file__).read_text(encoding="utf-8").splitlines()
 MODEL = """
 composites:
   Inner:
@@ -77,38 +92,50 @@ actors:
 connections: [{wires}]
 {more}
 """
+AT_12 = "declared at m.yaml:12:3"
+NO_MORE, TRAPPED = raised('raise RuntimeError("no more")'), raised('raise RuntimeError("trapped")')
 IN, OUT = "t.output -> a.input", "t.output -> c.in"
 
 
 @pytest.mark.parametrize(
     ("part", "wires", "more", "message"),
     [
-        ("{type: Broken}", IN, "", "a failed in fire() at (1 s, 1): RuntimeError: no more\n   declared at m.yaml:12:3"),
+        (
+            "{type: Broken}",
+            IN,
+            "",
+            "a failed in fire() at (1 s, 1): RuntimeError: no more" + NO_MORE + "declared at m.yaml:12:3",
+        ),
         (
             "{type: Broken}",
             OUT,
             "",
-            "c.b failed in fire() at (0 s, 1): RuntimeError: no more\n   declared at m.yaml:8:7",
+            "c.b failed in fire() at (0 s, 1): RuntimeError: no more" + NO_MORE + "declared at m.yaml:8:7",
         ),
         (
             "{type: Broken, where: initialize}",
             OUT,
             "",
-            "a failed in initialize() at (0 s, 1): RuntimeError: no start\n   declared at m.yaml:12:3",
+            "a failed in initialize() at (0 s, 1): RuntimeError: no start"
+            + raised('raise RuntimeError("no start")')
+            + "declared at m.yaml:12:3",
         ),
         (
             "{type: Broken, where: wrapup}",
             OUT,
             "",
-            "a failed in wrapup() at (5 s, 2): RuntimeError: no end\n   declared at m.yaml:12:3",
+            "a failed in wrapup() at (5 s, 2): RuntimeError: no end"
+            + raised('raise RuntimeError("no end")')
+            + "declared at m.yaml:12:3",
         ),
         (
             "{type: Broken, where: channel}",
             IN,
             "",
             (
-                "a failed in fire() at (0 s, 1): a.output has no channel 4: it has 0 channels, counted from 0\n"
-                "   declared at m.yaml:12:3"
+                "a failed in fire() at (0 s, 1): a.output has no channel 4: it has 0 channels, counted from 0"
+                + raised("self.output.send(1.0, 4)")
+                + "declared at m.yaml:12:3"
             ),
         ),
         (
@@ -117,16 +144,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             "",
             (
                 "a failed in fire() at (0 s, 1): a token of type object has no value that could be logged: make it a "
-                "dataclass, or give it a __repr__ that shows what is in it\n   declared at m.yaml:12:3"
-            ),
-        ),
-        (
-            "{type: Broken, where: text}",
-            IN,
-            "metrics:\n  total: {of: a.output, take: sum}",
-            (
-                "metric total failed in taking the sum of a.output at (0 s, 1): TypeError: unsupported operand type(s) "
-                "for +=: 'int' and 'str'\n   declared at m.yaml:16:3"
+                "dataclass, or give it a __repr__ that shows what is in it"
+                + raised("self.output.send(things[self.where])")
+                + "declared at m.yaml:12:3"
             ),
         ),
         (
@@ -143,8 +163,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             OUT,
             "aspects:\n  trap: {type: Trap, at: c.b.input}",
             (
-                "aspect trap failed in pass_token() at c.b.input at (0 s, 1): RuntimeError: trapped\n"
-                "   declared at m.yaml:16:3"
+                "aspect trap failed in pass_token() at c.b.input at (0 s, 1): RuntimeError: trapped"
+                + TRAPPED
+                + "declared at m.yaml:16:3"
             ),
         ),
         *(
@@ -153,8 +174,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
                 "t.output -> a.input",
                 f"aspects:\n  trap: {{type: Trap, at: {path}.output}}",
                 (
-                    f"aspect trap failed in pass_token() at {path}.output at (1 s, 1): RuntimeError: trapped\n"
-                    "   declared at m.yaml:16:3"
+                    f"aspect trap failed in pass_token() at {path}.output at (1 s, 1): RuntimeError: trapped"
+                    + TRAPPED
+                    + "declared at m.yaml:16:3"
                 ),
             )
             for how in ("wait", "timeout")
@@ -164,7 +186,9 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             "{type: Worker, how: fail}",
             OUT,
             "",
-            "a failed in run() at (1 s, 1): RuntimeError: no more\n   declared at m.yaml:12:3",
+            "a failed in run() at (1 s, 1): RuntimeError: no more work"
+            + raised('raise RuntimeError("no more work")')
+            + "declared at m.yaml:12:3",
         ),
     ],
 )
@@ -180,3 +204,58 @@ def test_who_when_and_where(part: str, wires: str, more: str, message: str) -> N
     results = simulation.results("failed")  # what was recorded is kept
     assert (results.events, results.stopped) == (len(simulation.log.records), "failed")
     assert all(record.tag <= caught.value.tag for record in simulation.log.records)
+
+
+PACKAGED = """
+import numpy as np
+from epicycle.actors import Actor
+
+
+class Packaged(Actor):
+    is_source = True
+
+    def initialize(self):
+        np.linalg.inv(np.zeros((2, 2))) if self.path == "first" else json_of(self)
+
+
+def json_of(value):
+    import json
+    json.dumps(value)
+"""
+
+
+def test_an_actor_of_an_installed_package(tmp_path: Path) -> None:
+    """Its own line is shown, not that of the library which it calls, nor that of a function beside it."""
+    home = tmp_path / "site-packages" / "acme"
+    home.mkdir(parents=True)
+    (home / "actors.py").write_text(PACKAGED, encoding="utf-8")
+    spec = spec_from_file_location("acme_of_mine", home / "actors.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for name, reason in (
+        ("first", "LinAlgError: Singular matrix"),
+        ("second", "TypeError: Object of type Packaged is not JSON serializable"),
+    ):
+        model = Model("m", stop=1)
+        model.add(module.Packaged(name))
+        with pytest.raises(ActorError) as caught:
+            Simulation(model).run()
+        head, at, line, carets, declared = str(caught.value).splitlines()
+        assert head == f"{name} failed in initialize() at (0 s, 1): {reason}"
+        assert at == f"   raised at {home / 'actors.py'}:10:{9 if name == 'first' else 70}"
+        assert line[carets.index("^") :].startswith("np.linalg.inv(" if name == "first" else "json_of(self)")
+        assert declared.startswith("   declared at ")
+
+
+def test_an_actor_of_epicycles_own_needs_no_line() -> None:
+    model = Model("m", stop=1)
+    clock = model.add(Clock("clock", period=1, values=[[1, 2]]))
+    scale = model.add(Scale("scale", factor=0.5))
+    model.connect(clock.output, scale.input)
+    with pytest.raises(ActorError) as caught:
+        Simulation(model).run()
+    first, declared = str(caught.value).splitlines()
+    assert first.startswith("scale failed in fire() at (0 s, 1): TypeError: ")
+    assert declared.startswith("   declared at ")

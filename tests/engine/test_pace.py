@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from epicycle.runner.engine import Pace, Simulation
+from epicycle.runner.engine import SLOWEST, Pace, Simulation
 from tests.engine.engine_parts import Plan, load
 
 START = 128.0
@@ -68,7 +68,23 @@ def test_the_real_clock() -> None:
     assert time.perf_counter() - began >= 0.2
 
 
-@pytest.mark.parametrize("factor", [0.0, -1.0, float("inf"), float("nan")])
+@pytest.mark.parametrize("factor", [0.0, -1.0, 9e-10, 1e-320, float("inf"), float("nan")])
 def test_a_pace_that_is_none(factor: float) -> None:
-    with pytest.raises(ValueError, match="a pace is a number of model seconds in a second, greater than 0, not"):
+    with pytest.raises(ValueError, match="a pace is") as caught:
         Pace(factor)
+    message = f"a pace is a number of model seconds in a second, 1e-09 or more, not {factor:g}"
+    assert str(caught.value) == message
+
+
+def test_a_wait_of_years_is_slept_in_pieces() -> None:
+    now, slept = 0.0, []
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        now += seconds
+        slept.append(seconds)
+
+    pace = Pace(SLOWEST, clock=lambda: now, sleep=sleep)
+    pace.wait_for(0)
+    pace.wait_for(100_000)  # ns, of which one takes a second
+    assert slept == [3_600.0] * 27 + [2_800.0]

@@ -244,4 +244,7 @@ def test_an_exception_in_a_process_of_simpys_alone(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Plan, "begin", begin)
     with pytest.raises(ActorError) as caught:
         simulate("actors: {a: {type: Plan}}")
-    assert str(caught.value) == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
+    message, at, line, carets = str(caught.value).splitlines()
+    assert message == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
+    assert at.startswith("   raised at ")
+    assert line[carets.index("^") :] == 'raise KeyError("lost")'

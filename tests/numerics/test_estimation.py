@@ -131,7 +131,7 @@ def test_covariance_stays_positive_definite(
         assert (covariance == covariance.T).all()
         # From sizes 1e8 and more, the smallest eigenvalue is known up to rounding of the largest only.
         eigenvalues = np.linalg.eigvalsh(covariance)
-        assert eigenvalues[0] > 0.0 or eigenvalues[0] > -1e-13 * eigenvalues[-1]
+        assert eigenvalues[0] > -1e-13 * eigenvalues[-1]
 
 
 def test_huge_prior_and_tiny_noise_are_positive_definite_strictly() -> None:
@@ -141,6 +141,20 @@ def test_huge_prior_and_tiny_noise_are_positive_definite_strictly() -> None:
         mean, covariance = ukf.update(mean, covariance, 0.0, rows, np.array([[1e-6, 0.0, 1e-6]]))
         mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.1), PROCESS_NOISE)
         assert np.linalg.eigvalsh(covariance)[0] > 0.0
+
+
+def test_noise_is_an_ellipse_along_the_line_of_sight() -> None:
+    """Seen from (1, 2), a target at (4, 6) lies along (0.6, 0.8)."""
+    rows = np.array([[ukf.RELATIVE_POSITION, 1.0, 2.0, 9.0, 9.0, 0.5, 2.0], [ukf.RANGE, 1.0, 2.0, 9.0, 9.0, 0.5, 2.0]])
+    noises = ukf.measurement_noise(np.array([[4.0, 6.0]]), np.ones(1), rows)
+    a, b = 0.25, 4.0
+    expected = [a * 0.36 + b * 0.64, (a - b) * 0.48, a * 0.64 + b * 0.36]
+    assert noises == pytest.approx(np.array([expected, [a, 0.0, 0.0]]))
+    # The mean over what is there with weights, one of them straight above; who stands on the target looks along x.
+    both = ukf.measurement_noise(np.array([[4.0, 6.0], [1.0, 7.0], [1.0, 2.0]]), np.array([0.5, 0.3, 0.2]), rows)
+    expected = 0.5 * np.array(expected) + 0.3 * np.array([b, 0.0, a]) + 0.2 * np.array([a, 0.0, b])
+    assert both[0] == pytest.approx(expected)
+    assert both[1].tolist() == [a, 0.0, 0.0]
 
 
 def test_no_measurement_changes_nothing() -> None:
@@ -155,7 +169,7 @@ def test_a_step_is_prediction_noise_and_update_in_turn(averaged: bool) -> None:
     observed, deviations = random.normal(size=(3, 4)), random.uniform(0.1, 2.0, size=(3, 2))
     rows = np.column_stack([[0.0, 1.0, 0.0], observed, deviations])
     predicted = ukf.predict(*PRIOR, transition, PROCESS_NOISE)
-    points, weights = ukf.sigma_points(*predicted, 0.0) if averaged else (predicted[0][np.newaxis], np.ones(1))
+    points, weights = ukf.sigma_points(*predicted, 0.5) if averaged else (predicted[0][np.newaxis], np.ones(1))
     expected = ukf.update(*predicted, 0.5, rows, ukf.measurement_noise(points, weights, rows))
     mean, covariance, fused = ukf.predict_and_fuse(*PRIOR, transition, PROCESS_NOISE, 0.5, rows, averaged)
     assert (mean.tolist(), covariance.tolist(), fused) == (expected[0].tolist(), expected[1].tolist(), True)

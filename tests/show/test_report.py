@@ -23,6 +23,7 @@ from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
 from epicycle.runner.study import Plan, StudyMetric, read_study
 from epicycle.runner.study.columns import Column, si_unit
+from epicycle.runner.study.manifest import manifest_text
 from epicycle.runner.study.replays import Replay, ReplayError, repeat
 from epicycle.runner.study.statistics import half_width
 from tests.study.study_parts import STUDY, THIS, write
@@ -44,7 +45,7 @@ actors:
   clock: {type: Clock, period: 0.1 s}
   wheel: {type: CircularMotion, start: [0, 2], speed: "${speed}", turn_rate: "${speed / radius}"}
 connections: [clock.output -> wheel.trigger]
-run: {stop: 2 s}
+run: {stop: 2 s, record: [wheel.state]}
 metrics: {ticks: {of: clock.output, take: count}}
 figures: {way: {type: Trajectories, robots: wheel.state}}
 """
@@ -204,7 +205,7 @@ def test_unfinished_and_failed_runs_and_hostile_names(tmp_path: Path, capsys: py
     command = ["study", str(tmp_path / "walks.yaml"), "--types", str(THIS), "--out", str(out), "--replications", "3"]
     assert main(command) == 1
     manifest = json.loads((out / "manifest.json").read_text())
-    (out / "manifest.json").write_text(json.dumps({**manifest, "replications": 5}))
+    (out / "manifest.json").write_text(manifest_text({**manifest, "replications": 5}))
     capsys.readouterr()
     assert main(["report", str(out)]) == 0
     found = page(out)
@@ -294,7 +295,7 @@ def test_report_repeats_runs(wheels: Path, tmp_path: Path, capsys: pytest.Captur
     shutil.copytree(wheels.parent, tmp_path / "copy")
     manifest = json.loads((tmp_path / "copy" / "out" / "manifest.json").read_text())
     manifest["file"] = str(tmp_path / "copy" / "wheels.yaml")
-    (tmp_path / "copy" / "out" / "manifest.json").write_text(json.dumps(manifest))
+    (tmp_path / "copy" / "out" / "manifest.json").write_text(manifest_text(manifest))
     (tmp_path / "copy" / "wheel.yaml").write_text(WHEEL + "# changed\n")
     capsys.readouterr()
     assert main(["report", str(tmp_path / "copy" / "out")]) == 1

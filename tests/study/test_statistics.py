@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from epicycle.runner.student import student_quantile, student_tail
 from epicycle.runner.study.statistics import bootstrap_mean, half_width, holm, mean, paired_difference, rate
 
 RUNS = 3000
@@ -96,3 +97,54 @@ def test_few_values_give_no_false_certainty() -> None:
         found = paired_difference(before, {each: value + gap for each, value in before.items()})
         assert found.p == pytest.approx(stats.binomtest(0, 8).pvalue)
         assert found.estimate.error == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 4, 9, 19, 29, 60, 199, 200, 201, 999, 5_000])
+def test_students_t_is_scipys_to_twelve_digits(freedom: int) -> None:
+    for p in (0.001, 0.025, 0.3, 0.6, 0.9, 0.975, 0.995, 0.99999):
+        assert student_quantile(p, freedom) == pytest.approx(stats.t.ppf(p, freedom), rel=1e-12)
+    for number in (0.0, 0.3, 1.0, 2.0, 5.0, 40.0, 1e6, -1.5):
+        expected = stats.t.sf(number, freedom)
+        assert student_tail(number, freedom) == pytest.approx(expected, rel=1e-11, abs=1e-290)
+
+
+def test_students_t_at_its_ends() -> None:
+    # With one and with two degrees of freedom there are closed forms.
+    assert student_tail(1.0, 1) == pytest.approx(0.25, rel=1e-14)
+    assert student_tail(1e-9, 1) == pytest.approx(0.5 - 1e-9 / math.pi, rel=1e-14)
+    assert student_quantile(0.75, 1) == pytest.approx(1.0, rel=1e-14)
+    assert student_quantile(0.9, 2) == pytest.approx(0.8 / math.sqrt(2 * 0.9 * 0.1), rel=1e-14)
+    assert student_quantile(0.5, 7) == 0.0
+    assert student_quantile(0.25, 7) == -student_quantile(0.75, 7)
+    assert (student_tail(math.inf, 3), student_tail(-math.inf, 3)) == (0.0, 1.0)
+    assert math.isnan(student_tail(math.nan, 3))
+    z = 1.959963984540054
+    assert student_quantile(0.975, 100_000) == pytest.approx(z + (z**3 + z) / 400_000, rel=1e-9)
+    for p, freedom in ((0.0, 3), (1.0, 3), (math.nan, 3), (0.5, 0)):
+        with pytest.raises(ValueError, match="there is no quantile"):
+            student_quantile(p, freedom)
+
+
+def test_wilsons_interval_is_scipys() -> None:
+    for successes, count in ((0, 7), (3, 7), (7, 7), (120, 4000)):
+        expected = stats.binomtest(successes, count).proportion_ci(0.9, method="wilson")
+        found = rate(successes, count, 0.9)
+        assert found.low == pytest.approx(expected.low, abs=1e-15)
+        assert found.high == pytest.approx(expected.high, rel=1e-13)
+
+
+@pytest.mark.parametrize("count", [8, 40, 400])
+def test_bootstrap_is_scipys_but_for_chance(count: int) -> None:
+    values = np.random.default_rng(count).exponential(1.0, count)
+    expected = stats.bootstrap((values,), np.mean, confidence_level=0.9, n_resamples=9_999, rng=0)
+    found = bootstrap_mean(values.tolist(), 0.9)
+    width = expected.confidence_interval.high - expected.confidence_interval.low
+    assert found.low == pytest.approx(expected.confidence_interval.low, abs=0.04 * width)
+    assert found.high == pytest.approx(expected.confidence_interval.high, abs=0.04 * width)
+    assert found.error == pytest.approx(expected.standard_error, rel=0.04)
+
+
+def test_students_t_has_these_bits() -> None:
+    """Made of + - * / and square roots, they are the same everywhere."""
+    found = [student_quantile(p, freedom).hex() for p, freedom in ((0.975, 19), (0.995, 9), (0.95, 250))]
+    assert found == ["0x1.0be83653b666fp+1", "0x1.9ffa9c6c4220ep+1", "0x1.a6a6114b5ff1bp+0"]

@@ -25,6 +25,7 @@ from epicycle.runner.study import plan as plan_module
 from epicycle.runner.study import progress as progress_module
 from epicycle.runner.study import session as session_module
 from epicycle.runner.study import store as store_module
+from epicycle.runner.study.manifest import checksum, manifest_text
 from epicycle.runner.study.schedule import OK, Done, Schedule
 from epicycle.runner.study.session import duration, manifest_of
 from epicycle.runner.study.store import Store, Writer, lock, prepare
@@ -36,6 +37,10 @@ def study(folder: Path, *arguments: object, out: str = "out") -> int:
     return main(
         ["study", str(folder / "walks.yaml"), "--types", str(THIS), "--out", str(folder / out), *map(str, arguments)]
     )
+
+
+OTHER_FORMAT = "\n   help: its table.parquet can be read with pandas; make its runs anew in another folder"
+MADE_ANEW = "\n   help: 'epicycle study STUDY --out mine' writes it anew, and keeps the runs that are there"
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +104,9 @@ def test_extension_makes_only_what_is_new(done: Path, tmp_path: Path, capsys: py
     (tmp_path / "walks.yaml").write_text(STUDY.replace("[0 m/s,", "[-1 m/s, 0 m/s,"))
     assert said() == "walks: 3 conditions, 5 new runs, 10 there before"
     after = open_study(tmp_path / "out").table().to_pylist()
-    assert [row | {"condition": row["condition"] - 1} for row in after[5:]] == before
+    assert [
+        row | {"condition": row["condition"] - 1} for row in after[5:] if row["replication"] < 5
+    ] == before  # fmt: skip
     # Anything that a run hangs on makes it another one.
     assert said("--set", "fails=[9]") == "walks: 3 conditions, 15 new runs, 0 there before"
     (tmp_path / "walk.yaml").write_text(MODEL + "# as it was, but who knows\n")
@@ -268,8 +275,50 @@ def copied(done: Path, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def message(capsys: pytest.CaptureFixture[str], folder: Path) -> str:
-    return capsys.readouterr().err.replace(f"{folder}/", "")
+def message(capsys: pytest.CaptureFixture[str], folder: Path, *, out: bool = False) -> str:
+    said = capsys.readouterr()
+    return (said.out if out else said.err).replace(f"{folder}/", "")
+
+
+def test_fewer_replications_take_no_row_from_the_table(
+    copied: Path, done: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = (done / "out" / "table.parquet").read_bytes()
+    kept = "out has 6 runs beyond the 2 replications asked for: the table keeps them\n"
+    assert study(copied, "--replications", 2) == 0
+    assert capsys.readouterr() == (
+        f"walks: 2 conditions, 0 new runs, 4 there before\nwrote {copied / 'out' / 'table.parquet'}\n",
+        kept.replace("out has", f"{copied / 'out'} has"),
+    )
+    assert (copied / "out" / "table.parquet").read_bytes() == before
+    assert main(["status", str(copied / "out")]) == 0
+    assert message(capsys, copied, out=True) == f"walks: 4 of 4 runs are over, and 6 more (10 ok)\n{kept}"
+    assert main(["report", str(copied / "out")]) == 0
+    page = (copied / "out" / "report.html").read_text(encoding="utf-8")
+    assert "4 of 4 runs are over, and 6 more of replications beyond those asked for." in page
+    assert "Seeds 20 to 24:" in page
+
+
+@pytest.mark.parametrize("paired", ["true", "false"])
+def test_runs_of_another_seed_are_told_and_not_mixed_in(
+    paired: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path, STUDY + f"paired: {paired}\n")
+    assert study(tmp_path, "--replications", 2) == 0
+    write(tmp_path, STUDY.replace("seed: 20", "seed: 21") + f"paired: {paired}\n")
+    assert study(tmp_path, "--replications", 2, out="fresh") == 0
+    capsys.readouterr()
+    assert study(tmp_path, "--replications", 2) == 0
+    made, lost = ("2 new runs, 2", 2) if paired == "true" else ("4 new runs, 0", 4)
+    assert capsys.readouterr() == (
+        f"walks: 2 conditions, {made} there before\nwrote {tmp_path / 'out' / 'table.parquet'}\n",
+        (
+            f"{tmp_path / 'out'} has {lost} runs of another version of the study, its model or Epicycle, "
+            "which the table leaves out\n"
+        ),
+    )
+    tables = [(tmp_path / out / "table.parquet").read_bytes() for out in ("out", "fresh")]
+    assert tables[0] == tables[1]
 
 
 def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -298,10 +347,13 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
     assert message(capsys, copied) == "error: mine holds other results, not those of a study\n"
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
     for spoiled, said in (
-        (manifest | {"format": 1}, "mine has format 1, this Epicycle reads format 2"),
-        ({key: manifest[key] for key in manifest if key != "text"}, "mine/manifest.json is broken: it has no 'text'"),
+        (manifest | {"format": 2}, f"mine has format 2, this Epicycle reads format 3{OTHER_FORMAT}"),
+        (
+            {key: manifest[key] for key in manifest if key != "text"},
+            f"mine/manifest.json is damaged: it has no 'text'{MADE_ANEW}",
+        ),
     ):
-        (copied / "mine" / "manifest.json").write_text(json.dumps(spoiled))
+        (copied / "mine" / "manifest.json").write_text(manifest_text(spoiled))
         assert main(["status", str(copied / "mine")]) == 2
         assert message(capsys, copied) == f"error: {said}\n"
     with lock(copied / "out"):
@@ -320,7 +372,7 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
 def test_resume_wants_the_same_model(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (copied / "walk.yaml").write_text(MODEL + "\n")
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
-    (copied / "out" / "manifest.json").write_text(json.dumps(manifest | {"file": str(copied / "walks.yaml")}))
+    (copied / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": str(copied / "walks.yaml")}))
     assert main(["resume", str(copied / "out")]) == 2
     assert message(capsys, copied) == (
         "error: the model has changed since out was made: walk.yaml\n"
@@ -334,7 +386,7 @@ def test_results_can_be_read_where_their_model_is_not(copied: Path, capsys: pyte
     home.mkdir()
     (copied / "out").rename(home / "out")
     manifest = json.loads((home / "out" / "manifest.json").read_text())
-    (home / "out" / "manifest.json").write_text(json.dumps(manifest | {"file": "/nowhere/walks.yaml"}))
+    (home / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": "/nowhere/walks.yaml"}))
     assert open_study(home / "out").means("place") == before
     assert main(["status", str(home / "out")]) == 0
     capsys.readouterr()
@@ -347,7 +399,7 @@ def test_results_of_another_version_are_read_and_not_gone_on_with(
 ) -> None:
     before = open_study(copied / "out").table()
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
-    (copied / "out" / "manifest.json").write_text(json.dumps(manifest | {"file": str(copied / "walks.yaml")}))
+    (copied / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": str(copied / "walks.yaml")}))
     for module in (plan_module, session_module):
         monkeypatch.setattr(module, "epicycle_version", lambda: "47.11")
     assert open_study(copied / "out").table() == before
@@ -364,13 +416,13 @@ def test_truncated_part(copied: Path, capsys: pytest.CaptureFixture[str]) -> Non
     part = next((copied / "out" / "parts").glob("*.parquet"))
     lost = pq.read_metadata(part).num_rows
     part.write_bytes(part.read_bytes()[:-20])
-    assert study(copied) == 2
-    said = message(capsys, copied)
-    head, tail = said.splitlines()
-    assert head.startswith(f"error: out/parts/{part.name} is broken: ")
-    assert tail == "   help: delete it, and 'epicycle resume out' makes its runs anew"
-    part.unlink()
+    assert main(["status", str(copied / "out")]) == 2
+    assert message(capsys, copied) == (
+        f"error: out/parts/{part.name} is damaged: it is not what was written\n"
+        "   help: 'epicycle resume out' puts it aside and makes the runs anew that are lost with it\n"
+    )
     assert study(copied) == 0
+    assert [path.name for path in (copied / "out" / "damaged").iterdir()] == [part.name]
     new = f"{lost} new run{'s' if lost > 1 else ''}"
     assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {new}, {10 - lost} there before\n")
 
@@ -381,7 +433,7 @@ def test_a_line_that_is_not_whole_was_not_finished(copied: Path, done: Path) -> 
     rows = [row for batch in store.rows() for row in batch.to_pylist()]
     for part in (copied / "out" / "parts").iterdir():
         part.unlink()
-    lines = [json.dumps(row) for row in rows]
+    lines = [f"{checksum(text.encode())} {text}" for text in map(json.dumps, rows)]
     # The same row twice, as if killed between the journal's part and its end; and half a row.
     (copied / "out" / "journals" / "a.jsonl").write_text("\n".join([*lines[:4], lines[0], lines[5][:-9]]))
     (copied / "out" / "parts" / ".b.parquet.77").write_text("half a part")

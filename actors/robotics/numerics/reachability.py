@@ -9,9 +9,10 @@ import numpy as np
 from .compiled import inner, kernel
 from .horizon import trajectory
 from .typing import Array
-from .ukf import constant_velocity, sigma_points
+from .ukf import constant_velocity, predict, sigma_points
 
 OLDEST = 100_000.0  # periods
+_SAME = 1e-6  # periods: a difference between times that is due to rounding
 
 
 def tube_radius(initial: float, growth: float, step_length: float, steps: int) -> Array:
@@ -77,7 +78,8 @@ def peer_tubes(
     Each row of ``plans`` is one plan: x, y, vx, vy when it was made, the time (s) of that, how many controls follow,
     and these, the accelerations from then on; past the last of them the velocity is kept.  To the ``radius`` (N,) of
     eq. (3), eq. (4) adds ``growth`` for every period that has passed since but one, which is normal latency.  Plans
-    older than ``OLDEST`` count as that old: what they say is lost in the distance to keep.
+    older than ``OLDEST`` count as that old: what they say is lost in the distance to keep.  A peer whose periods begin
+    at other times is where it is on its way between two of its steps.
     """
     count, steps = plans.shape[0], radius.shape[0]
     positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
@@ -85,14 +87,22 @@ def peer_tubes(
         px, py, vx, vy = plans[i, 0], plans[i, 1], plans[i, 2], plans[i, 3]
         age = _age(now - plans[i, 4], period, OLDEST)
         planned = int(plans[i, 5])
+        ahead = now - plans[i, 4] - age * period  # less than half a period, or the plan is from the future or too old
+        if not _SAME * period < abs(ahead) <= period:
+            ahead = 0.0
         for k in range(age + steps):
             px += period * vx
             py += period * vy
+            before_x, before_y = vx, vy
             if k < planned:
                 vx += period * plans[i, 6 + 2 * k]
                 vy += period * plans[i, 7 + 2 * k]
             if k >= age:
                 positions[i, k - age, 0], positions[i, k - age, 1] = px, py
+                if ahead < 0.0:
+                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * before_x, py + ahead * before_y
+                elif ahead > 0.0:
+                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * vx, py + ahead * vy
         lost = max(0, age - 1)
         for s in range(steps):
             distances[i, s] = safe_distance + margin * (radius[s] + growth * lost)
@@ -132,27 +142,52 @@ def propagate(
     return means, covariances
 
 
+@inner
+def _after(mean: Array, covariance: Array, noise: Array, periods: float, period: float) -> tuple[Array, Array]:
+    """An estimate so many periods later (or before), as its filter predicts it: period by period, and what is left."""
+    transition, whole = constant_velocity(period), int(max(periods, 0.0) + _SAME)
+    for _ in range(whole):
+        mean, covariance = predict(mean, covariance, transition, noise)
+    left = periods - whole
+    if abs(left) > _SAME:
+        part = noise.copy()
+        for i in range(part.shape[0]):
+            for j in range(part.shape[1]):
+                part[i, j] *= abs(left)
+        mean, covariance = predict(mean, covariance, constant_velocity(left * period), part)
+    return mean, covariance
+
+
 @kernel
 def expected_target(
-    mean: Array, covariance: Array, process_noise: Array, period: float, elapsed: float, steps: int
+    mean: Array,
+    covariance: Array,
+    noise: Array,
+    is_widened: bool,
+    kappa: float,
+    period: float,
+    elapsed: float,
+    steps: int,
 ) -> tuple[Array, Array, Array, Array]:
-    """What f4 and eq. (5) need of a target with constant velocity that was estimated ``elapsed`` seconds ago.
+    """What f4 and eq. (5) need of a target with constant velocity, from an estimate ``elapsed`` seconds before now.
 
-    Means (1, N, 2) and covariances (1, N, 3) at steps 1..N from now on; the positions (M, 2) to which its sigma points
-    have gone at step N, and their weights (M,).
+    Means (1, N, 2) and covariances (1, N, 3) at steps 1..N from now on; the positions (M, 2) of its sigma points at
+    step N, and their weights (M,).  ``noise`` is the process noise of a period.  Up to now the estimate is predicted
+    with it, as its filter does it; over the horizon only if the covariance ``is_widened`` by it.  The sigma points are
+    then those of the state at step N, and otherwise have gone there from those of the state now.
     """
     # Copies, as tokens are read-only, and what they are handed to would be compiled once more for that.
-    now, spread, age = mean.copy(), covariance.copy(), _age(elapsed, period, OLDEST)
-    means, covariances = propagate(now, spread, constant_velocity(period), process_noise, age + steps)
-    points, weights = sigma_points(now, spread, 0.0)
-    places, spreads, last = np.empty((1, steps, 2)), np.empty((1, steps, 3)), np.empty((points.shape[0], 2))
-    for s in range(steps):
-        for c in range(2):
-            places[0, s, c] = means[age + s, c]
-        for c in range(3):
-            spreads[0, s, c] = covariances[age + s, c]
-    ahead = (age + steps) * period
+    periods = min(max(elapsed / period, -OLDEST), OLDEST)
+    now, spread = _after(mean.copy(), covariance.copy(), noise, periods, period)
+    gained = noise if is_widened else np.zeros(noise.shape)
+    means, covariances = propagate(now, spread, constant_velocity(period), gained, steps)
+    ahead = steps * period
+    if is_widened:
+        now, spread = _after(now, spread, noise, float(steps), period)
+        ahead = 0.0
+    points, weights = sigma_points(now, spread, kappa)
+    last = np.empty((points.shape[0], 2))
     for i in range(points.shape[0]):
         for c in range(2):
             last[i, c] = points[i, c] + ahead * points[i, 2 + c]
-    return places, spreads, last, weights
+    return means.reshape((1, steps, 2)), covariances.reshape((1, steps, 3)), last, weights

@@ -230,7 +230,7 @@ def predict_and_fuse(
     mean, covariance = predict(mean, covariance, transition, process_noise)
     if measurements.shape[0] == 0:
         return mean, covariance, False
-    points, weights = sigma_points(mean, covariance, 0.0)
+    points, weights = sigma_points(mean, covariance, kappa)
     if not averaged:
         points, weights = points[:1], weights[:1]
         weights[0] = 1.0  # of the mean

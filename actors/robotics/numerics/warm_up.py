@@ -36,7 +36,9 @@ def _call_every_kernel() -> None:
     mean, covariance, _ = predict_and_fuse(np.zeros(4), np.eye(4), *model, 0.0, np.zeros((1, 7)), True)
     for token in (mean, covariance):
         token.setflags(write=False)
-    means, covariances, sigma_positions, weights = expected_target(mean, covariance, np.eye(4), period, 0.0, steps)
+    means, covariances, sigma_positions, weights = expected_target(
+        mean, covariance, np.eye(4), False, 0.0, period, 0.0, steps
+    )
     controls = np.zeros((steps, 2))
     zero, tube = np.zeros(2), tube_radius(0.2, 0.4, 1.0, steps)
     centre, radius, starts = standing_plan(zero, zero, controls, 0.0, tube, zero, 0.0, 1.0, period)

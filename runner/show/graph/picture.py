@@ -16,6 +16,7 @@ from typing import Any
 import networkx as nx
 
 from ...model import extent
+from ..canvas import PLAIN, open_matplotlib
 from . import text
 from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width
 from .outline import short_name
@@ -36,6 +37,7 @@ METADATA = {
 
 def write_picture(drawing: Drawing, path: Path) -> None:
     """Draw into a file, whose ending decides the format; the same drawing gives the same bytes."""
+    open_matplotlib()
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -46,7 +48,7 @@ def write_picture(drawing: Drawing, path: Path) -> None:
     kind = path.suffix.lower()[1:]
     with mpl.rc_context(), warnings.catch_warnings():
         mpl.rcdefaults()  # whatever the user's own style is
-        mpl.rcParams.update({"svg.hashsalt": "epicycle", "svg.fonttype": "path", "path.simplify": False})
+        mpl.rcParams.update({"svg.hashsalt": "epicycle", "svg.fonttype": "path", "path.simplify": False, **PLAIN})
         warnings.filterwarnings("ignore", message="Glyph")  # a box stands for what the font lacks
         figure = Figure(figsize=(width / 72, height / 72))
         FigureCanvasAgg(figure)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
+from ..canvas import open_matplotlib
+
 FAMILY = "DejaVu Sans"
 NAME, KIND, PORT, PILL = 9.0, 7.5, 7.0, 6.5  # font sizes in points
 
@@ -12,6 +14,7 @@ NAME, KIND, PORT, PILL = 9.0, 7.5, 7.0, 6.5  # font sizes in points
 @lru_cache(maxsize=16)
 def font(size: float, bold: bool = False) -> Any:
     """The font of a size."""
+    open_matplotlib()
     from matplotlib.font_manager import FontProperties
 
     return FontProperties(family=FAMILY, size=size, weight="bold" if bold else "normal")
@@ -20,6 +23,7 @@ def font(size: float, bold: bool = False) -> Any:
 @lru_cache(maxsize=65536)
 def width(text: str, size: float, bold: bool = False) -> float:
     """The width of a line of text, in points, rounded up."""
+    open_matplotlib()
     from matplotlib.textpath import text_to_path
 
     wide, _, _ = text_to_path.get_text_width_height_descent(text, font(size, bold), ismath=False)

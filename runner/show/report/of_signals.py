@@ -28,7 +28,7 @@ from ...model import Model, Problems
 from ...model.patterns import select
 from ...study import Plan
 from ...study.statistics import half_width
-from ..drawing import figures_of
+from ..drawing import draw, figures_of
 from ..figures import Figure, positions
 from .data import Condition, Data
 from .figure import Complaint, Layout, Roles, RunKey, SignalFigure, layout, roles, unknown
@@ -296,7 +296,7 @@ class SingleRun(SignalFigure):
         with tempfile.TemporaryDirectory() as folder:
             for ending in FORMATS:
                 path = Path(folder) / f"run.{ending}"
-                figure.draw(results, path)
+                draw(self.figure, figure, results, path)
                 files[ending] = path.read_bytes()
         return files
 

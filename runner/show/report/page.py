@@ -141,7 +141,7 @@ def _seeds(data: Data) -> str:
     study = data.plan.study
     if not study.paired:
         return f"Every run has a seed of its own, made of {study.seed}, its condition and its replication."
-    last = study.seed + data.plan.replications - 1
+    last = study.seed + max(data.plan.replications, 1 + max((row["replication"] for row in data.rows), default=0)) - 1
     return (
         f"Seeds {study.seed} to {last}: replication r has the same one in every condition, so that differences "
         "between conditions are seen in pairs of runs."
@@ -181,13 +181,18 @@ def _runs(data: Data) -> Content:
     counts = data.results.counts()
     over, plan = counts.total(), data.plan
     most = "" if plan.study.until is None else "at most "
-    missing = plan.size - over
+    beyond = data.results.beyond()
+    missing = plan.size - (over - beyond)
     rows = [[status, f"{number:,}"] for status, number in sorted(counts.items(), key=lambda each: each[0] != "ok")]
     if missing and plan.study.until is None:
         rows.append(["missing", f"{missing:,}"])
     failures = [row for row in data.rows if row["status"] != "ok"]
     return [
-        tag("p", f"{over:,} of {most}{counted(plan.size, 'run')} are over."),
+        tag(
+            "p",
+            f"{over - beyond:,} of {most}{counted(plan.size, 'run')} are over"
+            + (f", and {beyond:,} more of replications beyond those asked for." if beyond else "."),
+        ),
         tag("p", f"The study is not finished: {counted(missing, 'run')} are missing.", class_="problem")
         if missing and plan.study.until is None
         else None,

@@ -9,6 +9,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal
 
+from ..canvas import open_matplotlib, plain_text
 from ..figures import save
 
 # Okabe and Ito, Color Universal Design, 2008; with markers and dashes, so that lines differ in print, too.
@@ -45,9 +46,10 @@ _STYLE: dict[str, Any] = {
 @contextmanager
 def style() -> Iterator[None]:
     """Whatever a user has set for plots of their own."""
+    open_matplotlib()
     import matplotlib.style
 
-    with matplotlib.style.context(["default", _STYLE]):
+    with matplotlib.style.context(["default", _STYLE]), plain_text():
         yield
 
 

@@ -12,10 +12,11 @@ from typing import Any
 
 from epicycle.actors import EpicycleError
 
-from ...model import ModelError, Problems
+from ...model import ModelError, Problems, describe, raised_at
 from ...study import StudyResults, plan_of_folder
 from ...study.replays import Replay, repeat
 from ...study.store import replace_file
+from ..drawing import FigureError
 from .data import Data
 from .declared import figures_of_study
 from .figure import RunKey, SignalFigure, StudyFigure
@@ -105,6 +106,8 @@ def _picture(
             caption = figure.draw(data, extracts, paths)
     except EpicycleError as error:
         return Picture(name, figure.doc, "", None, str(error))
+    except Exception as error:  # of a class of a user's
+        return Picture(name, figure.doc, "", None, str(FigureError(name, describe(error), raised_at(error))))
     report.files += paths
     return Picture(name, figure.doc, caption, paths[FORMATS.index("svg")].read_bytes())
 

@@ -1,0 +1,475 @@
+"""Laws of random numbers: each makes a value of random bits, by + - * /, square roots and ``elementary`` alone.
+
+Where the inverse of a law's distribution function has a closed form, a value is the inverse at one uniform number: it
+takes one word of the stream and grows with it.  The others draw until a value is accepted.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from functools import cache
+from itertools import accumulate
+from typing import Final, Protocol
+
+from .elementary import acos, cos, exp, expm1, log, log1p, tan
+from .elementary import pow as power_of
+
+_STEP: Final = 1 / 2**52
+_LARGEST: Final = 2**63 - 1  # what fits an integer of 64 bits
+
+
+class Bits(Protocol):
+    """Where random bits come from."""
+
+    def word(self) -> int:
+        """64 random bits."""
+
+    def below(self, bound: int) -> int:
+        """An integer of 0, 1, ..., ``bound`` - 1."""
+
+
+def between(bits: Bits) -> float:
+    """Uniform in the open interval (0, 1): an odd multiple of 2^-53, as likely as its distance from 1."""
+    return ((bits.word() >> 12) + 0.5) * _STEP
+
+
+def _not_negative(**parameters: float) -> None:
+    for name, value in parameters.items():
+        if not value >= 0.0:
+            raise ValueError(f"{name} = {value:g} is not 0 or more")
+
+
+def _positive(**parameters: float) -> None:
+    for name, value in parameters.items():
+        if not value > 0.0:
+            raise ValueError(f"{name} = {value:g} is not above 0")
+
+
+def _probability(p: float) -> None:
+    if not 0.0 <= p <= 1.0:
+        raise ValueError(f"p = {p:g} is not between 0 and 1")
+
+
+# -- closed inverses --------------------------------------------------------------------------------------------------
+
+
+def standard_normal(bits: Bits) -> float:
+    """Normal with mean 0 and variance 1."""
+    return normal_quantile(((bits.word() >> 12) + 0.5) * _STEP)
+
+
+def normal_quantile(share: float) -> float:
+    """The inverse of the standard normal distribution function in (0, 1), to about 1e-16 of its value.
+
+    Source: M. J. Wichura, Algorithm AS 241: The Percentage Points of the Normal Distribution, Applied Statistics 37,
+    1988 (PPND16).
+    """
+    q = share - 0.5
+    if -0.425 <= q <= 0.425:
+        r = 0.180625 - q * q
+        above = (((((((2509.0809287301226727 * r + 33430.575583588128105) * r + 67265.770927008700853) * r
+            + 45921.953931549871457) * r + 13731.693765509461125) * r + 1971.5909503065514427) * r
+            + 133.14166789178437745) * r + 3.3871328727963666080)  # fmt: skip
+        below = (((((((5226.4952788528545610 * r + 28729.085735721942674) * r + 39307.895800092710610) * r
+            + 21213.794301586595867) * r + 5394.1960214247511077) * r + 687.18700749205790830) * r
+            + 42.313330701600911252) * r + 1.0)  # fmt: skip
+        return q * above / below
+    r = math.sqrt(-log(share if q < 0.0 else 1.0 - share))
+    if r <= 5.0:
+        r -= 1.6
+        above = (((((((7.74545014278341407640e-4 * r + 0.0227238449892691845833) * r + 0.241780725177450611770) * r
+            + 1.27045825245236838258) * r + 3.64784832476320460504) * r + 5.76949722146069140550) * r
+            + 4.63033784615654529590) * r + 1.42343711074968357734)  # fmt: skip
+        below = (((((((1.05075007164441684324e-9 * r + 5.47593808499534494600e-4) * r + 0.0151986665636164571966) * r
+            + 0.148103976427480074590) * r + 0.689767334985100004550) * r + 1.67638483018380384940) * r
+            + 2.05319162663775882187) * r + 1.0)  # fmt: skip
+    else:
+        r -= 5.0
+        above = (((((((2.01033439929228813265e-7 * r + 2.71155556874348757815e-5) * r + 0.00124266094738807843860) * r
+            + 0.0265321895265761230930) * r + 0.296560571828504891230) * r + 1.78482653991729133580) * r
+            + 5.46378491116411436990) * r + 6.65790464350110377720)  # fmt: skip
+        below = (((((((2.04426310338993978564e-15 * r + 1.42151175831644588870e-7) * r + 1.84631831751005468180e-5) * r
+            + 7.86869131145613259100e-4) * r + 0.0148753612908506148525) * r + 0.136929880922735805310) * r
+            + 0.599832206555887937690) * r + 1.0)  # fmt: skip
+    return above / below if q > 0.0 else -above / below
+
+
+def normal_share(x: float) -> float:
+    """The standard normal distribution function.  Source: G. Marsaglia, J. Statistical Software 11, 2004."""
+    if not -8.3 < x < 8.3:
+        return 0.0 if x < 0.0 else 1.0
+    term, found, place = x, 0.0, 1.0
+    while found + term != found:
+        found += term
+        place += 2.0
+        term *= x * x / place
+    return 0.5 + found * exp(-0.5 * x * x - 0.91893853320467274178)
+
+
+def normal(bits: Bits, loc: float, scale: float) -> float:
+    """Mean ``loc``, standard deviation ``scale``."""
+    if not scale >= 0.0:
+        _not_negative(scale=scale)
+    return loc + scale * standard_normal(bits)
+
+
+def lognormal(bits: Bits, mean: float, sigma: float) -> float:
+    """e to the power of a normal number."""
+    return exp(normal(bits, mean, sigma))
+
+
+def standard_exponential(bits: Bits) -> float:
+    """Mean 1."""
+    return -log(1.0 - ((bits.word() >> 12) + 0.5) * _STEP)
+
+
+def exponential(bits: Bits, scale: float) -> float:
+    """Mean ``scale``."""
+    if not scale >= 0.0:
+        _not_negative(scale=scale)
+    return scale * -log(1.0 - ((bits.word() >> 12) + 0.5) * _STEP)
+
+
+def weibull(bits: Bits, a: float) -> float:
+    """Shape ``a``, scale 1."""
+    _positive(a=a)
+    return power_of(standard_exponential(bits), 1.0 / a)
+
+
+def pareto(bits: Bits, a: float) -> float:
+    """Lomax, from 0 on."""
+    _positive(a=a)
+    return expm1(standard_exponential(bits) / a)
+
+
+def power(bits: Bits, a: float) -> float:
+    """Density a x^(a - 1)."""
+    _positive(a=a)
+    return power_of(between(bits), 1.0 / a)
+
+
+def rayleigh(bits: Bits, scale: float) -> float:
+    """The length of a plane normal vector."""
+    _not_negative(scale=scale)
+    return scale * math.sqrt(2.0 * standard_exponential(bits))
+
+
+def laplace(bits: Bits, loc: float, scale: float) -> float:
+    """Exponential to both sides."""
+    _not_negative(scale=scale)
+    share = between(bits)
+    return loc + scale * log(2.0 * share) if share < 0.5 else loc - scale * log(2.0 * (1.0 - share))
+
+
+def logistic(bits: Bits, loc: float, scale: float) -> float:
+    """The logit of a uniform number."""
+    _not_negative(scale=scale)
+    share = between(bits)
+    return loc + scale * log(share / (1.0 - share))
+
+
+def gumbel(bits: Bits, loc: float, scale: float) -> float:
+    """The greatest of many."""
+    _not_negative(scale=scale)
+    return loc - scale * log(-log(between(bits)))
+
+
+def standard_cauchy(bits: Bits) -> float:
+    """Mode 0, half width 1."""
+    return tan(math.pi * (between(bits) - 0.5))
+
+
+def triangular(bits: Bits, left: float, mode: float, right: float) -> float:
+    """Rises from ``left`` to ``mode``, falls to ``right``."""
+    if not left <= mode <= right:
+        raise ValueError(f"left = {left:g}, mode = {mode:g} and right = {right:g} are not in order")
+    share, width = between(bits), right - left
+    if share * width <= mode - left:
+        return left + math.sqrt(share * width * (mode - left))
+    return right - math.sqrt((1.0 - share) * width * (right - mode))
+
+
+def geometric(bits: Bits, p: float) -> int:
+    """The first success, from 1 on."""
+    if not 0.0 < p <= 1.0:
+        raise ValueError(f"p = {p:g} is not above 0 and at most 1")
+    share = between(bits)
+    return 1 if p == 1.0 else min(1 + math.floor(log1p(-share) / log1p(-p)), _LARGEST)
+
+
+# -- acceptance and rejection -----------------------------------------------------------------------------------------
+
+
+def standard_gamma(bits: Bits, shape: float) -> float:
+    """Scale 1.  Source: Marsaglia and Tsang, A Simple Method for Generating Gamma Variables, ACM TOMS 26, 2000."""
+    _not_negative(shape=shape)
+    if shape < 1.0:
+        return standard_gamma(bits, shape + 1.0) * power_of(between(bits), 1.0 / shape) if shape else 0.0
+    d = shape - 1.0 / 3.0
+    c = 1.0 / math.sqrt(9.0 * d)
+    while True:
+        x = standard_normal(bits)
+        v = 1.0 + c * x
+        if v <= 0.0:
+            continue
+        v, square, share = v * v * v, x * x, between(bits)
+        if share < 1.0 - 0.0331 * square * square or log(share) < 0.5 * square + d * (1.0 - v + log(v)):
+            return d * v
+
+
+def gamma(bits: Bits, shape: float, scale: float) -> float:
+    """Mean shape * scale."""
+    _not_negative(scale=scale)
+    return scale * standard_gamma(bits, shape)
+
+
+def chisquare(bits: Bits, df: float) -> float:
+    """The squared length of a normal vector."""
+    _positive(df=df)
+    return 2.0 * standard_gamma(bits, 0.5 * df)
+
+
+def beta(bits: Bits, a: float, b: float) -> float:
+    """Mean a / (a + b).  Source: M. D. Jöhnk, Metrika 8, 1964, for small parameters; else a share of two gammas."""
+    _positive(a=a, b=b)
+    if a > 1.0 or b > 1.0:
+        x = standard_gamma(bits, a)
+        return x / (x + standard_gamma(bits, b))
+    while True:
+        # Logarithms, as the powers may all be too small for a float.
+        x, y = log(between(bits)) / a, log(between(bits)) / b
+        if exp(x) + exp(y) <= 1.0:
+            top = max(x, y)
+            return exp(x - top) / (exp(x - top) + exp(y - top))
+
+
+def standard_t(bits: Bits, df: float) -> float:
+    """A normal number over the root of its estimated variance."""
+    _positive(df=df)
+    return standard_normal(bits) / math.sqrt(chisquare(bits, df) / df)
+
+
+def f(bits: Bits, dfnum: float, dfden: float) -> float:
+    """The ratio of two mean squares."""
+    return chisquare(bits, dfnum) / dfnum / (chisquare(bits, dfden) / dfden)
+
+
+def vonmises(bits: Bits, mu: float, kappa: float) -> float:
+    """An angle in [-pi, pi].  Source: Best and Fisher, Efficient Simulation of the von Mises Distribution, 1979."""
+    _not_negative(kappa=kappa)
+    if kappa > 1e6:  # normal to all digits that count, while the ratios below lose theirs
+        return math.remainder(mu + standard_normal(bits) / math.sqrt(kappa), 2.0 * math.pi)
+    if kappa < 1e-8:
+        return math.remainder(mu + math.pi * (2.0 * between(bits) - 1.0), 2.0 * math.pi)
+    root = 1.0 + math.sqrt(1.0 + 4.0 * kappa * kappa)
+    rho = 2.0 * kappa / (root + math.sqrt(2.0 * root))  # (root - sqrt(2 root)) / (2 kappa) without cancellation
+    s = (1.0 + rho * rho) / (2.0 * rho)
+    while True:
+        z = cos(math.pi * between(bits))
+        w = (1.0 + s * z) / (s + z)
+        c, share = kappa * (s - w), between(bits)
+        if c * (2.0 - c) > share or log(c / share) + 1.0 - c >= 0.0:
+            angle = acos(min(1.0, max(-1.0, w)))
+            return math.remainder(mu + (angle if bits.word() >> 63 else -angle), 2.0 * math.pi)
+
+
+def wald(bits: Bits, mean: float, scale: float) -> float:
+    """Inverse Gaussian.  Source: Michael, Schucany and Haas, The American Statistician 30, 1976."""
+    _positive(mean=mean, scale=scale)
+    x = standard_normal(bits)
+    t = mean * x * x / (2.0 * scale)
+    small = mean / (1.0 + t + math.sqrt(t * (2.0 + t)))  # the smaller root; the product of both is mean^2
+    return small if between(bits) * (mean + small) <= mean else mean / small * mean
+
+
+def poisson(bits: Bits, lam: float) -> int:
+    """Mean lam.  Source for large ones: W. Hörmann, Insurance: Mathematics and Economics 12, 1993 (PTRS)."""
+    if not 0.0 <= lam <= 1e18:
+        raise ValueError(f"lam = {lam:g} is not between 0 and 1e18")
+    if lam < 10.0:
+        share, chance, k = between(bits), exp(-lam), 0
+        below = chance
+        while share > below and chance > 0.0:
+            k += 1
+            chance *= lam / k
+            below += chance
+        return k
+    b = 0.931 + 2.53 * math.sqrt(lam)
+    a = -0.059 + 0.02483 * b
+    ceiling = 1.1239 + 1.1328 / (b - 3.4)
+    while True:
+        u, v = between(bits) - 0.5, between(bits)
+        us = 0.5 - abs(u)
+        k = math.floor((2.0 * a / us + b) * u + lam + 0.43)
+        if us >= 0.07 and v <= 0.9277 - 3.6224 / (b - 2.0):
+            return k
+        if k >= 0 and not (us < 0.013 and v > us):
+            chance = -lam if k == 0 else -_deviance(k, lam) - _stirling(k) - 0.5 * log(2.0 * math.pi * k)
+            if log(v * ceiling / (a / (us * us) + b)) <= chance:
+                return k
+
+
+def binomial(bits: Bits, n: int, p: float) -> int:
+    """Mean n p.  Source for large ones: W. Hörmann, J. Statistical Computation and Simulation 46, 1993 (BTRS)."""
+    n = int(n)
+    if not 0 <= n <= _LARGEST:
+        raise ValueError(f"n = {n} is not between 0 and 2^63 - 1")
+    _probability(p)
+    if p > 0.5:
+        return n - binomial(bits, n, 1.0 - p)
+    q = 1.0 - p
+    if n * p < 10.0:
+        share, chance, k = between(bits), exp(n * log1p(-p)), 0
+        below = chance
+        while share > below and k < n and chance > 0.0:
+            k += 1
+            chance *= (n - k + 1) * p / (k * q)
+            below += chance
+        return k
+    spread = math.sqrt(n * p * q)
+    b = 1.15 + 2.53 * spread
+    a = -0.0873 + 0.0248 * b + 0.01 * p
+    ceiling = (2.83 + 5.1 / b) * spread
+    top = _log_binomial(math.floor((n + 1) * p), n, p)
+    while True:
+        u, v = between(bits) - 0.5, between(bits)
+        us = 0.5 - abs(u)
+        k = math.floor((2.0 * a / us + b) * u + n * p + 0.5)
+        if us >= 0.07 and v <= 0.92 - 4.2 / b:
+            return k
+        if 0 <= k <= n and log(v * ceiling / (a / (us * us) + b)) <= _log_binomial(k, n, p) - top:
+            return k
+
+
+def negative_binomial(bits: Bits, n: float, p: float) -> int:
+    """A Poisson number whose mean is a gamma number."""
+    _positive(n=n, p=p)
+    _probability(p)
+    return poisson(bits, gamma(bits, n, (1.0 - p) / p))
+
+
+def _log_binomial(k: int, n: int, p: float) -> float:
+    """The logarithm of a binomial probability.
+
+    Source: C. Loader, Fast and Accurate Computation of Binomial Probabilities, 2000.
+    """
+    if k in (0, n):
+        return n * (log1p(-p) if k == 0 else log(p))
+    return (
+        _stirling(n) - _stirling(k) - _stirling(n - k) - _deviance(k, n * p) - _deviance(n - k, n * (1.0 - p))
+        + 0.5 * log(n / (2.0 * math.pi * k * (n - k)))
+    )  # fmt: skip
+
+
+def _deviance(k: int, mean: float) -> float:
+    """k log(k / mean) + mean - k."""
+    gap = k - mean
+    return k * log1p(gap / mean) - gap
+
+
+@cache
+def _few(k: int) -> float:
+    return log(math.factorial(k)) - (k * log(k) - k + 0.5 * log(2.0 * math.pi * k))
+
+
+def _stirling(k: int) -> float:
+    """log(k!) less Stirling's formula for it, for k > 0."""
+    if k < 16:
+        return _few(k)
+    square = float(k) * k
+    return (1 / 12 - (1 / 360 - (1 / 1260 - 1 / 1680 / square) / square) / square) / k
+
+
+# -- choices and vectors ----------------------------------------------------------------------------------------------
+
+
+def cumulated(weights: Sequence[float]) -> list[float]:
+    """The sums of weights up to each; raises ``ValueError`` where they are no weights."""
+    sums = list(accumulate(weights))
+    if not sums or not all(weight >= 0.0 for weight in weights) or not 0.0 < sums[-1] < math.inf:
+        raise ValueError(f"weights {list(weights)} are not all 0 or more with a finite sum above 0")
+    return sums
+
+
+def weighted(bits: Bits, sums: Sequence[float]) -> int:
+    """An index, as likely as its weight; ``sums`` are ``cumulated``."""
+    place = bisect_right(sums, between(bits) * sums[-1])
+    # Rounding may have reached the whole sum, which lies beyond the last weight that is not 0.
+    return place if place < len(sums) else bisect_right(sums, math.nextafter(sums[-1], 0.0))
+
+
+def without_replacement(bits: Bits, count: int, wanted: int, weights: Sequence[float] | None) -> list[int]:
+    """Different indices, in the order in which they are drawn."""
+    possible = count if weights is None else sum(weight > 0.0 for weight in weights)
+    if wanted > possible:
+        raise ValueError(f"{wanted} different elements are asked for, and there are {possible}")
+    drawn: list[int] = []
+    if weights is None:
+        moved: dict[int, int] = {}  # of a shuffle whose untouched places are not written down
+        for last in range(count - 1, count - 1 - wanted, -1):
+            place = bits.below(last + 1)
+            drawn.append(moved.get(place, place))
+            moved[place] = moved.get(last, last)
+        return drawn
+    left = list(weights)
+    for _ in range(wanted):
+        drawn.append(weighted(bits, cumulated(left)))
+        left[drawn[-1]] = 0.0
+    return drawn
+
+
+def multinomial(bits: Bits, n: int, weights: Sequence[float]) -> list[int]:
+    """How often each outcome comes: one binomial number after the other, of what is left."""
+    share, counts = 1.0, []
+    for weight in weights[:-1]:
+        counts.append(binomial(bits, n, min(1.0, weight / share)) if n and weight else 0)
+        n, share = n - counts[-1], share - weight
+        if share < -1e-12 or weight < 0.0:
+            raise ValueError(f"pvals {list(weights)} are no probabilities, or add up to more than 1")
+    return [*counts, n]
+
+
+def dirichlet(bits: Bits, shapes: Sequence[float]) -> list[float]:
+    """Shares that add up to 1: each is a beta share of what the ones before it have left."""
+    left, shares = 1.0, []
+    rests = list(accumulate(reversed(shapes)))[::-1]
+    for shape, rest in zip(shapes[:-1], rests[1:], strict=True):
+        share = beta(bits, shape, rest)
+        shares.append(left * share)
+        left *= 1.0 - share
+    return [*shares, left]
+
+
+def square_root(covariance: Sequence[Sequence[float]]) -> list[list[float]]:
+    """A lower triangle L with L L^T the covariance (Cholesky); a direction without variance gets zeros."""
+    size = len(covariance)
+    if any(len(row) != size for row in covariance):
+        raise ValueError("cov is not square")
+    root = [[0.0] * size for _ in range(size)]
+    for i in range(size):
+        for j in range(i + 1):
+            if not abs(covariance[i][j] - covariance[j][i]) <= 1e-8 * (1.0 + abs(covariance[i][j])):
+                raise ValueError("cov is not symmetric")
+            rest = covariance[i][j]
+            for k in range(j):
+                rest -= root[i][k] * root[j][k]
+            if i != j:
+                root[i][j] = rest / root[j][j] if root[j][j] else 0.0
+            elif rest < -1e-8 * (1.0 + covariance[i][i]):
+                raise ValueError("cov is not positive semidefinite")
+            else:
+                root[i][i] = math.sqrt(rest) if rest > 1e-14 * covariance[i][i] else 0.0
+    return root
+
+
+def multivariate_normal(bits: Bits, means: Sequence[float], root: Sequence[Sequence[float]]) -> list[float]:
+    """means + root z, with independent standard normal numbers z."""
+    draws = [standard_normal(bits) for _ in means]
+    values = []
+    for mean, row in zip(means, root, strict=True):
+        for factor, draw in zip(row, draws, strict=True):
+            mean += factor * draw
+        values.append(mean)
+    return values

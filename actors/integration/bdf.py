@@ -1,0 +1,168 @@
+"""BDF: backward differentiation formulas of order 1 to 5 with quasi-constant steps, for stiff systems.
+
+L. F. Shampine, M. W. Reichelt: The MATLAB ODE suite, SIAM J. Sci. Comput. 18 (1997) 1-22, with the modified
+differentiation formulas (NDF) that stand there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from .newton import Convergence, Factors, Jacobian, Matrix
+from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, norm, stretch
+
+_MAX_ORDER: Final = 5
+_MAX_CORRECTIONS: Final = 4
+_KAPPA: Final = (0.0, -0.1850, -1 / 9, -0.0823, -0.0415, 0.0)
+_GAMMA: Final = (0.0, 1.0, 3 / 2, 11 / 6, 25 / 12, 137 / 60)  # sums of 1/k
+_ALPHA: Final = tuple((1.0 - kappa) * gamma for kappa, gamma in zip(_KAPPA, _GAMMA, strict=True))
+_ERROR: Final = tuple(
+    kappa * gamma + 1.0 / (order + 1) for order, (kappa, gamma) in enumerate(zip(_KAPPA, _GAMMA, strict=True))
+)
+_ONES: Final = (1.0,) * (_MAX_ORDER + 1)
+_FACTORS: Final = [(1.0 / (number + 1), number / (number + 1)) for number in range(_MAX_ORDER)]
+
+
+class BDF(Stepper):
+    """Backward differences of the states, as many as the order is high, carried from step to step."""
+
+    def __init__(self, derivative: Derivative, state: State, limits: Limits) -> None:
+        super().__init__(1, derivative, state, limits)
+        self._order = 1
+        self._equal_steps = 0
+        self._start = 0.0
+        zero = [0.0] * len(state)
+        self._differences = [state, [self.next_step * rate for rate in self.rates]] + [zero] * (_MAX_ORDER + 1)
+        self._jacobian = Jacobian(derivative, len(state), limits.absolute)
+        self._matrix: Matrix = self._jacobian.at(0.0, state, self.rates)
+        self._factors: Factors | None = None
+
+    def step(self) -> bool:
+        least = self.least_step
+        self._differences = list(self._differences)  # a copy of this stepper keeps its own
+        step = min(max(self.next_step, least), self.limits.max_step)
+        if step != self.next_step:
+            self._rescale(step / self.next_step if self.next_step else 1.0)
+        is_new = False  # whether the Jacobian is of this step
+        while step >= least:
+            end = self.time + step
+            step = end - self.time
+            predicted = _total(self._differences[: self._order + 1], _ONES)
+            newton = Convergence(self.limits, _MAX_CORRECTIONS)
+            correction = self._correct(newton, end, step, predicted)
+            if not newton.is_reached:
+                self._factors = None
+                if is_new:
+                    self._rescale(0.5)
+                    step *= 0.5
+                else:
+                    self._matrix = self._jacobian.at(end, predicted, self.derivative(end, predicted))
+                    is_new = True
+                continue
+            safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
+            state = [value + change for value, change in zip(predicted, correction, strict=True)]
+            scale = self.scale(state)
+            error = _ERROR[self._order] * norm(correction, scale)
+            if error <= 1.0:
+                self._start, self.time, self.state, self.next_step = self.time, end, state, step
+                self._accept(correction)
+                if self._equal_steps > self._order:
+                    self._choose_order(scale, error, safety)
+                return True
+            factor = max(SHRINK_LIMIT, stretch(error, safety, self._order))
+            self._rescale(factor)
+            step *= factor
+        return False
+
+    def _correct(self, newton: Convergence, end: float, step: float, predicted: State) -> State:
+        """Solve for what is to be added to the predicted state."""
+        share = step / _ALPHA[self._order]
+        if self._factors is None:
+            self._factors = _factorised(self._matrix, share)
+        past = _total(self._differences[1 : self._order + 1], _GAMMA[1:])
+        past = [value / _ALPHA[self._order] for value in past]
+        scale = self.scale(predicted)
+        state, added = predicted, [0.0] * len(predicted)
+        while self._factors is not None:
+            rates = self.derivative(end, state)
+            change = self._factors.solve(
+                [share * rate - old - total for rate, old, total in zip(rates, past, added, strict=True)]
+            )
+            goes_on = newton.goes_on(norm(change, scale))
+            added = [total + value for total, value in zip(added, change, strict=True)]
+            if not goes_on:
+                break
+            state = [value + each for value, each in zip(state, change, strict=True)]
+        return added
+
+    def _accept(self, correction: State) -> None:
+        """Carry the differences on by a step: each is what it was, plus the one above it."""
+        differences, order = self._differences, self._order
+        differences[order + 2] = [new - old for new, old in zip(correction, differences[order + 1], strict=True)]
+        differences[order + 1] = correction
+        for number in range(order, -1, -1):
+            pairs = zip(differences[number], differences[number + 1], strict=True)
+            differences[number] = [old + above for old, above in pairs]
+        self._equal_steps += 1
+
+    def _choose_order(self, scale: list[float], error: float, safety: float) -> None:
+        """Go on with the order, of this one and its neighbours, that allows the longest step."""
+        order = self._order
+        best, best_factor = order, stretch(error, 1.0, order)
+        for other in (order - 1, order + 1):
+            if 1 <= other <= _MAX_ORDER:
+                factor = stretch(_ERROR[other] * norm(self._differences[other + 1], scale), 1.0, other)
+                if factor > best_factor or (factor == best_factor and other < order):
+                    best, best_factor = other, factor
+        self._order = best
+        factor = min(GROWTH_LIMIT, safety * best_factor)
+        self._rescale(factor)
+        self.next_step *= factor
+        self._factors = None
+
+    def _rescale(self, factor: float) -> None:
+        """Turn the differences into those of a step that is longer or shorter by a factor."""
+        size = self._order + 1
+        new, old = _spread(size, factor), _spread(size, 1.0)
+        for_all = [[_dot(row, column) for column in zip(*old, strict=True)] for row in new]
+        differences = self._differences[:size]
+        self._differences[:size] = [_total(differences, weights) for weights in zip(*for_all, strict=True)]
+        self._equal_steps = 0
+
+    def piece(self) -> Piece:
+        rows = self._differences[: self._order + 1]
+        return Piece(self._start, self.time, self.time, self.next_step, _FACTORS[: self._order], rows)
+
+
+def _dot(left: Sequence[float], right: Sequence[float]) -> float:
+    total = 0.0
+    for one, other in zip(left, right, strict=True):
+        total += one * other
+    return total
+
+
+def _total(rows: Sequence[State], weights: Sequence[float]) -> State:
+    """The weighted sum of some rows."""
+    weights = weights[: len(rows)]
+    return [_dot(column, weights) for column in zip(*rows, strict=True)]
+
+
+def _spread(size: int, factor: float) -> Matrix:
+    """The matrix that takes backward differences to values at points that lie ``factor`` steps apart."""
+    rows = [[1.0] * size]
+    for number in range(1, size):
+        step = [0.0, *((number - 1 - factor * column) / number for column in range(1, size))]
+        rows.append([above * each for above, each in zip(rows[-1], step, strict=True)])
+    return rows
+
+
+def _factorised(matrix: Matrix, share: float) -> Factors | None:
+    """The identity less a share of a matrix, factorised; None if it is singular."""
+    rows = [[-share * value for value in row] for row in matrix]
+    for number, row in enumerate(rows):
+        row[number] += 1.0
+    try:
+        return Factors(rows)
+    except ZeroDivisionError:
+        return None

@@ -1,0 +1,142 @@
+"""What implicit methods need: the Jacobian by differences, linear systems, and Newton's iteration watched."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from typing import Final
+
+from .stepper import Derivative, Limits, State
+
+Matrix = list[list[float]]
+
+_PRECISION: Final = sys.float_info.epsilon
+# A difference of derivatives says too little if it is that small beside them, and the next one should be taken over
+# a wider or narrower stretch outside these bounds (D. E. Salane, Sandia report 86-1319, 1986).
+_USELESS: Final = 2e-14
+_SMALL: Final = 2e-12
+_LARGE: Final = 1e-4
+_LEAST: Final = 1e3 * _PRECISION
+
+
+class Jacobian:
+    """How the derivatives change with each state, by differences whose widths are learnt from call to call."""
+
+    def __init__(self, derivative: Derivative, size: int, threshold: float) -> None:
+        self._derivative = derivative
+        self._threshold = threshold  # a state counts as no smaller than this
+        self._widths = [1.5e-8] * size
+
+    def at(self, time: float, state: State, rates: State) -> Matrix:
+        """The matrix of d(rate of row)/d(state of column); ``rates`` are the derivatives there."""
+        columns = []
+        for number, (value, rate) in enumerate(zip(state, rates, strict=True)):
+            # Towards where the solution goes, which is where the derivatives should be defined.
+            reach = max(self._threshold, abs(value)) * (1.0 if rate >= 0.0 else -1.0)
+            width = self._widths[number]
+            while (value + width * reach) - value == 0.0:
+                width *= 10.0
+            found = self._difference(time, state, rates, number, width * reach)
+            if found.change < _USELESS * found.size:
+                wider = self._difference(time, state, rates, number, 10.0 * width * reach)
+                if found.change * wider.size < wider.change * found.size:
+                    found, width = wider, 10.0 * width
+            columns.append(found.column)
+            if found.change < _SMALL * found.size:
+                width *= 10.0
+            elif found.change > _LARGE * found.size:
+                width *= 0.1
+            self._widths[number] = max(width, _LEAST)
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def _difference(self, time: float, state: State, rates: State, number: int, move: float) -> _Difference:
+        moved = list(state)
+        moved[number] += move
+        move = moved[number] - state[number]
+        other = self._derivative(time, moved)
+        changes = [new - old for new, old in zip(other, rates, strict=True)]
+        change, size = max(
+            (abs(each), max(abs(new), abs(old))) for each, new, old in zip(changes, other, rates, strict=True)
+        )
+        return _Difference([each / move for each in changes], change, size)
+
+
+@dataclass(frozen=True)
+class _Difference:
+    """A column of the Jacobian, the largest change that it comes from, and the rate that changed so."""
+
+    column: State
+    change: float
+    size: float
+
+
+class Factors:
+    """A matrix as the product of triangular ones, with the largest pivot of each column.
+
+    Raises ``ZeroDivisionError`` if the matrix is singular.
+    """
+
+    def __init__(self, matrix: Matrix) -> None:
+        rows = [list(row) for row in matrix]
+        order = list(range(len(rows)))
+        for column in range(len(rows)):
+            best = max(range(column, len(rows)), key=lambda row: abs(rows[row][column]))
+            rows[column], rows[best] = rows[best], rows[column]
+            order[column], order[best] = order[best], order[column]
+            pivot = rows[column]
+            for row in rows[column + 1 :]:
+                share = row[column] = row[column] / pivot[column]
+                if share != 0.0:
+                    for number in range(column + 1, len(rows)):
+                        row[number] -= share * pivot[number]
+        self._rows, self._order = rows, order
+        self._inverse = [1.0 / row[number] for number, row in enumerate(rows)]
+
+    def solve(self, right: State) -> State:
+        """The solution for a right side."""
+        found: State = []
+        for number, row in zip(self._order, self._rows, strict=True):
+            total = right[number]
+            for factor, value in zip(row, found, strict=False):
+                total -= factor * value
+            found.append(total)
+        for number in range(len(found) - 1, -1, -1):
+            row, total = self._rows[number], found[number]
+            for behind in range(number + 1, len(found)):
+                total -= row[behind] * found[behind]
+            found[number] = total * self._inverse[number]
+        return found
+
+
+class Convergence:
+    """Watches the corrections of one Newton iteration of at most ``most`` corrections."""
+
+    def __init__(self, limits: Limits, most: int) -> None:
+        relative = limits.relative
+        self._tolerance = max(10.0 * _PRECISION / relative, min(0.03, math.sqrt(relative)))
+        self._left = most
+        self._before: float | None = None
+        self.rate = 0.0  # by which factor the latest correction is smaller than the one before
+        self.count = 0
+        self.is_reached = False
+
+    def goes_on(self, correction: float) -> bool:
+        """Whether, with the size of the next correction, it is worth going on; if not, ``is_reached`` says why."""
+        self.count += 1
+        if correction == 0.0:
+            self.is_reached = True
+        elif self._before is not None:
+            self.rate = rate = correction / self._before
+            if not rate < 1.0:
+                return False
+            rest = rate / (1.0 - rate) * correction  # what all further corrections add up to
+            self.is_reached = rest < self._tolerance
+            expected = rest
+            for _ in range(self._left - 1):
+                expected *= rate
+            if expected > self._tolerance:
+                return False
+        self._before = correction
+        self._left -= 1
+        return not self.is_reached and self._left > 0 and correction < math.inf

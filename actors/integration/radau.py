@@ -1,0 +1,199 @@
+"""Radau: the implicit Runge-Kutta method Radau IIA of order 5, for stiff systems.
+
+E. Hairer, G. Wanner: Solving Ordinary Differential Equations II, section IV.8.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from .newton import Convergence, Factors, Jacobian, Matrix
+from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, norm, root_power
+
+_MAX_CORRECTIONS: Final = 6
+_ROOT: Final = math.sqrt(6.0)
+_NODES: Final = ((4.0 - _ROOT) / 10.0, (4.0 + _ROOT) / 10.0, 1.0)
+_ERROR: Final = ((-13.0 - 7.0 * _ROOT) / 3.0, (-13.0 + 7.0 * _ROOT) / 3.0, -1.0 / 3.0)
+# The inverse of the tableau's matrix has one real eigenvalue and a pair of complex ones,
+_REAL: Final = 3.637834252744496
+_PAIR: Final = (2.6810828736277523, -3.050430199247411)
+# and these matrices lead from its eigenvectors to the stages and back.
+_TO_STAGES: Final = (
+    (0.09443876248897524, -0.14125529502095421, 0.03002919410514742),
+    (0.25021312296533332, 0.20412935229379994, -0.38294211275726192),
+    (1.0, 1.0, 0.0),
+)
+_FROM_STAGES: Final = (
+    (4.17871859155190428, 0.32768282076106237, 0.52337644549944951),
+    (-4.17871859155190428, -0.32768282076106237, 0.47662355450055044),
+    (0.50287263494578682, -2.57192694985560522, 0.59603920482822492),
+)
+# The rows of the polynomial through the start and the stages, over the stages.
+_DENSE: Final = (
+    (13.0 / 3.0 + 7.0 * _ROOT / 3.0, 13.0 / 3.0 - 7.0 * _ROOT / 3.0, 1.0 / 3.0),
+    (-23.0 / 3.0 - 22.0 * _ROOT / 3.0, -23.0 / 3.0 + 22.0 * _ROOT / 3.0, -8.0 / 3.0),
+    (10.0 / 3.0 + 5.0 * _ROOT, 10.0 / 3.0 - 5.0 * _ROOT, 10.0 / 3.0),
+)
+_FACTORS: Final = [(1.0, 0.0)] * 3
+
+Triple = tuple[State, State, State]
+
+
+def _times(matrix: tuple[tuple[float, float, float], ...], vectors: Triple) -> Triple:
+    """A matrix of three by three times the vectors of three stages, state by state."""
+    first, second, third = ([a * x + b * y + c * z for x, y, z in zip(*vectors, strict=True)] for a, b, c in matrix)
+    return first, second, third
+
+
+class Radau(Stepper):
+    """Three implicit stages, solved by simplified Newton iterations in the eigenvectors of the tableau."""
+
+    def __init__(self, derivative: Derivative, state: State, limits: Limits) -> None:
+        super().__init__(3, derivative, state, limits)
+        self._jacobian = Jacobian(derivative, len(state), limits.absolute)
+        self._matrix: Matrix = self._jacobian.at(0.0, state, self.rates)
+        self._is_new = True  # whether the Jacobian is of where the solution stands
+        self._factors: tuple[Factors, Factors] | None = None
+        self._before: tuple[float, float] | None = None  # the latest step and its error
+        self._piece: Piece | None = None
+
+    def step(self) -> bool:
+        least = self.least_step
+        step = min(max(self.next_step, least), self.limits.max_step)
+        if step != self.next_step:
+            self._before = self._factors = None
+        was_rejected = False
+        while step >= least:
+            end = self.time + step
+            step = end - self.time
+            newton = Convergence(self.limits, _MAX_CORRECTIONS)
+            stages = self._solve(newton, step)
+            if not newton.is_reached or self._factors is None:
+                self._factors = None
+                if self._is_new:
+                    step *= 0.5
+                else:
+                    self._matrix = self._jacobian.at(self.time, self.state, self.rates)
+                    self._is_new = True
+                continue
+            safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
+            state = [value + change for value, change in zip(self.state, stages[2], strict=True)]
+            error = self._error(self._factors[0], stages, state, step, filtered=was_rejected)
+            factor = safety * self._predicted(step, error)
+            if error <= 1.0:
+                self._accept(end, state, stages)
+                self._before = step, error
+                self._prepare(step, min(GROWTH_LIMIT, factor), newton)
+                return True
+            step *= max(SHRINK_LIMIT, factor)
+            self._factors = None
+            was_rejected = True
+        return False
+
+    def _solve(self, newton: Convergence, step: float) -> Triple:
+        """The stages, as what each adds to the state."""
+        zero = [0.0] * len(self.state)
+        stages: Triple = (zero, zero, zero)
+        if self._piece is not None:  # the latest polynomial goes on for a while
+            first, second, third = (
+                [new - old for new, old in zip(self._piece.at(self.time + node * step), self.state, strict=True)]
+                for node in _NODES
+            )
+            stages = first, second, third
+        if self._factors is None:
+            self._factors = _factorised(self._matrix, step)
+        if self._factors is None:
+            return stages
+        real, (pair, turn) = _REAL / step, (_PAIR[0] / step, _PAIR[1] / step)
+        scale = self.scale(self.state)
+        size = len(scale)
+        parts = _times(_FROM_STAGES, stages)
+        goes_on = True
+        while goes_on:
+            rates = self._rates(step, stages)
+            one, two, three = _times(_FROM_STAGES, rates)
+            change = self._factors[0].solve([rate - real * part for rate, part in zip(one, parts[0], strict=True)])
+            both = self._factors[1].solve(
+                [rate - (pair * x - turn * y) for rate, x, y in zip(two, parts[1], parts[2], strict=True)]
+                + [rate - (pair * y + turn * x) for rate, x, y in zip(three, parts[1], parts[2], strict=True)]
+            )
+            changes = change, both[:size], both[size:]
+            goes_on = newton.goes_on(norm([*change, *both], scale * 3))
+            first, second, third = (
+                [old + new for old, new in zip(part, each, strict=True)]
+                for part, each in zip(parts, changes, strict=True)
+            )
+            parts = first, second, third
+            stages = _times(_TO_STAGES, parts)
+        return stages
+
+    def _rates(self, step: float, stages: Triple) -> Triple:
+        first, second, third = (
+            self.derivative(
+                self.time + node * step, [value + each for value, each in zip(self.state, stage, strict=True)]
+            )
+            for node, stage in zip(_NODES, stages, strict=True)
+        )
+        return first, second, third
+
+    def _error(self, factors: Factors, stages: Triple, state: State, step: float, *, filtered: bool) -> float:
+        a, b, c = _ERROR
+        ends = [(a * x + b * y + c * z) / step for x, y, z in zip(*stages, strict=True)]
+        scale = self.scale(self.state, state)
+        error = factors.solve([rate + each for rate, each in zip(self.rates, ends, strict=True)])
+        size = norm(error, scale)
+        if filtered and size > 1.0:
+            # The error of components that decay at once is exaggerated: once more through the system damps it.
+            rates = self.derivative(self.time, [value + each for value, each in zip(self.state, error, strict=True)])
+            size = norm(factors.solve([rate + each for rate, each in zip(rates, ends, strict=True)]), scale)
+        return size
+
+    def _predicted(self, step: float, error: float) -> float:
+        """By which factor the step may change for an error of 1, as the latest two errors tell (Gustafsson)."""
+        if error == 0.0:
+            return math.inf
+        root = root_power(error, 0.25)
+        if self._before is None:
+            return 1.0 / root
+        before, error_before = self._before
+        return min(1.0, step / before * root_power(error_before, 0.25) / root) / root
+
+    def _accept(self, end: float, state: State, stages: Triple) -> None:
+        rows = [[a * x + b * y + c * z for x, y, z in zip(*stages, strict=True)] for a, b, c in _DENSE]
+        self._piece = Piece(self.time, end, self.time, end - self.time, _FACTORS, [self.state, *rows])
+        self.time, self.state, self.rates = end, state, self.derivative(end, state)
+
+    def _prepare(self, step: float, factor: float, newton: Convergence) -> None:
+        """Make ready for the next step; what is factorised is kept while the step would hardly be longer."""
+        self._is_new = newton.count > 2 and newton.rate > 1e-3
+        if self._is_new:
+            self._matrix = self._jacobian.at(self.time, self.state, self.rates)
+        elif factor < 1.2:
+            self.next_step = step
+            return
+        self._factors = None
+        self.next_step = step * factor
+
+    def piece(self) -> Piece:
+        assert self._piece is not None
+        return self._piece
+
+
+def _factorised(matrix: Matrix, step: float) -> tuple[Factors, Factors] | None:
+    """The system of the real eigenvalue, and that of the pair, in real numbers twice as large; None if singular."""
+    real, (pair, turn) = _REAL / step, (_PAIR[0] / step, _PAIR[1] / step)
+    single = [[-value for value in row] for row in matrix]
+    upper = [[*row, *([0.0] * len(row))] for row in single]
+    lower = [[*([0.0] * len(row)), *row] for row in single]
+    size = len(single)
+    for number in range(size):
+        single[number][number] += real
+        upper[number][number] += pair
+        upper[number][size + number] = -turn
+        lower[number][number] = turn
+        lower[number][size + number] += pair
+    try:
+        return Factors(single), Factors(upper + lower)
+    except ZeroDivisionError:
+        return None

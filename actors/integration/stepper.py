@@ -1,0 +1,141 @@
+"""What all steppers share: the scale of errors, the control of the step, and the polynomial along a step.
+
+Everything here is computed in plain floats with + - * / and square roots, in a fixed order, so that a solution has
+the same bits on every processor.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+State = list[float]
+Derivative = Callable[[float, State], list[float]]
+Bounds = tuple[float, float]
+
+SHRINK_LIMIT: Final = 0.2  # a step becomes shorter by no more than this factor at once,
+GROWTH_LIMIT: Final = 10.0  # and longer by no more than this one
+_BITS: Final = 14
+
+
+def root_power(base: float, exponent: float) -> float:
+    """``base ** exponent`` for an exponent from 0 to 1, which counts to 14 binary places: square roots suffice."""
+    result = 1.0
+    for _ in range(_BITS):
+        base = math.sqrt(base)
+        exponent += exponent
+        if exponent >= 1.0:
+            exponent -= 1.0
+            result *= base
+    return result
+
+
+def norm(values: Sequence[float], scale: Sequence[float]) -> float:
+    """The root of the mean of the squares of the values, each divided by its scale."""
+    total = 0.0
+    for value, unit in zip(values, scale, strict=True):
+        ratio = value / unit
+        total += ratio * ratio
+    return math.sqrt(total / len(scale))
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The solution along one step, from ``start`` to ``end``: a polynomial for each state.
+
+    With x = (time - origin) / width it is ``rows[0] + factor 1 * (rows[1] + factor 2 * (rows[2] + ...))``, where a
+    factor is ``slope * x + offset``.
+    """
+
+    start: float
+    end: float
+    origin: float
+    width: float
+    factors: Sequence[tuple[float, float]]
+    rows: Sequence[State]
+
+    def at(self, time: float) -> State:
+        """The states at a time."""
+        x = (time - self.origin) / self.width
+        values = self.rows[-1]
+        for (slope, offset), row in zip(self.factors[::-1], self.rows[-2::-1], strict=True):
+            factor = slope * x + offset
+            values = [value * factor + each for value, each in zip(values, row, strict=True)]
+        return values
+
+    def bounds(self, left: float, right: float) -> list[Bounds]:
+        """Bounds on each state between two times, by interval arithmetic."""
+        x, y = (left - self.origin) / self.width, (right - self.origin) / self.width
+        found = [(value, value) for value in self.rows[-1]]
+        for (slope, offset), row in zip(self.factors[::-1], self.rows[-2::-1], strict=True):
+            a, b = slope * x + offset, slope * y + offset
+            for number, ((low, high), each) in enumerate(zip(found, row, strict=True)):
+                products = (low * a, low * b, high * a, high * b)
+                found[number] = (min(products) + each, max(products) + each)
+        return found
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The error that a step may make, relative to each state and added to that, and how long it may be."""
+
+    relative: float
+    absolute: float
+    max_step: float
+
+
+class Stepper(ABC):
+    """A method that takes a solution on, step by step, from time 0.
+
+    ``time`` and ``state`` are where it stands.  ``order`` is that of the error, by which the first step is chosen.
+    """
+
+    def __init__(self, order: int, derivative: Derivative, state: State, limits: Limits) -> None:
+        self.derivative = derivative
+        self.limits = limits
+        self.time = 0.0
+        self.state = state
+        self.rates = derivative(0.0, state)
+        self.next_step = self._first_step(order)
+
+    @abstractmethod
+    def step(self) -> bool:
+        """Take one step; False if none is short enough."""
+
+    @abstractmethod
+    def piece(self) -> Piece:
+        """The solution along the latest step."""
+
+    def scale(self, *states: State) -> list[float]:
+        """The error that each state may have, by the largest of its values."""
+        relative, absolute = self.limits.relative, self.limits.absolute
+        sizes = map(abs, states[0]) if len(states) == 1 else (max(map(abs, each)) for each in zip(*states, strict=True))
+        return [absolute + relative * size for size in sizes]
+
+    @property
+    def least_step(self) -> float:
+        """The shortest step that moves the time well beyond rounding."""
+        return 10.0 * (math.nextafter(self.time, math.inf) - self.time)
+
+    def _first_step(self, order: int) -> float:
+        """Guess the first step, so that an Euler step would be about right (Hairer, Norsett, Wanner, II.4)."""
+        scale = self.scale(self.state)
+        size, speed = norm(self.state, scale), norm(self.rates, scale)
+        trial = 1e-6 if size < 1e-5 or speed < 1e-5 else 0.01 * size / speed
+        state = [value + trial * rate for value, rate in zip(self.state, self.rates, strict=True)]
+        change = [new - old for new, old in zip(self.derivative(trial, state), self.rates, strict=True)]
+        bend = norm(change, scale) / trial if trial else math.inf
+        if speed <= 1e-15 and bend <= 1e-15:
+            step = max(1e-6, trial * 1e-3)
+        else:
+            step = root_power(0.01 / max(speed, bend), 1.0 / (order + 1))
+        return min(100.0 * trial, step, self.limits.max_step)
+
+
+def stretch(error: float, safety: float, order: int) -> float:
+    """By which factor a step of this error may become longer, or must become shorter, for an error of 1."""
+    shrunk = root_power(error, 1.0 / (order + 1))
+    return safety / shrunk if shrunk else math.inf

@@ -1,0 +1,167 @@
+"""What one long run says of its own mean: an interval by batch means, and where its warm-up ends.
+
+Batches are kept in constant memory, however long the run is: as soon as there are too many, each two become one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from ..student import student_quantile
+
+BATCHES = 20  # more of them gain next to nothing (Schmeiser 1982)
+MOST = 1024  # that are kept
+OF_MSER = 5  # tokens in a batch
+LEAST_OF_MSER = 10  # batches
+SHAKY = 0.45  # two standard deviations of the autocorrelation of 20 numbers that have nothing to do with each other
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A confidence interval of a mean from one run; ``autocorrelation`` is that of the batch means, at lag 1."""
+
+    level: float
+    low: float
+    high: float
+    batches: int
+    autocorrelation: float
+
+    @property
+    def half(self) -> float:
+        """Half its width."""
+        return (self.high - self.low) / 2
+
+    @property
+    def is_shaky(self) -> bool:
+        """Whether the batch means hang together so much that only a longer run can be trusted."""
+        return self.autocorrelation > SHAKY
+
+
+class TokenBatches:
+    """Sums over batches of equally many tokens."""
+
+    def __init__(self) -> None:
+        self._size = 1
+        self._sums: list[float] = []
+        self._sum = 0.0
+        self._count = 0
+
+    def add(self, value: float) -> None:
+        """Take in a token."""
+        self._sum += value
+        self._count += 1
+        if self._count == self._size:
+            self._sums.append(self._sum)
+            self._sum, self._count = 0.0, 0
+            if len(self._sums) == MOST:
+                self._sums = _pairs(self._sums)
+                self._size *= 2
+
+    def batches(self) -> tuple[list[float], list[float]]:
+        """Their sums and weights; tokens that do not fill one are left out."""
+        return self._sums, [float(self._size)] * len(self._sums)
+
+
+class TimeBatches:
+    """Sums over slices of time of equal width (ns), from ``start`` on: of values times how long they stand there.
+
+    ``most`` slices are kept; if more are needed, each two become one.
+    """
+
+    def __init__(self, start: int, width: int = 1, most: int = MOST) -> None:
+        self._start, self._width, self._most = start, width, most
+        self._sums: list[float] = []
+        self._covered: list[float] = []  # for how long there was a value, in all ports together
+
+    def add(self, value: float, begin: int, end: int) -> None:
+        """Take in a value that stands from ``begin`` to ``end``, neither before the start."""
+        last = self._slice(end - 1)  # which may make them wider
+        first = (begin - self._start) // self._width
+        for index in range(first, last + 1):
+            edge = self._start + index * self._width
+            length = float(min(end, edge + self._width) - max(begin, edge))
+            self._sums[index] += value * length
+            self._covered[index] += length
+
+    def _slice(self, time: int) -> int:
+        """The number of the slice in which a time lies; there is one."""
+        while (index := (time - self._start) // self._width) >= self._most:
+            self._sums, self._covered = _pairs(self._sums), _pairs(self._covered)
+            self._width *= 2
+        if (missing := index + 1 - len(self._sums)) > 0:
+            self._sums += [0.0] * missing
+            self._covered += [0.0] * missing
+        return index
+
+    def count(self, time: int) -> None:
+        """Take in that something came, once."""
+        index = self._slice(time)
+        self._sums[index] += 1.0
+
+    def cover(self, end: int) -> None:
+        """All of the time until ``end`` was watched."""
+        self._slice(max(end - 1, self._start))
+        for index in range(len(self._covered)):
+            self._covered[index] = float(min(self._width, end - self._start - index * self._width))
+
+    def batches(self, end: int) -> tuple[list[float], list[float]]:
+        """Sums and weights of the slices that were over at ``end``, from the first on in which there was a value."""
+        full = min((end - self._start) // self._width, len(self._sums))
+        first = next((index for index in range(full) if self._covered[index] > 0), full)
+        return self._sums[first:full], self._covered[first:full]
+
+
+def _pairs(sums: Sequence[float]) -> list[float]:
+    """Each two of them together; the last one alone, perhaps."""
+    return [sums[index] + sums[index + 1] if index + 1 < len(sums) else sums[index] for index in range(0, len(sums), 2)]
+
+
+def batch_interval(sums: Sequence[float], weights: Sequence[float], value: float, level: float) -> Interval | None:
+    """The interval around a mean, by the means of 20 batches; None if there are too few numbers.
+
+    Student's interval with 19 degrees of freedom is widened by sqrt((1 + r) / (1 - r)), as if the batch means were an
+    autoregressive sequence; r is their autocorrelation at lag 1, less its bias, if that is above 0.
+    Source: A. M. Law, *Simulation Modeling and Analysis*, 9.5.3; for the widening, A. Tafazzoli et al. (2011), Skart.
+    """
+    size = len(sums) // BATCHES
+    if size == 0:
+        return None
+    first = len(sums) - size * BATCHES  # what is too much for equal batches is warm-up rather than anything else
+    means = []
+    for begin in range(first, len(sums), size):
+        weight = math.fsum(weights[begin : begin + size])
+        if weight == 0.0:
+            return None
+        means.append(math.fsum(sums[begin : begin + size]) / weight)
+    mean = math.fsum(means) / BATCHES
+    gaps = [each - mean for each in means]
+    squares = math.fsum(gap * gap for gap in gaps)
+    products = math.fsum(gap * other for gap, other in pairwise(gaps))
+    correlation = products / squares if squares > 0.0 else 0.0
+    known = min(max(correlation + 1.0 / BATCHES, 0.0), 0.99)
+    variance = squares / (BATCHES - 1) / BATCHES * (1.0 + known) / (1.0 - known)
+    half = student_quantile((1.0 + level) / 2.0, BATCHES - 1) * math.sqrt(variance)
+    return Interval(level, value - half, value + half, BATCHES, correlation)
+
+
+def mser(means: Sequence[float]) -> int | None:
+    """How many of the batches are warm-up: those without which the standard error of the mean is least.
+
+    That is the d with the least sum of (x - mean)^2 / (n - d)^2 over the n - d others.  None if it is in the second
+    half of the run, which is too short then.
+    Source: K. P. White, *An effective truncation heuristic for bias reduction in simulation output*, Simulation 69
+    (1997); K. P. White, M. J. Cobb, S. C. Spratt, WSC 2000.
+    """
+    mean, squares = 0.0, 0.0
+    best, least = 0, math.inf
+    for count in range(1, len(means) + 1):  # from the end on, so that each d costs one step
+        place = len(means) - count
+        gap = means[place] - mean
+        mean += gap / count
+        squares += gap * (means[place] - mean)
+        if count >= OF_MSER and squares / (count * count) <= least:
+            best, least = place, squares / (count * count)
+    return best if best <= len(means) // 2 else None

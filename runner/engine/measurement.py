@@ -1,0 +1,372 @@
+"""Measurement: a metric while the run goes on, and what it comes to in the end."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+from epicycle.actors import Quantity, to_nanoseconds, to_seconds
+from epicycle.actors.expression import Formula, operand
+
+from ..model import Metric
+from ..model.measure import MSER5, TIME, Measure
+from ..tables import short
+from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, Interval, TimeBatches, TokenBatches, batch_interval, mser
+from .statistic import statistic_of
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a metric came to.
+
+    ``missing`` says why there is no value, ``unsure`` why there is no interval where one was asked for; ``after`` is
+    the time (s) until which nothing counted.
+    """
+
+    value: Any = None
+    missing: str = ""
+    interval: Interval | None = None
+    unsure: str = ""
+    after: float = 0.0
+
+    def shown(self, show: Callable[[Any], str]) -> str:
+        """The value with its interval, as ``show`` writes numbers."""
+        if self.value is None:
+            return "-"
+        return show(self.value) + (f" ± {self.interval.half:.2g}" if self.interval is not None else "")
+
+    def plain(self) -> dict[str, Any]:
+        """What there is to say beside the value, for programs."""
+        found: dict[str, Any] = {"after": self.after} if self.after else {}
+        found |= {key: said for key, said in (("missing", self.missing), ("unsure", self.unsure)) if said}
+        return found if self.interval is None else {**found, **asdict(self.interval)}
+
+    @property
+    def remarks(self) -> list[str]:
+        """What people should know of the value."""
+        if self.missing:
+            return [f"no value, because {self.missing}"]
+        found = []
+        if self.interval is not None:
+            found.append(
+                f"{100 * self.interval.level:.6g} % interval, autocorrelation {self.interval.autocorrelation:.2f}"
+                + (" (too much: make the run longer)" if self.interval.is_shaky else "")
+            )
+        if self.unsure:
+            found.append(f"no interval, because {self.unsure}")
+        if self.after:
+            found.append(f"after {self.after:.6g} s")
+        return found
+
+
+@dataclass(frozen=True)
+class _Unfit:
+    """Stands for a token that cannot be measured; the reason follows 'because'."""
+
+    reason: str
+
+
+class Measurement:
+    """Takes in what the ports of a metric send."""
+
+    def __init__(self, metric: Metric) -> None:
+        self._measure = metric.measure
+        self._ports = metric.ports
+        self._kept: _Kept | None = None
+        self._is_beyond = False  # of all numbers
+        self._taking: _Taking = _taking(self._measure, metric.ports, 0)
+        if metric.measure.after == MSER5:
+            self._kept = _Kept(metric.ports)
+        else:
+            assert isinstance(metric.measure.after, float)
+            self._taking = _taking(self._measure, metric.ports, to_nanoseconds(metric.measure.after))
+
+    def add(self, port: str, time: int, token: Any) -> None:
+        """Take in a token at a time (ns)."""
+        value = _measured(self._measure, token)
+        if isinstance(value, _Unfit):
+            value = _Unfit(f"{port} sent {value.reason} at {to_seconds(time):.9g} s")
+        try:
+            if self._kept is None:
+                self._taking.add(port, time, value)
+            else:
+                self._kept.add(port, time, value)
+        except OverflowError:
+            self._is_beyond = True
+
+    def outcome(self, end: int) -> Outcome:
+        """What it has come to at a time (ns) up to which nothing more will come."""
+        beyond = Outcome(missing="it is beyond all numbers")
+        try:
+            found = beyond if self._is_beyond else self._outcome(end)
+        except (OverflowError, ValueError):  # of sums: infinity, or infinity less infinity
+            return beyond
+        if isinstance(found.value, float) and not math.isfinite(found.value) and self._measure.take not in _AS_SENT:
+            return beyond
+        return self._converted(found)
+
+    def _outcome(self, end: int) -> Outcome:
+        if self._kept is None:
+            return self._taking.outcome(end)
+        taking = self._kept.settled(self._measure, self._ports, end)
+        return Outcome(missing=taking) if isinstance(taking, str) else taking.outcome(end)
+
+    def _converted(self, found: Outcome) -> Outcome:
+        unit, to = self._measure.own_unit, self._measure.to
+        if not to or isinstance(found.value, bool) or not isinstance(found.value, (int, float)):
+            return found
+        interval = found.interval
+        if interval is not None:
+            low, high = (Quantity(each, unit).to(to) for each in (interval.low, interval.high))
+            interval = replace(interval, low=low, high=high)
+        return replace(found, value=Quantity(found.value, unit).to(to), interval=interval)
+
+
+_AS_SENT = ("first", "last", "min", "max")  # of which infinity is a value as any other
+
+
+def _measured(measure: Measure, token: Any) -> Any:
+    """What counts of a token, or ``_Unfit`` with what the port sent."""
+    if measure.take in ("first", "last", "count", "rate"):
+        return token
+    if measure.when is not None:
+        return (_known if isinstance(token, (int, str)) else _holds)(measure.when, token)
+    if isinstance(token, str):  # some of which float() reads
+        return _Unfit(f"{short(token)}, which is no number,")
+    try:
+        number = float(token)
+    except Exception:
+        return _Unfit(f"{short(token)}, which is no number,")
+    if math.isnan(number) or (math.isinf(number) and measure.take not in _AS_SENT):
+        return _Unfit(f"{number}")
+    return token if measure.take in (*_AS_SENT, "sum") else number
+
+
+def _holds(when: Formula, token: Any) -> float | _Unfit:
+    """Whether a condition holds for a token: 1 or 0."""
+    try:
+        return float(bool(when({"value": operand(token)})))
+    except Exception as error:
+        return _Unfit(f"{short(token)}, of which {when.source!r} cannot be told ({error}),")
+
+
+_known = lru_cache(maxsize=1024, typed=True)(_holds)  # states come again and again
+
+
+# -- tokens, each of which counts as much ---------------------------------------------------------------------------
+
+
+class _Tokens:
+    """Takes tokens from a time on."""
+
+    def __init__(self, measure: Measure, start: int) -> None:
+        self.start = start
+        self.count = 0
+        self._measure = measure
+        self._statistic = statistic_of(measure)
+        self._batches = TokenBatches() if measure.interval is not None else None
+        self._unfit = ""
+
+    def add(self, port: str, time: int, value: Any) -> None:
+        if time < self.start:
+            return
+        self.count += 1
+        if isinstance(value, _Unfit):
+            self._unfit = self._unfit or value.reason
+            return
+        self._statistic.add(value, 1)
+        if self._batches is not None:
+            self._batches.add(value)
+
+    def outcome(self, end: int) -> Outcome:
+        found = self._statistic.value
+        if missing := self._unfit or _too_short(self.start, end):
+            return Outcome(missing=missing)
+        after = to_seconds(self.start)
+        if found is None:
+            few = "no token came" if self.count == 0 else "one token has no spread"
+            return Outcome(missing=few + (f" after {after:.6g} s" if after else ""))
+        if self._batches is None:
+            return Outcome(found, after=after)
+        return _with_interval(found, self._batches.batches(), self._measure, self.count, after)
+
+
+# -- spells of time: each value counts for as long as it stands -----------------------------------------------------
+
+
+class _Spells:
+    """Takes what stands at ports, from a time on."""
+
+    def __init__(self, measure: Measure, ports: Iterable[str], start: int, batches: TimeBatches | None = None) -> None:
+        self.start = start
+        self._measure = measure
+        self._statistic = statistic_of(measure)
+        self._batches = batches
+        if batches is None and measure.interval is not None:
+            self._batches = TimeBatches(start)
+        self._unfit = ""
+        self._count = 0
+        self._weight = 0
+        self._open: dict[str, tuple[int, Any]] = {}
+        if measure.initial is not None:
+            value = _measured(measure, measure.initial)
+            self._open = dict.fromkeys(ports, (0, value))
+
+    def add(self, port: str, time: int, value: Any) -> None:
+        self._count += time >= self.start
+        self._close(port, time)
+        self._open[port] = (time, value)
+
+    def _close(self, port: str, time: int) -> None:
+        since, value = self._open.get(port, (time, None))
+        begin = max(since, self.start)
+        if time <= begin:
+            return
+        if isinstance(value, _Unfit):
+            self._unfit = self._unfit or value.reason
+            return
+        self._weight += time - begin
+        self._statistic.add(value, time - begin)
+        if self._batches is not None:
+            self._batches.add(value, begin, time)
+
+    def close(self, end: int) -> None:
+        """What stands now stands until the end."""
+        for port in self._open:
+            self._close(port, end)
+
+    def outcome(self, end: int) -> Outcome:
+        self.close(end)
+        if missing := self._unfit or _too_short(self.start, end):
+            return Outcome(missing=missing)
+        found = self._statistic.value
+        if found is None:
+            return Outcome(missing="no time passed after the first token" if self._open else "no token came")
+        after = to_seconds(self.start)
+        if self._measure.interval is None or self._batches is None:
+            return Outcome(found, after=after)
+        return _with_interval(found, self._batches.batches(end), self._measure, self._count, after)
+
+
+class _Arrivals:
+    """Counts tokens in time, from a time on."""
+
+    def __init__(self, measure: Measure, start: int, batches: TimeBatches | None = None) -> None:
+        self.start = start
+        self._measure = measure
+        self._count = 0
+        self._batches = batches or TimeBatches(start)
+
+    def add(self, port: str, time: int, value: Any) -> None:
+        if time >= self.start:
+            self._count += 1
+            self._batches.count(time)
+
+    def close(self, end: int) -> None:
+        self._batches.cover(end)
+
+    def outcome(self, end: int) -> Outcome:
+        if missing := _too_short(self.start, end):
+            return Outcome(missing=missing)
+        if end == self.start:
+            return Outcome(missing="no time passed")
+        found, after = self._count / to_seconds(end - self.start), to_seconds(self.start)
+        if self._measure.interval is None:
+            return Outcome(found, after=after)
+        self.close(end)
+        sums, covered = self._batches.batches(end)
+        return _with_interval(found, (sums, [each / 1e9 for each in covered]), self._measure, self._count, after)
+
+
+_Taking: TypeAlias = _Tokens | _Spells | _Arrivals
+
+
+def _taking(measure: Measure, ports: Iterable[str], start: int) -> _Taking:
+    if measure.take == "rate":
+        return _Arrivals(measure, start)
+    return _Spells(measure, ports, start) if measure.kind.over == TIME else _Tokens(measure, start)
+
+
+def _too_short(start: int, end: int) -> str:
+    if end >= start:
+        return ""
+    return f"the run ended at {to_seconds(end):.6g} s, before its warm-up of {to_seconds(start):.6g} s was over"
+
+
+def _with_interval(
+    value: float, batches: tuple[list[float], list[float]], measure: Measure, count: int, after: float
+) -> Outcome:
+    assert measure.interval is not None
+    found = batch_interval(*batches, value, measure.interval) if count >= BATCHES else None
+    unsure = "" if found is not None else f"{count} tokens are too few for {BATCHES} batches"
+    return Outcome(value, interval=found, unsure=unsure, after=after)
+
+
+# -- a warm-up that has to be found ---------------------------------------------------------------------------------
+
+
+class _Kept:
+    """Keeps what came, until it is known where the warm-up ended."""
+
+    def __init__(self, ports: list[str]) -> None:
+        self._names = ports
+        self._numbers = {port: number for number, port in enumerate(ports)}
+        self._ports = array("l")
+        self._times = array("q")
+        self._values = array("d")
+        self._unfit = ""
+
+    def add(self, port: str, time: int, value: Any) -> None:
+        if isinstance(value, _Unfit):
+            self._unfit = self._unfit or value.reason
+            return
+        self._ports.append(self._numbers[port])
+        self._times.append(time)
+        self._values.append(0.0 if isinstance(value, str) else float(value))  # of arrivals only the times count
+
+    def settled(self, measure: Measure, ports: list[str], end: int) -> _Taking | str:
+        """What has taken all that came after the warm-up; or why there is none."""
+        count = len(self._times)
+        if self._unfit:
+            return self._unfit
+        if count < LEAST_OF_MSER * OF_MSER:
+            return f"MSER-5 needs {LEAST_OF_MSER * OF_MSER} tokens, and {count} came"
+        pieces = count // OF_MSER
+        skipped, start = 0, 0
+        if measure.kind.over == TIME:
+            origin = 0 if measure.take == "rate" or measure.initial is not None else self._times[0]
+            width = (end - origin) // pieces
+            if width == 0:
+                return "MSER-5 needs time between tokens"
+            slices = TimeBatches(origin, width, pieces + 1)
+            trial = self._replayed(
+                _Arrivals(measure, origin, slices)
+                if measure.take == "rate"
+                else _Spells(measure, ports, origin, slices),
+                until=origin + pieces * width,
+            )
+            assert not isinstance(trial, _Tokens)
+            trial.close(origin + pieces * width)
+            sums, covered = slices.batches(origin + pieces * width)
+            means = [each / weight for each, weight in zip(sums, covered, strict=True) if weight]
+        else:
+            places = range(0, pieces * OF_MSER, OF_MSER)
+            means = [math.fsum(self._values[place : place + OF_MSER]) / OF_MSER for place in places]
+        if (found := mser(means)) is None:
+            return "it does not settle in the first half of the run, says MSER-5: make it longer"
+        if measure.kind.over == TIME:
+            start = origin + found * width
+        else:
+            skipped = found * OF_MSER
+            start = self._times[skipped] if skipped else 0
+        return self._replayed(_taking(measure, ports, start), skipped)
+
+    def _replayed(self, taking: _Taking, skipped: int = 0, until: int | None = None) -> _Taking:
+        for place in range(skipped, len(self._times)):
+            if until is None or self._times[place] < until:
+                taking.add(self._names[self._ports[place]], self._times[place], self._values[place])
+        return taking

@@ -1,0 +1,161 @@
+"""What a metric takes from what a port sends, declared once: for the reader, its messages, the schema and the docs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from epicycle.actors import Configurable, Parameter, ParameterError, Quantity, UnitError, did_you_mean, parse_unit
+from epicycle.actors.expression import Formula, FormulaParameter
+
+MSER5 = "mser5"
+TOKENS, TIME = "tokens", "time"  # over what something is taken
+
+
+@dataclass(frozen=True)
+class Take:
+    """A kind of metric: whether tokens count or the time that each stands, and what else may be said of it.
+
+    ``unit`` is what it counts in, if that does not hang on the tokens.
+    """
+
+    over: str
+    doc: str
+    of: str = "numbers"  # or "any" tokens, or "single" values: numbers and texts
+    options: tuple[str, ...] = ()  # beside 'after', 'to' and what is said of all metrics
+    needs: str = ""  # an option without which it says nothing
+    unit: str = ""
+    settles: bool = True  # whether MSER-5 can tell when it has settled
+
+
+TAKES = {
+    "last": Take(TOKENS, "the last one", of="single", settles=False),
+    "first": Take(TOKENS, "the first one", of="single", settles=False),
+    "count": Take(TOKENS, "how many there are", of="any", settles=False),
+    "min": Take(TOKENS, "the least"),
+    "max": Take(TOKENS, "the greatest"),
+    "sum": Take(TOKENS, "their sum"),
+    "mean": Take(TOKENS, "their mean: each token counts the same, however long it stands", options=("interval",)),
+    "std": Take(TOKENS, "their standard deviation, sqrt(sum((x - mean)^2) / (n - 1))"),
+    "quantile": Take(
+        TOKENS,
+        "the number below which a share p of them lies, interpolated: type 7 of Hyndman and Fan, NumPy's default",
+        options=("p",),
+        needs="p",
+    ),
+    "rate": Take(TIME, "how many there are per second of model time", of="any", options=("interval",), unit="1/s"),
+    "time_mean": Take(
+        TIME, "the mean over time: each value counts as long as it stands", options=("initial", "interval")
+    ),
+    "time_std": Take(TIME, "the standard deviation over time, sqrt(mean of (x - time_mean)^2)", options=("initial",)),
+    "time_quantile": Take(
+        TIME,
+        "the least value such that the signal is no greater for a share p of the time",
+        options=("p", "initial"),
+        needs="p",
+    ),
+    "share": Take(
+        TIME,
+        "the share of the time in which 'when' holds",
+        of="any",
+        options=("when", "initial", "interval"),
+        needs="when",
+        unit="1",
+    ),
+}
+
+
+class WarmUpParameter(Parameter[float | str]):
+    """A time in s, or ``mser5``."""
+
+    def __init__(self, default: float, *, doc: str) -> None:
+        super().__init__(float | str, default, unit="s", doc=doc)
+        self.forms = (Parameter(float, unit="s", min=0.0), Parameter(str, choices=(MSER5,)))
+
+    def describe_type(self) -> str:
+        return f"number or {MSER5}"
+
+    def convert(self, value: object) -> float | str | None:
+        if value == MSER5:
+            return MSER5
+        try:
+            return self.forms[0].convert(value)
+        except ParameterError:
+            if isinstance(value, str) and (guess := did_you_mean(value, [MSER5])):
+                raise ParameterError(f"{value!r} is neither a time nor {MSER5}{guess}") from None
+            raise
+
+
+class Measure(Configurable):
+    """What is said of a metric beside its name and the ports that it is of."""
+
+    take = Parameter(str, "last", choices=tuple(TAKES), doc="what is taken from the tokens")
+    p: Parameter[float | None] = Parameter(
+        float, None, unit="1", min=0.0, max=1.0, doc="which quantile; 0.5 is the median"
+    )
+    when: Parameter[Formula | None] = FormulaParameter(  # type: ignore[assignment]
+        None, doc="a condition on 'value', such as value > 0 or value == 'busy'"
+    )
+    initial: Parameter[object] = Parameter(
+        object, None, doc="what holds before the first token; if left out, time counts from that token on"
+    )
+    after = WarmUpParameter(0.0, doc="the warm-up, which does not count: how long it is, or mser5, which finds out")
+    interval: Parameter[float | None] = Parameter(
+        float, None, unit="1", min=0.5, max=0.9999, doc="level of a confidence interval, by batch means"
+    )
+    unit = Parameter(str, "", doc="what the tokens count in")
+    to = Parameter(str, "", doc="the unit in which the metric is given (default: that of the tokens)")
+    doc = Parameter(str, "", doc="what it is")
+
+    @property
+    def kind(self) -> Take:
+        """What is declared of its ``take``."""
+        return TAKES[self.take]
+
+    @property
+    def own_unit(self) -> str:
+        """What it counts in before it is converted."""
+        return self.kind.unit or self.unit
+
+    def misfits(self) -> Iterator[tuple[str, str, str]]:
+        """What does not go together: the option, what is wrong, and what to do."""
+        kind = self.kind
+        for option in ("p", "when", "initial", "interval"):
+            if getattr(self, option) is not None and option not in kind.options:
+                others = ", ".join(name for name, each in TAKES.items() if option in each.options)
+                yield option, f"{option!r} does not go with {self.take!r}", f"it goes with {others}"
+        if kind.needs and getattr(self, kind.needs) is None:
+            example = "p: 0.9" if kind.needs == "p" else "when: value > 0"
+            yield "take", f"{self.take!r} needs {kind.needs!r}", f"add '{example}' or the like"
+        if self.when is not None and self.when.names != ("value",):
+            yield "when", f"{self.when.source!r} is no condition on 'value'", "write 'value > 0' or the like"
+        if self.after == MSER5 and not kind.settles:
+            yield "after", f"{MSER5} cannot tell when {self.take!r} has settled", "give the warm-up as a time"
+        is_number = isinstance(self.initial, (bool, int, float))
+        if self.initial is not None and kind.of == "numbers" and not is_number:
+            yield "initial", f"initial: {self.initial!r} is not a number", ""
+        if kind.unit and self.unit not in ("", kind.unit):
+            yield "unit", f"{self.take!r} counts in {kind.unit}", f"write 'to: {self.unit}'"
+        elif problem := conversion_problem(self.own_unit, self.to):
+            yield "to", *problem
+
+
+def take_problem(metric: str, take: str) -> tuple[str, str] | None:
+    """What is wrong with a kind of metric that there is not, and what to do; None if there is one."""
+    if take in TAKES:
+        return None
+    return f"metric {metric!r} cannot take {take!r}{did_you_mean(take, TAKES)}", f"valid: {', '.join(TAKES)}"
+
+
+def conversion_problem(unit: str, to: str) -> tuple[str, str] | None:
+    """Why numbers in one unit cannot be given in another, and what to do; None if they can."""
+    if not to:
+        return None
+    if not unit:
+        return f"there is no unit that could be converted to {to}", "add 'unit: ...', what it counts in before"
+    try:
+        parse_unit(to)  # a unit that is not known is told as such
+        Quantity(1.0, unit).to(to)
+    except UnitError as error:
+        return str(error), ""
+    return None

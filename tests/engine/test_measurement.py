@@ -1,0 +1,409 @@
+"""Metrics are what their definitions say, over tokens and over time; where there is no value, the reason is told."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from epicycle.runner.engine.batches import MOST, TimeBatches, TokenBatches, mser
+from epicycle.runner.engine.measurement import Measurement, Outcome
+from epicycle.runner.engine.statistic import Total
+from epicycle.runner.model import Metric
+from epicycle.runner.model.measure import TAKES, Measure
+from epicycle.runner.show import summary_object
+from tests.engine.engine_parts import simulate
+
+SECOND = 10**9
+NUMBERS = st.floats(-1e6, 1e6) | st.integers(-1000, 1000)
+GAPS = st.integers(0, 5 * SECOND)  # ns between tokens; 0: two at one time
+SEQUENCES = st.lists(st.tuples(GAPS, NUMBERS), min_size=1, max_size=40)
+
+
+def measured(tokens: list[tuple[str, int, Any]], end: int, ports: tuple[str, ...] = ("a.out",), **said: Any) -> Outcome:
+    """What a metric comes to over tokens of ports at times in ns."""
+    measurement = Measurement(Metric("m", list(ports), Measure(**said)))
+    for port, time, token in tokens:
+        measurement.add(port, time, token)
+    return measurement.outcome(end)
+
+
+def timed(sequence: list[tuple[int, Any]]) -> list[tuple[str, int, Any]]:
+    """Tokens at their times, from the gaps between them."""
+    time, found = 0, []
+    for gap, value in sequence:
+        time += gap
+        found.append(("a.out", time, value))
+    return found
+
+
+def spells(tokens: list[tuple[str, int, Any]], start: int, end: int) -> list[tuple[Any, int]]:
+    """Each value with the ns for which it stands between start and end."""
+    edges = [time for _, time, _ in tokens[1:]] + [end]
+    return [
+        (value, min(edge, end) - max(time, start))
+        for (_, time, value), edge in zip(tokens, edges, strict=True)
+        if min(edge, end) > max(time, start)
+    ]
+
+
+@given(SEQUENCES, st.integers(0, 5 * SECOND), st.sampled_from([0.0, 2.5]))
+def test_what_counts_time_is_weighted_by_it(sequence: list[tuple[int, Any]], rest: int, after: float) -> None:
+    tokens = timed(sequence)
+    end = tokens[-1][1] + rest
+    stands = spells(tokens, round(after * SECOND), end)
+    total = sum(length for _, length in stands)
+    if total == 0:
+        assert measured(tokens, end, take="time_mean", after=after).value is None
+        return
+    mean = sum(Fraction(value) * length for value, length in stands) / total
+    variance = sum((Fraction(value) - mean) ** 2 * length for value, length in stands) / total
+    scale = max(abs(value) for value, _ in stands) or 1.0
+    assert measured(tokens, end, take="time_mean", after=after).value == pytest.approx(float(mean), abs=1e-14 * scale)
+    found = measured(tokens, end, take="time_std", after=after).value
+    assert found == pytest.approx(math.sqrt(variance), rel=1e-9, abs=1e-7 * scale)
+    positive = sum(length for value, length in stands if value > 0)
+    assert measured(tokens, end, take="share", when="value > 0", after=after).value == positive / total
+    for p in (0.0, 0.3, 0.5, 1.0):
+        quantile = measured(tokens, end, take="time_quantile", p=p, after=after).value
+        assert sum(length for value, length in stands if value <= quantile) >= Fraction(p) * total
+        assert sum(length for value, length in stands if value < quantile) < max(Fraction(p) * total, 1)
+    if end > round(after * SECOND):
+        late = sum(time >= round(after * SECOND) for _, time, _ in tokens)
+        rate = measured(tokens, end, take="rate", after=after).value
+        assert rate == pytest.approx(late * SECOND / (end - round(after * SECOND)))
+
+
+@given(SEQUENCES, st.sampled_from([0.0, 2.5]))
+def test_what_counts_tokens_is_numpys(sequence: list[tuple[int, Any]], after: float) -> None:
+    tokens = timed(sequence)
+    end = max(tokens[-1][1], 3 * SECOND)
+    values = [float(value) for _, time, value in tokens if time >= after * SECOND]
+    found = {
+        take: measured(tokens, end, take=take, after=after).value
+        for take in ("count", "sum", "min", "max", "mean", "std")
+    }
+    assert found["count"] == len(values)
+    assert found["sum"] == math.fsum(values)
+    if not values:
+        assert (found["mean"], found["std"], found["min"]) == (None, None, None)
+        return
+    assert (found["min"], found["max"]) == (min(values), max(values))
+    assert found["mean"] == math.fsum(values) / len(values)
+    if len(values) > 1:
+        assert found["std"] == pytest.approx(np.std(values, ddof=1), rel=1e-9, abs=1e-6)
+    for p in (0.0, 0.1, 0.5, 0.9, 1.0):
+        quantile = measured(tokens, end, take="quantile", p=p, after=after).value
+        assert quantile == pytest.approx(np.quantile(values, p), rel=1e-12, abs=1e-9)
+
+
+def test_the_mean_of_a_queues_size_is_one_over_time() -> None:
+    """Two come at once, both are gone a second later, and then nothing happens for nine seconds."""
+    tokens = [("q.size", 0, 1), ("q.size", 0, 2), ("q.size", SECOND, 1), ("q.size", SECOND, 0)]
+    assert measured(tokens, 10 * SECOND, ("q.size",), take="mean").value == 1.0
+    assert measured(tokens, 10 * SECOND, ("q.size",), take="time_mean").value == 0.2
+    assert measured(tokens, 10 * SECOND, ("q.size",), take="share", when="value == 2").value == 0.1
+
+
+def test_what_holds_before_the_first_token_is_given_or_does_not_count() -> None:
+    tokens = [("a.out", 6 * SECOND, 4)]
+    assert measured(tokens, 10 * SECOND, take="time_mean").value == 4.0
+    assert measured(tokens, 10 * SECOND, take="time_mean", initial=0).value == 1.6
+    assert measured([], 10 * SECOND, take="time_mean", initial=3).value == 3.0
+    assert measured(tokens, 10 * SECOND, take="share", when="value == 'up'", initial="up").value == 0.6
+
+
+def test_of_several_ports_each_counts_for_its_own_time() -> None:
+    tokens = [("a", 0, 1), ("b", 5 * SECOND, 4)]
+    ports = ("a", "b")
+    assert measured(tokens, 10 * SECOND, ports, take="time_mean").value == 2.0  # (10 * 1 + 5 * 4) / 15
+    assert measured(tokens, 10 * SECOND, ports, take="time_mean", initial=0).value == 1.5
+    assert measured(tokens, 10 * SECOND, ports, take="rate").value == 0.2
+
+
+@pytest.mark.parametrize(
+    ("said", "tokens", "missing"),
+    [
+        ({"take": "mean"}, [], "no token came"),
+        ({"take": "time_mean"}, [], "no token came"),
+        ({"take": "quantile", "p": 0.5, "after": 1.0}, [(0, 1.0)], "no token came after 1 s"),
+        ({"take": "std"}, [(0, 1.0)], "one token has no spread"),
+        ({"take": "time_mean"}, [(2, 1.0)], "no time passed after the first token"),
+        ({"take": "mean", "after": 9.0}, [(0, 1.0)], "the run ended at 2 s, before its warm-up of 9 s was over"),
+        ({"take": "rate", "after": 9.0}, [(0, 1.0)], "the run ended at 2 s, before its warm-up of 9 s was over"),
+        ({"take": "rate", "after": 2.0}, [], "no time passed"),
+        ({"take": "mean"}, [(1, math.nan)], "a.out sent nan at 1 s"),
+        ({"take": "max"}, [(1, math.nan)], "a.out sent nan at 1 s"),
+        ({"take": "time_std"}, [(0, 1.0), (1, -math.inf)], "a.out sent -inf at 1 s"),
+        ({"take": "sum"}, [(1, "many")], "a.out sent many, which is no number, at 1 s"),
+        ({"take": "mean"}, [(1, np.zeros(2))], "a.out sent [0, 0], which is no number, at 1 s"),
+        ({"take": "mean"}, [(0, 1e308), (1, 1e308)], "it is beyond all numbers"),
+        ({"take": "sum"}, [(0, 10**400)], "a.out sent " + repr(10**400)[:97] + "..., which is no number, at 0 s"),
+        ({"take": "std"}, [(0, 1e300), (1, -1e300)], "it is beyond all numbers"),
+        ({"take": "mean", "after": "mser5"}, [(0, 1.0)], "MSER-5 needs 50 tokens, and 1 came"),
+        ({"take": "time_mean", "after": "mser5"}, [(1, 1.0)] * 60, "MSER-5 needs time between tokens"),
+        (
+            {"take": "mean", "after": "mser5"},
+            [(1, float(each)) for each in range(100)],
+            "it does not settle in the first half of the run, says MSER-5: make it longer",
+        ),
+        (
+            {"take": "share", "when": "value > 0"},
+            [(0, "up")],
+            (
+                "a.out sent up, of which 'value > 0' cannot be told ('value > 0': value > 0: > cannot compare a text "
+                "with a number, with value = 'up'), at 0 s"
+            ),
+        ),
+    ],
+)  # fmt: skip
+def test_why_there_is_no_value(said: dict[str, Any], tokens: list[tuple[int, Any]], missing: str) -> None:
+    end = SECOND if "time between" in missing else 2 * SECOND
+    found = measured([("a.out", time * SECOND, token) for time, token in tokens], end, **said)
+    assert found.missing == missing
+    assert (found.value, found.interval) == (None, None)
+    assert found.remarks == [f"no value, because {missing}"]
+
+
+def test_what_came_before_the_warm_up_was_over_spoils_nothing() -> None:
+    tokens = [("a.out", 0, math.nan), ("a.out", SECOND, 1.0), ("a.out", 2 * SECOND, 3.0)]
+    assert measured(tokens, 3 * SECOND, take="mean", after=1.0).value == 2.0
+    assert measured(tokens, 3 * SECOND, take="time_mean", after=1.0).value == 2.0
+    assert measured(tokens, 3 * SECOND, take="time_mean", after=0.5).missing == "a.out sent nan at 0 s"
+
+
+def test_a_run_is_not_lost_for_a_metric_of_something_odd() -> None:
+    _, results = simulate(
+        "actors: {t: {type: Ticker, limit: 3}, odd: {type: Spread}, probe: {type: Probe}}\n"
+        "connections: [t.output -> odd.input, odd.output -> probe.input]\n"
+        "metrics: {up: {of: odd.output, take: share, when: value > 0}, last: {of: odd.output, take: count}}",
+        until=2.5,
+    )
+    assert results.metrics["up"] is None
+    assert results.outcomes["up"].missing.startswith("odd.output sent 0/0, of which 'value > 0' cannot be told")
+    assert results.metrics["last"] == 3
+
+
+def test_time_runs_until_the_stop_time_only_if_that_ended_the_run() -> None:
+    text = (
+        "actors: {{t: {{type: Ticker, limit: {limit}}}}}\n"
+        "metrics: {{mean: {{of: t.output, take: time_mean}}, rate: {{of: t.output, take: rate}}}}"
+    )
+    _, results = simulate(text.format(limit=100), until=2.5)
+    assert results.stopped == "stop time"
+    assert results.metrics == {"mean": 0.8, "rate": 1.2}  # (0 + 1 + 2 / 2) / 2.5, 3 / 2.5
+    _, results = simulate(text.format(limit=3), until=2.5)
+    assert results.stopped == "no events left"
+    assert results.metrics == {"mean": 0.5, "rate": 1.5}  # at 2 s all is over
+
+
+# -- how it is kept ---------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.floats(-1e200, 1e200, allow_subnormal=True), max_size=60), st.integers(1, 40))
+def test_sums_are_exact_however_many_there_are(values: list[float], times: int) -> None:
+    total = Total()
+    for value in values * times:
+        total.add(value)
+    assert total.value == float(sum(map(Fraction, values)) * times)
+
+
+@given(st.lists(st.tuples(st.integers(0, 10**12), st.integers(0, 10**11), st.integers(-9, 9)), max_size=30))
+@settings(max_examples=60)
+def test_slices_of_time_hold_what_stood_in_them(spans: list[tuple[int, int, int]]) -> None:
+    batches = TimeBatches(0)
+    for begin, length, value in spans:
+        if length:
+            batches.add(float(value), begin, begin + length)
+    end = max((begin + length for begin, length, _ in spans), default=0)
+    sums, covered = batches.batches(end)
+    assert len(sums) <= MOST
+    width = batches._width
+    first = end // width - len(sums)
+    for index, (found, weight) in enumerate(zip(sums, covered, strict=True)):
+        low, high = (first + index) * width, (first + index + 1) * width
+        inside = [(value, min(begin + length, high) - max(begin, low)) for begin, length, value in spans]
+        assert found == sum(value * length for value, length in inside if length > 0)
+        assert weight == sum(length for _, length in inside if length > 0)
+
+
+def test_batches_of_tokens_stay_few() -> None:
+    batches = TokenBatches()
+    for value in range(100_000):
+        batches.add(float(value))
+    sums, weights = batches.batches()
+    assert MOST // 2 <= len(sums) < MOST
+    size = int(weights[0])
+    assert sums == [float(sum(range(at * size, (at + 1) * size))) for at in range(len(sums))]
+
+
+# -- warm-up ----------------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.integers(-50, 50).map(float), min_size=10, max_size=40))
+def test_mser_is_its_definition(means: list[float]) -> None:
+    def error(cut: int) -> Fraction:
+        rest = [Fraction(each) for each in means[cut:]]
+        mean = sum(rest) / len(rest)
+        return sum((each - mean) ** 2 for each in rest) / len(rest) ** 2
+
+    errors = {cut: error(cut) for cut in range(len(means) - 4)}  # a mean of fewer than five says nothing
+    least = min(errors.values())
+    found = mser(means)
+    good = [cut for cut, value in errors.items() if float(value) == pytest.approx(float(least), rel=1e-9)]
+    assert (found in good) or (found is None and max(good) > len(means) // 2)
+
+
+def test_mser_cuts_off_what_has_not_settled() -> None:
+    assert mser([9.0, 5.0, 3.0] + [1.0, 2.0] * 20) == 3
+    assert mser([1.0] * 40) == 0
+    assert mser([float(each) for each in range(40)]) is None
+
+
+def test_a_warm_up_that_is_found_is_told() -> None:
+    values = [100.0] * 20 + [1.0, 3.0] * 200
+    tokens = [("a.out", place * SECOND, value) for place, value in enumerate(values)]
+    found = measured(tokens, 420 * SECOND, take="mean", after="mser5", interval=0.95)
+    assert (found.value, found.after) == (2.0, 20.0)
+    assert found.remarks[-1] == "after 20 s"
+    over_time = measured(tokens, 420 * SECOND, take="time_mean", after="mser5")
+    assert (over_time.value, over_time.after) == (2.0, 20.0)
+    # Hardly anything comes at first, and then two a second.
+    slow = [("a.out", place * 20 * SECOND, 0) for place in range(5)]
+    rush = [("a.out", 100 * SECOND + place * SECOND // 2, 0) for place in range(800)]
+    rate = measured(slow + rush, 500 * SECOND, take="rate", after="mser5")
+    assert rate.value == pytest.approx(2.0, rel=0.01)
+    assert 95 <= rate.after <= 110
+
+
+# -- intervals --------------------------------------------------------------------------------------------------------
+
+
+def test_interval_by_hand() -> None:
+    values = [1.0, 2.0, 4.0, 3.0] * 5
+    tokens = [("a.out", place * SECOND, value) for place, value in enumerate(values)]
+    found = measured(tokens, 20 * SECOND, take="mean", interval=0.95).interval
+    assert found is not None
+    deviations = np.array(values) - 2.5
+    correlation = float((deviations[1:] * deviations[:-1]).sum() / (deviations**2).sum())
+    assert found.autocorrelation == pytest.approx(correlation)
+    widening = max(correlation + 0.05, 0.0)
+    half = 2.0930240544 * np.std(values, ddof=1) / math.sqrt(20) * math.sqrt((1 + widening) / (1 - widening))
+    assert (found.low, found.high) == (pytest.approx(2.5 - half), pytest.approx(2.5 + half))
+    assert (found.batches, found.level, found.is_shaky) == (20, 0.95, False)
+
+
+def test_too_few_tokens_have_no_interval_and_too_short_a_run_is_told() -> None:
+    tokens = [("a.out", place * SECOND, float(place)) for place in range(40)]
+    found = measured(tokens[:19], 19 * SECOND, take="mean", interval=0.9)
+    assert (found.value, found.interval) == (9.0, None)
+    assert found.remarks == ["no interval, because 19 tokens are too few for 20 batches"]
+    found = measured(tokens, 40 * SECOND, take="time_mean", interval=0.9)
+    assert found.remarks == ["90 % interval, autocorrelation 0.85 (too much: make the run longer)"]
+    same = measured([("a.out", place, 3.0) for place in range(40)], 40, take="mean", interval=0.9)
+    assert same.interval is not None
+    assert (same.interval.low, same.interval.high, same.interval.autocorrelation) == (3.0, 3.0, 0.0)
+
+
+def is_covered(outcome: Outcome, truth: float) -> bool:
+    found = outcome.interval
+    return found is not None and found.low <= truth <= found.high
+
+
+def test_intervals_cover_the_mean_of_what_hangs_together() -> None:
+    """AR(1) with 0.9: the naive interval of a thousand such numbers covers the mean in 36 of 100 runs."""
+    random, runs, length = np.random.default_rng(11), 400, 1000
+    shocks = random.normal(size=(length, runs))
+    series = np.empty((length, runs))
+    series[0] = shocks[0] / math.sqrt(1 - 0.81)
+    for place in range(1, length):
+        series[place] = 0.9 * series[place - 1] + shocks[place]
+    hits = 0
+    for column in series.T.tolist():
+        measurement = Measurement(Metric("m", ["a"], Measure(take="mean", interval=0.95)))
+        for place, value in enumerate(column):
+            measurement.add("a", place, value)
+        hits += is_covered(measurement.outcome(length), 0.0)
+    assert 0.90 <= hits / runs <= 0.98
+
+
+def test_intervals_over_time_cover_the_mean_number_in_a_queue() -> None:
+    """M/M/1 at 0.5, of which one is in the system on average and the server is busy half of the time."""
+    random, runs, customers = np.random.default_rng(3), 120, 500
+    hits = {"time_mean": 0, "share": 0, "rate": 0}
+    for _ in range(runs):
+        arrivals = np.cumsum(random.exponential(2.0, customers))
+        services = random.exponential(1.0, customers)
+        leaves = np.empty(customers)
+        last = 0.0
+        for place in range(customers):
+            last = leaves[place] = max(arrivals[place], last) + services[place]
+        events = sorted([(int(each * 1e9), 1) for each in arrivals] + [(int(each * 1e9), -1) for each in leaves])
+        measurements = {
+            take: Measurement(Metric("m", ["a"], Measure(take=take, initial=0, after=50.0, interval=0.95, when=when)))
+            for take, when in (("time_mean", None), ("share", "value > 0"))
+        }
+        coming = Measurement(Metric("m", ["a"], Measure(take="rate", after=50.0, interval=0.95)))
+        number = 0
+        for time, change in events:
+            number += change
+            for measurement in measurements.values():
+                measurement.add("a", time, number)
+            if change > 0:
+                coming.add("a", time, number)
+        end = int(arrivals[-1] * 1e9)
+        hits["time_mean"] += is_covered(measurements["time_mean"].outcome(end), 1.0)
+        hits["share"] += is_covered(measurements["share"].outcome(end), 0.5)
+        hits["rate"] += is_covered(coming.outcome(end), 0.5)
+    for take, count in hits.items():
+        assert 0.88 <= count / runs <= 0.985, take
+
+
+def test_every_take_is_measured_somehow() -> None:
+    tokens = [("a.out", place * SECOND, place % 3) for place in range(60)]
+    needs: dict[str, dict[str, Any]] = {"p": {"p": 0.5}, "when": {"when": "value > 0"}}
+    for take, kind in TAKES.items():
+        options = needs.get(kind.needs, {})
+        found = measured(tokens, 60 * SECOND, take=take, **options)
+        assert found.value is not None, take
+        assert list(Measure(take=take, **options).misfits()) == []
+        if kind.settles:
+            assert measured(tokens, 60 * SECOND, take=take, after="mser5", **options).value is not None, take
+
+
+def test_what_there_is_to_say_is_in_results_and_json() -> None:
+    _, results = simulate(
+        "actors: {t: {type: Ticker, period: 0.5}, s: {type: Scale, factor: -1}}\n"
+        "connections: [t.output -> s.input]\n"
+        "metrics:\n"
+        "  rate: {of: t.output, take: rate, interval: 0.9, to: 1/min}\n"
+        "  late: {of: s.output, take: mean, after: 1 h}\n"
+        "  last: {of: s.output}\n",
+        until=100.25,
+    )
+    rate, late = results.outcomes["rate"], results.outcomes["late"]
+    assert results.metrics == {"rate": pytest.approx(201 / 100.25 * 60), "late": None, "last": -200.0}
+    assert results.units == {"rate": "1/min", "late": "", "last": ""}
+    assert list(results.intervals) == ["rate"]
+    assert rate.interval is not None
+    assert rate.interval.low < 120 < rate.interval.high
+    reason = "the run ended at 100.25 s, before its warm-up of 3600 s was over"
+    assert late.missing == reason
+    told = summary_object(results)
+    assert told["metrics"]["late"] is None
+    assert told["outcomes"] == {
+        "rate": {
+            "level": 0.9,
+            "low": rate.interval.low,
+            "high": rate.interval.high,
+            "batches": 20,
+            "autocorrelation": rate.interval.autocorrelation,
+        },
+        "late": {"missing": reason},
+    }
+    assert f"no value, because {reason}" in str(results)

@@ -1,0 +1,144 @@
+"""Mutants of our sources, as cosmic-ray makes them: which there are, and a sample that is spread over all of them."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import random  # noqa: TID251 (of the tool, not of a model)
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from cosmic_ray.commands.init import init
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+from cosmic_ray.work_db import WorkDB, use_db
+
+GUARDED = ("actors/core", "actors/robotics", "aspects", "runner/engine")
+
+# What numba compiles, and Python runs to the same bits.
+KERNELS = ("actors/robotics/numerics/", "actors/core/elementary/")
+
+# Lines whose numbers are a matter of taste: how exactly the solver solves, and how long one waits for it.
+TOLERANCES = {
+    "actors/robotics/numerics/barrier.py": re.compile(r"^_?[A-Z][A-Z_]+ = "),
+    "actors/robotics/numerics/newton.py": re.compile(r"^_?[A-Z][A-Z_]+ = "),
+    "actors/robotics/casadi_solver.py": re.compile(r"^_?[A-Z][A-Z_]+ = |\"ipopt\.|\"max_iter|\"tol"),
+}
+
+
+class Mutant(NamedTuple):
+    """One change of one file, by one of cosmic-ray's operators; ``job`` is its name in the session.
+
+    ``text`` is the file with the change in it, where it has been made.
+    """
+
+    file: str
+    line: int
+    column: int
+    operator: str
+    occurrence: int
+    job: str
+    text: str = ""
+
+    def made(self, original: str) -> Mutant:
+        """With the text, which takes a tenth of a second."""
+        return self._replace(text=mutate_code(original, get_operator(self.operator)(), self.occurrence) or "")
+
+    def lines(self, original: str) -> tuple[str, str]:
+        """The first line that differs, before and after."""
+        pairs = zip(original.splitlines(), self.text.splitlines(), strict=False)
+        return next(((old.strip(), new.strip()) for old, new in pairs if old != new), ("", ""))
+
+
+def session(root: Path, file: Path) -> Iterator[Mutant]:
+    """All mutants that say something, noted in a new session of cosmic-ray."""
+    sources = [path.relative_to(root) for folder in GUARDED for path in sorted((root / folder).rglob("*.py"))]
+    file.unlink(missing_ok=True)
+    with use_db(file, WorkDB.Mode.create) as db:
+        init(sources, db, {})
+        for item in db.work_items:
+            (mutation,) = item.mutations
+            found = Mutant(
+                str(mutation.module_path), *mutation.start_pos, mutation.operator_name, mutation.occurrence, item.job_id
+            )
+            if not _says_nothing(root / found.file, found):
+                yield found
+
+
+def sample(root: Path, mutants: list[Mutant], count: int, seed: int) -> list[Mutant]:
+    """So many mutants, at places that are spread evenly over all files; at each place one of those there are."""
+    places: dict[tuple[str, int, int], list[Mutant]] = {}
+    for mutant in sorted(mutants):
+        places.setdefault(mutant[:3], []).append(mutant)
+    chance = random.Random(seed)
+    step = max(1.0, len(places) / count)
+    start = chance.uniform(0.0, step)
+    order = list(places.values())
+    chosen = [order[int(start + step * number)] for number in range(min(count, len(order)))]
+    found = []
+    for each in chosen:
+        chance.shuffle(each)
+        made = (mutant.made((root / mutant.file).read_text(encoding="utf-8")) for mutant in each)
+        found += list(itertools.islice(filter(_is_python, made), 1))
+    return found
+
+
+def _is_python(mutant: Mutant) -> bool:
+    try:
+        compile(mutant.text, mutant.file, "exec")
+    except SyntaxError:
+        return False
+    return mutant.text != ""
+
+
+def _says_nothing(path: Path, mutant: Mutant) -> bool:
+    """Whether it changes what is never run (annotations) or a tolerance, or fails or is the same wherever it is run."""
+    if _is_no_mistake_to_make(mutant.operator):
+        return True
+    if mutant.operator.endswith("RemoveDecorator") and mutant.file.startswith(KERNELS):
+        return True  # it would run as it is, or be compiled otherwise, to the same bits
+    text, ranges = _annotations(path)
+    tolerances = TOLERANCES.get(mutant.file)
+    if tolerances is not None and tolerances.search(text.splitlines()[mutant.line - 1]):
+        return True
+    at = (mutant.line, mutant.column)
+    return any(first <= at < last for first, last in ranges)
+
+
+def _is_no_mistake_to_make(operator: str) -> bool:
+    """Shifts and bits of numbers fail at once, which would flatter the score; ``is`` and ``==`` agree on None."""
+    kind, _, change = operator.partition("/")[2].partition("_")
+    before, _, after = change.partition("_")
+    if kind in ("ReplaceBinaryOperator", "ReplaceUnaryOperator"):
+        return (before in _BITS) != (after in _BITS)
+    if kind == "ReplaceComparisonOperator":
+        return (before in _SAME) != (after in _SAME)
+    return False
+
+
+_BITS = {"RShift", "LShift", "BitOr", "BitAnd", "BitXor", "Invert"}
+_SAME = {"Is", "IsNot"}
+
+
+@cache
+def _annotations(path: Path) -> tuple[str, list[tuple[tuple[int, int], tuple[int, int]]]]:
+    """A file's text, and where it speaks to a type checker only."""
+    text = path.read_text(encoding="utf-8")
+    nodes: list[ast.AST] = []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation is not None:
+            nodes.append(node.annotation)
+        elif isinstance(node, ast.FunctionDef):
+            nodes += [node.returns] if node.returns is not None else []
+            nodes += [each for each in node.decorator_list if ast.unparse(each) in ("overload", "override")]
+        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            nodes.append(node)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "cast":
+            nodes.append(node.args[0])
+    return text, [
+        ((node.lineno, node.col_offset), (node.end_lineno or 0, node.end_col_offset or 0))  # type: ignore[attr-defined]
+        for node in nodes
+    ]

@@ -1,0 +1,29 @@
+"""Digests are those in the repository, here and with the libraries of another machine; ``make portable`` tries more."""
+
+from __future__ import annotations
+
+import json
+
+from epicycle.actors.core import elementary
+
+from .digests import ONE_ARGUMENT, TWO_ARGUMENTS, functions, parts
+from .portable import GOLDEN, Setting, differences, old_libraries, outcome
+
+
+def test_every_part_has_a_digest_in_the_repository() -> None:
+    assert list(json.loads(GOLDEN.read_text())) == list(parts())
+
+
+def test_every_function_is_in_it() -> None:
+    assert {*ONE_ARGUMENT, *TWO_ARGUMENTS, "distance"} <= set(elementary.__all__)
+    assert {*elementary.__all__} - {*ONE_ARGUMENT, *TWO_ARGUMENTS} <= {"distance", "power", "total", "log_gamma"}
+
+
+def test_compiled_functions_have_the_same_bits() -> None:
+    assert functions(compiled=True) == functions()
+
+
+def test_digests_hold_with_the_libraries_of_an_old_processor() -> None:
+    found, wrong, _ = outcome(Setting("old", {**old_libraries(), "PYTHONHASHSEED": "2"}))
+    assert wrong == ""
+    assert differences(found, json.loads(GOLDEN.read_text())) == []

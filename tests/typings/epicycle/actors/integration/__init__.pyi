@@ -1,0 +1,1 @@
+from actors.integration import *
