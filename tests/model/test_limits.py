@@ -173,8 +173,10 @@ def test_a_clock_is_not_set_to_the_end_of_all_time(tmp_path: Path) -> None:
     [
         (
             "{from: 1, to: 1.0000000000000000001, step: 1e-19}",
-            "m.yaml:4:49: error: the range of 'n' has values that cannot be told apart as floats: "
-            "from 1 to 1.0000000000000000001 in steps of 1E-19",
+            (
+                "m.yaml:4:49: error: the range of 'n' has values that cannot be told apart as floats: "
+                "from 1 to 1.0000000000000000001 in steps of 1E-19"
+            ),
         ),
         (
             "{from: 0 Mm, to: 1e308 Mm, step: 1e307 Mm}",
