@@ -97,8 +97,9 @@ def maps(trees: Sequence[Path], jobs: int) -> dict[bool, dict[str, Any]]:
     ]
     found: dict[bool, dict[str, Any]] = {True: {}, False: {}}
     with multiprocessing.get_context("fork").Pool(jobs) as pool:
-        for (_, _, compiled), each in zip(tasks, pool.imap(record, tasks), strict=True):
+        for number, ((_, _, compiled), each) in enumerate(zip(tasks, pool.imap(record, tasks), strict=True), 1):
             found[compiled] |= each
+            print(f"{number} of {len(tasks)} heaps of tests have been run", flush=True)
     return found
 
 
