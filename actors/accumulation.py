@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .combining import present, rounds
-from .core import Actor, InputPort, OutputPort, Parameter, to_seconds
+from .core import Actor, InputPort, OutputPort, Parameter, elementary, to_seconds
 
 
 class Counter(Actor):
@@ -52,7 +52,7 @@ class Accumulator(Actor):
             if not self.input.present:
                 self.output.send(self._sum)
         for (tokens,) in rounds(self.input):
-            self._sum += sum(present(tokens))
+            self._sum += elementary.total(present(tokens))
             self.output.send(self._sum)
 
 

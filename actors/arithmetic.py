@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from .combining import present, rounds
-from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter
+from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter, elementary
 
 
 class AddSubtract(Actor):
@@ -26,7 +26,7 @@ class AddSubtract(Actor):
 
     def fire(self) -> None:
         for plus, minus in rounds(self.plus, self.minus):
-            self.output.send(sum(present(plus)) - sum(present(minus)))
+            self.output.send(elementary.total(present(plus)) - elementary.total(present(minus)))
 
 
 class MultiplyDivide(Actor):
@@ -74,17 +74,17 @@ FUNCTIONS: Final[dict[str, Callable[[Any], Any]]] = {
     "abs": abs,
     "negate": lambda x: -x,
     "sign": _sign,
-    "square": lambda x: x**2,
+    "square": lambda x: elementary.power(x, 2),
     "sqrt": math.sqrt,
-    "exp": math.exp,
-    "log": math.log,
-    "log10": math.log10,
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "asin": math.asin,
-    "acos": math.acos,
-    "atan": math.atan,
+    "exp": elementary.exp,
+    "log": elementary.log,
+    "log10": elementary.log10,
+    "sin": elementary.sin,
+    "cos": elementary.cos,
+    "tan": elementary.tan,
+    "asin": elementary.asin,
+    "acos": elementary.acos,
+    "atan": elementary.atan,
     "floor": math.floor,
     "ceil": math.ceil,
     "round": round,  # to the even neighbour, as Python does

@@ -20,8 +20,8 @@ from .core import (
     did_you_mean,
 )
 from .expression import Formula, FormulaParameter, operand
-from .expression.enclosure import Bounds, bounds_of
-from .integration import STEPPERS, State
+from .expression.enclosure import bounds_of
+from .integration import STEPPERS, Bounds, State
 from .segment import Crossing, Equations, Guard, Segment, sign_of
 
 _MAX_STEPS = 10_000
@@ -52,8 +52,20 @@ class ODE(Actor):
     later.  An expression that is zero at the start does not cross there.  Crossings of one kind that come closer
     together than ``min_interval`` end the run with an error: a ball that comes to rest bounces without end (Zeno).
 
-    The solution does not depend on when it is looked at.  Numbers are bare, in the units that the model chooses, time
-    in s.  Solvers: ``scipy.integrate``.  Ptolemy: ``DifferentialSystem``, ``LevelCrossingDetector``.
+    The solution does not depend on when it is looked at, and has the same bits on every processor.  Numbers are bare,
+    in the units that the model chooses, time in s.
+
+    Methods: ``RK23`` (Bogacki-Shampine), ``RK45`` (Dormand-Prince) and ``DOP853`` (Hairer) are explicit Runge-Kutta
+    methods.  ``Radau`` (Radau IIA of order 5) and ``BDF`` (order 1 to 5) are for stiff systems: ``Radau`` is the more
+    exact one at loose tolerances, ``BDF`` takes fewer evaluations at tight ones.  The steps are those of SciPy's
+    solvers of these names, but the arithmetic is our own.
+
+    Steps are as long as the tolerances allow, but longer than 1 s only where nothing can hide in them: bounds on the
+    derivatives along the step (interval arithmetic) must show that they stay near what the step has seen.  A crossing
+    that comes and goes within an eighth of a second may be missed, if such bounds do not show that there is none.
+    With ``max_step`` no step is longer, that check is left out, and its eighth takes the place of the second's.
+
+    Ptolemy: ``DifferentialSystem``, ``LevelCrossingDetector``.
     """
 
     is_source: ClassVar[bool] = True
@@ -78,7 +90,7 @@ class ODE(Actor):
     absolute_tolerance = Parameter(float, 1e-12, min=1e-300, doc="error per step, added to the relative one")
     max_step = Parameter(
         float, None, unit="s", min=1e-9, max=1e6,
-        doc="longest step; 1 s if left out, and longer where nothing can hide in a step",
+        doc="longest step; if left out, 1 s, or what the tolerances allow where nothing can hide in it",
     )  # fmt: skip
     min_interval = Parameter(float, 1e-6, unit="s", min=1e-9, doc="what crossings of one kind keep between them")
 

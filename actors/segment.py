@@ -78,9 +78,10 @@ class Segment:
         self._equations = equations
         self._watched = max_step is None
         self._window = WINDOW if max_step is None else max_step
-        self._longest = LONGEST if max_step is None else max_step
-        self._patience, self._calm = 1, 0  # so many steps must be taken before longer ones are tried; so many were
-        self._stepper = STEPPERS[method](equations.rates, state, Limits(*tolerance, self._longest))
+        self._patience, self._taken = 1, 0  # so many steps must be taken before longer ones are tried; so many were
+        self._stepper = STEPPERS[method](
+            equations.rates, state, Limits(*tolerance, LONGEST if max_step is None else max_step)
+        )
         self._guards = guards
         self._start = state
         self._piece: Piece | None = None
@@ -129,40 +130,47 @@ class Segment:
 
     def _advance(self) -> bool:
         """Take one step, which is longer than the window only if nothing hides in it; False if there is none."""
-        if not self._watched:
-            return self._stepper.step()
         while True:
-            before = copy.copy(self._stepper)
-            self._stepper.limits = replace(before.limits, max_step=self._longest)
+            before = copy.copy(self._stepper) if self._watched and self._stepper.next_step > WINDOW else None
             if not self._stepper.step():
                 return False
-            step = self.end - before.time
-            if step <= WINDOW or not self._hides(before.time):
+            self._taken += 1
+            if before is None or self.end - before.time <= WINDOW or not self._hides(before.time):
                 break
             # Where that is so, it is likely to stay so: a longer step is tried less and less often.
+            length = self.end - before.time
             self._stepper, self._piece = before, None
-            self._longest = max(WINDOW, step / 4.0)
-            self._patience, self._calm = min(2 * self._patience, _MAX_PATIENCE), 0
-        self._calm += 1
-        if self._calm >= self._patience:
-            self._longest, self._calm = min(4.0 * self._longest, LONGEST), 0
+            self._limit(length / 4.0)
+            self._patience, self._taken = min(2 * self._patience, _MAX_PATIENCE), 0
+        if self._watched and self._taken >= self._patience:
+            self._limit(self._stepper.limits.max_step * 4.0)
+            self._taken = 0
         return True
 
+    def _limit(self, longest: float) -> None:
+        longest = min(max(longest, WINDOW), LONGEST)
+        self._stepper.limits = replace(self._stepper.limits, max_step=longest)
+
     def _hides(self, start: float) -> bool:
-        """Whether a derivative may be far from what it is at some points of the latest step and of what bounds it."""
+        """Whether a derivative may be far from all that the latest step has made of it.
+
+        That is its values at both ends, also with the states at the corners of their bounds, and the slopes of the
+        solution between.  To look within the step would be wrong: what is seen there, the stepper may have missed.
+        """
         end, piece = self.end, self._latest()
         bounds = piece.bounds(start, end)
-        middle = start + 0.5 * (end - start)
+        lows, highs = [low for low, _ in bounds], [high for _, high in bounds]
         mixed = [pair[number % 2] for number, pair in enumerate(bounds)]
-        corners = [[low for low, _ in bounds], [high for _, high in bounds], mixed]
+        quarter = 0.25 * (end - start)
+        states = [piece.at(start), *(piece.at(start + number * quarter) for number in (1, 2, 3)), piece.at(end)]
+        places = [(start, states[0]), (end, states[4]), (start, lows), (end, highs), (end, mixed)]
         try:
-            found = [self._equations.rates(time, piece.at(time)) for time in (middle, end)]
-            found += [self._equations.rates(middle, corner) for corner in corners]
+            found = [self._equations.rates(time, state) for time, state in places]
         except EpicycleError:  # a corner may lie where the derivatives are not defined
             return True
-        for (low, high), values in zip(
-            self._equations.bounds(start, end, bounds), zip(*found, strict=True), strict=True
-        ):
+        found += [[(new - old) / quarter for old, new in zip(*pair, strict=True)] for pair in pairwise(states)]
+        possible = self._equations.bounds(start, end, bounds)
+        for (low, high), values in zip(possible, zip(*found, strict=True), strict=True):
             least, most = min(values), max(values)
             margin = 2.0 * (most - least) + _NOISE * max(abs(least), abs(most))
             if not (least - margin <= low and high <= most + margin):
@@ -262,9 +270,10 @@ class Segment:
         if after == 0:
             return None
         noise = _NOISE * abs(guard.value(right, self.at(right)))
-        far = right
-        for halving in range(1, _HALVINGS + 1):
-            near = left + (right - left) * 0.5**halving
+        far, share = right, 1.0
+        for _ in range(_HALVINGS):
+            share *= 0.5
+            near = left + (right - left) * share
             if -after * guard.value(near, self.at(near)) > noise:
                 return near, far
             far = near

@@ -37,6 +37,10 @@ class _Ticking(Actor):
             raise ParameterError("values: the list is empty, there is nothing to send")
         self.output.type = int if self.values is None else token_type(self.values)
 
+    @property
+    def is_endless(self) -> bool:
+        return self.stop_time is None and not any(port.name == "stop" and port.width for port in self.inputs.values())
+
     def _send(self, tick: int) -> None:
         values: Sequence[Any] | None = self.values
         self.output.send(tick if values is None else values[tick % len(values)])

@@ -15,7 +15,7 @@ from .core import (
 )
 from .crash import CrashRestart
 from .decoration import Decoration, class_decorations, decorations
-from .duration import Duration, DurationParameter, FiringTime, FiringTimeParameter, needed
+from .duration import Duration, DurationParameter, FiringTime, FiringTimeParameter, time_needed
 from .execution import ActorPoint, ExecutionAspect, Job, Unit
 from .firing import ExecutionTime, SkipFiring
 from .measurement import (
@@ -36,9 +36,10 @@ from .processor import Processor
 from .radio import RadioMedium
 from .selection import ByActorParameter, GroupsParameter, PortsParameter, SelectionParameter
 from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
-from .tokens import FieldError
+from .tokens import STAMP, FieldError
 
 __all__ = [
+    "STAMP",
     "ActorPoint",
     "Alteration",
     "Aspect",
@@ -103,5 +104,5 @@ __all__ = [
     "Weaver",
     "class_decorations",
     "decorations",
-    "needed",
+    "time_needed",
 ]

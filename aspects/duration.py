@@ -62,7 +62,7 @@ class FiringTimeParameter(DurationParameter):
         self.forms = (*self.forms, self._by_port)
 
     def describe_type(self) -> str:
-        return "time or distribution, or these by input port"
+        return "time, distribution, or {port: time}"
 
     def _expected(self) -> str:
         return "a time in s >= 0, a distribution, or these by input port"
@@ -74,7 +74,7 @@ class FiringTimeParameter(DurationParameter):
         return super().convert(value)
 
 
-def needed(time: FiringTime, job: Job, random: Stream) -> float | None:
+def time_needed(time: FiringTime, job: Job, random: Stream) -> float | None:
     """How long a firing takes (s); None: there is nothing to do in it that would take time."""
     if not isinstance(time, Mapping):
         return drawn(time, random) if job.is_triggered else None

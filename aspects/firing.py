@@ -8,7 +8,7 @@ from typing import ClassVar
 from epicycle.actors import EpicycleError, Parameter, to_nanoseconds, to_seconds
 
 from .core import JoinPoint
-from .duration import FiringTimeParameter, needed
+from .duration import FiringTimeParameter, time_needed
 from .execution import ActorPoint, ExecutionAspect, Job
 from .measured import MeasuredTimes
 
@@ -53,7 +53,7 @@ class ExecutionTime(ExecutionAspect):
         self._measured = None if self.times is None else MeasuredTimes(self.times)
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
-        seconds = needed(self.time, job, point.random)
+        seconds = time_needed(self.time, job, point.random)
         if seconds is None:
             self._occupy(job, point, 0)
             return

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
 from .core import JoinPoint
-from .duration import FiringTime, FiringTimeParameter, needed
+from .duration import FiringTime, FiringTimeParameter, time_needed
 from .execution import ActorPoint, ExecutionAspect, Job
 from .selection import ByActorParameter
 
@@ -66,7 +66,7 @@ class Processor(ExecutionAspect):
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
         given: FiringTime | None = self._of(self.times, "times", point)
-        seconds = needed(self.time if given is None else given, job, point.random)
+        seconds = time_needed(self.time if given is None else given, job, point.random)
         if seconds is None:
             self.pass_by(job, point)
         else:

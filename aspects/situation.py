@@ -9,17 +9,14 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from epicycle.actors import EpicycleError, Parameter
+from epicycle.actors import EpicycleError, Parameter, elementary
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand
 
 from .core import Aspect, CommunicationAspect, JoinPoint, MeasurementAspect
 from .observation import TOKEN
 from .selection import GroupsParameter, PortsParameter
 
-Position = NDArray[np.float64]
+Position = list[float]
 SENDER = "expression for the path of who sent the message, such as token.robot; none: whose port the connection leaves"
 
 
@@ -83,9 +80,9 @@ class RangeLoss(_Situated, CommunicationAspect):
             point.forward(token)
             return
         if self.correlation is not None:
-            draw = self._correlated(draw, np.concatenate((here, there)), point.memory.setdefault("links", {}), sender)
-        distance = math.dist(here, there)
-        margin = math.inf if distance == 0.0 else 10.0 * self.exponent * math.log10(self.range / distance)
+            draw = self._correlated(draw, here + there, point.memory.setdefault("links", {}), sender)
+        distance = elementary.distance(here, there)
+        margin = math.inf if distance == 0.0 else 10.0 * self.exponent * elementary.log10(self.range / distance)
         if margin + self.shadowing * draw < 0.0:
             point.act("dropped", token)
         else:
@@ -97,8 +94,8 @@ class RangeLoss(_Situated, CommunicationAspect):
         if sender in links:
             last, before = links[sender]
             half = len(ends) // 2
-            moved = math.dist(ends[:half], before[:half]) + math.dist(ends[half:], before[half:])
-            rho = math.exp(-moved / self.correlation)
+            moved = elementary.distance(ends[:half], before[:half]) + elementary.distance(ends[half:], before[half:])
+            rho = elementary.exp(-moved / self.correlation)
             draw = rho * last + math.sqrt(1.0 - rho * rho) * draw
         links[sender] = draw, ends
         return draw
@@ -118,7 +115,7 @@ class OutOfRange(_Situated, MeasurementAspect):
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         sensor, target = _latest(self.body(point.owner, point), point), _target(point)
-        if sensor is not None and target is not None and math.dist(sensor, target) > self.range:
+        if sensor is not None and target is not None and elementary.distance(sensor, target) > self.range:
             point.act("failed", token)
         else:
             point.forward(token)
@@ -213,7 +210,7 @@ def _latest(port: str, point: JoinPoint) -> Position | None:
     position = [position] if _is_number(position) else position
     if not (isinstance(position, list) and position and all(_is_number(each) for each in position)):
         raise SituationError(f"{port} sends no position: numbers, or a token with such a field 'position'")
-    return np.array(position, dtype=float)
+    return [float(each) for each in position]
 
 
 def _is_number(value: object) -> bool:
@@ -232,7 +229,8 @@ def _common(path: str, other: str) -> int:
 
 def _distance(place: Position, start: Position, end: Position) -> float:
     """From a place to the segment between two others."""
-    along = end - start
-    length = float(along @ along)
-    share = 0.0 if length == 0.0 else min(1.0, max(0.0, float((place - start) @ along) / length))
-    return math.dist(place, start + share * along)
+    along = [b - a for a, b in zip(start, end, strict=True)]
+    length = elementary.total(step * step for step in along)
+    there = elementary.total((x - a) * step for x, a, step in zip(place, start, along, strict=True))
+    share = 0.0 if length == 0.0 else min(1.0, max(0.0, there / length))
+    return elementary.distance(place, [a + share * step for a, step in zip(start, along, strict=True)])

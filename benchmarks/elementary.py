@@ -1,6 +1,6 @@
 """The elementary functions: worst error in units in the last place over a million points each, and time against math.
 
-    .venv/bin/python benchmarks/elementary.py [points]
+    python -m benchmarks.elementary [points [function ...]]
 
 Errors are measured twice: long doubles (of 64 bits) find the worst points, and mpmath says how bad these are.  Where
 long doubles are no longer than doubles, mpmath measures all of them, which takes a quarter of an hour.
@@ -12,6 +12,7 @@ import math
 import sys
 import timeit
 from collections.abc import Callable, Iterator
+from time import process_time
 from typing import Any
 
 import mpmath
@@ -140,12 +141,13 @@ def times(name: str, arguments: int) -> Iterator[float]:
             for one in lists:
                 function(*one)
 
-        yield min(timeit.repeat(run, number=3, repeat=7)) / 3000 * 1e9
+        yield min(timeit.repeat(run, number=1, repeat=30, timer=process_time)) / 1000 * 1e9
     for library in (elementary, math):
         function = compiled_by(library, name, arguments)
         large = [np.resize(x, 100_000) for x in at]
         function(*large)
-        yield min(timeit.repeat(lambda f=function, x=large: f(*x), number=1, repeat=9)) / 100_000 * 1e9
+        calls = timeit.repeat(lambda f=function, x=large: f(*x), number=1, repeat=20, timer=process_time)
+        yield min(calls) / 100_000 * 1e9
 
 
 def main() -> None:

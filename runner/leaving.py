@@ -8,6 +8,8 @@ import threading
 import time
 from contextlib import suppress
 
+from .printing import complain
+
 PATIENCE = 1.0  # s that threads have to come to their end
 
 
@@ -20,7 +22,7 @@ def leave(code: int) -> int:
         return code
     names = ", ".join(each.name for each in left[:3]) + (", ..." if len(left) > 3 else "")
     with suppress(OSError, ValueError):  # there may be nobody any more who would read it
-        print(f"threads that the run has started are still at work, and are ended: {names}", file=sys.stderr)
+        complain(f"threads that the run has started are still at work, and are ended: {names}")
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):
             stream.flush()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epicycle.aspects import ExecutionTime, Latency
+from epicycle.aspects import ClockOffset, ExecutionTime, Latency
 from epicycle.runner import ModelError, Results, Simulation, load_model
 from epicycle.runner.cli import main
 from epicycle.runner.model import Problems, packaged_disturbances
@@ -247,6 +247,21 @@ def test_controllers_that_take_60_ms_bring_every_run_home(time: Any) -> None:
         model.weave("slow", ExecutionTime(time=time), at="**.controller")
         arrivals.append(Simulation(model, seed=seed).run().metrics["arrival_time"])
     assert all(4.5 < arrival < 6.0 for arrival in arrivals), arrivals
+
+
+def test_a_robot_whose_clock_is_wrong_trusts_its_own_data() -> None:
+    """A second ahead in all that it says, it fuses its own measurements in time, and its estimates are fresh to it."""
+    alone = load_model("collision_avoidance", set={"observers": 0})
+    right = Simulation(alone, seed=1, keep_log=True).run(until=2)
+    alone.weave("ahead", ClockOffset(offset=1), at="main")
+    wrong = Simulation(alone, seed=1, keep_log=True).run(until=2)
+    estimates = values(wrong, "main.estimator", "estimate")
+    for tick, expected in values(right, "main.estimator", "estimate").items():
+        assert estimates[tick].time == pytest.approx(expected.time + 1)
+        assert estimates[tick].mean.tolist() == pytest.approx(expected.mean.tolist())
+    assert values(wrong, "main.estimator", "too_late") == {}
+    here, there = (values(run, "main.vehicle", "state")[20].position for run in (right, wrong))
+    assert there == pytest.approx(here, abs=1e-6)
 
 
 def test_an_estimate_that_is_late_is_not_taken_for_fresh(monkeypatch: pytest.MonkeyPatch) -> None:

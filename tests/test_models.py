@@ -37,6 +37,8 @@ def test_scenario_parameters_reach_every_robot() -> None:
             "measurement_range=15 m",
             "observer[*].sensor.max_range=5 m",
             "safe_distance=2.5",
+            "kappa=0.5",
+            "velocity_noise=0.3",
         ],
     )
     actors = model.graph.actors
@@ -47,6 +49,9 @@ def test_scenario_parameters_reach_every_robot() -> None:
         5.0,
     ]
     assert actors["main.controller"].safe_distance == 2.5  # type: ignore[attr-defined]
+    # What a filter and a controller assume of the obstacle is one.
+    parts = [actors[f"{robot}.{part}"] for robot in ("main", "observer[1]") for part in ("estimator", "controller")]
+    assert {(part.kappa, part.velocity_noise) for part in parts} == {(0.5, 0.3)}  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("kind", ["relative_position", "range"])

@@ -117,6 +117,17 @@ def test_table_1_is_the_study() -> None:
     assert (study.model, study.replications, study.paired) == ("collision_avoidance", RUNS, True)
 
 
+def test_by_default_three_observers_and_no_disturbance() -> None:
+    default = load_model("collision_avoidance")
+    assert sum(path.endswith(".vehicle") for path in default.graph.actors) == 1 + 3
+    assert [
+        woven.aspect.probability for woven in default.aspects if woven.kind in ("PacketLoss", "MeasurementFailure")
+    ] == [  # type: ignore[attr-defined]
+        0.0,
+        0.0,
+    ]
+
+
 @pytest.mark.parametrize("level", LEVELS)
 def test_table_1_reaches_the_actors(level: float) -> None:
     for reach in RANGES:

@@ -1,5 +1,6 @@
 """What every actor is made of: ports, parameters, time, random streams, and the firing contract."""
 
+from . import elementary
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
@@ -57,6 +58,7 @@ __all__ = [
     "declared_parameters",
     "declared_ports",
     "did_you_mean",
+    "elementary",
     "has_own_ports",
     "irregular",
     "is_too_deep",

@@ -104,6 +104,11 @@ class Actor(Configurable):
     # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.
     is_source: ClassVar[bool] = False
 
+    @property
+    def is_endless(self) -> bool:
+        """Whether it is known to drive itself for ever, so that a run has to be ended by something else."""
+        return False
+
     def __init__(self, path: str, **parameters: object) -> None:
         try:
             super().__init__(**parameters)

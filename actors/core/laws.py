@@ -16,7 +16,7 @@ from typing import Final, Protocol
 from .elementary import acos, cos, exp, expm1, log, log1p, tan
 from .elementary import pow as power_of
 
-_STEP: Final = 2.0**-52
+_STEP: Final = 1 / 2**52
 _LARGEST: Final = 2**63 - 1  # what fits an integer of 64 bits
 
 

@@ -145,6 +145,11 @@ class InputPort(_Port[T]):
         tokens, channels = self._arriving
         return tokens.append, channels.append
 
+    @property
+    def arrived(self) -> list[int]:
+        """Engine: the channels of the tokens that have arrived, shown or not; the same list all the time."""
+        return self._arriving[1]
+
     def clear(self) -> None:
         """Engine: forget the tokens that are shown."""
         self._tokens.clear()

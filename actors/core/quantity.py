@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 from typing import Any
 
+from .elementary import power as power_of
 from .units import UnitError, between, is_compound, parse_unit
 
 MAX_DEPTH = 100  # of lists and mappings in each other, in files and in what expressions make of them
@@ -91,12 +92,14 @@ class Quantity(float):
     def __pow__(self, exponent: float, modulus: None = None) -> Any:
         power = exponent.to("1") if isinstance(exponent, Quantity) else exponent
         if not float(power).is_integer():
-            return self.si**power
+            return power_of(self.si, power)
         unit = f"{self.unit if self.unit.isalpha() else f'({self.unit})'}^{int(power)}"
-        return Quantity(float(self) ** int(power), unit) if _is_readable(unit) else self.si ** int(power)
+        return (
+            Quantity(power_of(float(self), int(power)), unit) if _is_readable(unit) else power_of(self.si, int(power))
+        )
 
     def __rpow__(self, base: float, modulus: None = None) -> Any:
-        return base ** self.to("1")
+        return power_of(base, self.to("1"))
 
     def __neg__(self) -> Quantity:
         return Quantity(-float(self), self.unit)

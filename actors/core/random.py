@@ -22,7 +22,7 @@ from .nearest import did_you_mean
 
 Size = int | Sequence[int] | None
 
-_STEP: Final = 2.0**-53  # from one number of ``random`` to the next
+_STEP: Final = 1 / 2**53  # from one number of ``random`` to the next
 _MOST: Final = 64  # words taken from the generator at once, which costs a tenth of taking them one by one
 _PLAIN: Final = frozenset({float, int, bool})
 

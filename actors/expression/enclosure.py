@@ -50,7 +50,9 @@ def _bounds(node: ast.expr, names: Mapping[str, Bounds]) -> Bounds:
             if name in CONSTANTS:
                 return CONSTANTS[name], CONSTANTS[name]
         case ast.BinOp():
-            return _OPERATORS[type(node.op)](_bounds(node.left, names), _bounds(node.right, names))
+            low, high = _OPERATORS[type(node.op)](_bounds(node.left, names), _bounds(node.right, names))
+            if low <= high:  # as it is not for inf - inf
+                return low, high
         case ast.UnaryOp():
             low, high = _bounds(node.operand, names)
             if isinstance(node.op, ast.Not):

@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, Final
 
-from ..core import MAX_DEPTH, Quantity, counted, did_you_mean
+from ..core import MAX_DEPTH, Quantity, counted, did_you_mean, elementary
 
 MAX_STEPS = 100_000
 MAX_ELEMENTS = 100_000
@@ -231,7 +231,9 @@ def _power(base: Any, exponent: Any) -> Any:
     # An int of b bits to the power n has at least (b - 1) * n bits: known before it is computed.
     if isinstance(base, int) and isinstance(exponent, int) and (base.bit_length() - 1) * exponent > 64:
         raise OverflowError
-    return base**exponent
+    if isinstance(base, Quantity) or isinstance(exponent, Quantity):
+        return base**exponent
+    return elementary.power(base, exponent)
 
 
 def _ordering(sign: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], bool]:
@@ -370,6 +372,11 @@ def _angle(unit: str, function: Callable[[float], float]) -> Callable[[Any], flo
     return lambda value: value.to(unit) if isinstance(value, Quantity) else function(value)
 
 
+def _log(x: float, base: float = math.e) -> float:
+    exact = {math.e: elementary.log, 2: elementary.log2, 10: elementary.log10}
+    return exact[base](x) if base in exact else elementary.log(x) / elementary.log(base)
+
+
 def _round(value: Any, decimals: Any = None) -> Any:
     if decimals is None:
         return round(value)
@@ -408,7 +415,7 @@ def _sum(value: Any) -> Any:
     for item in items:
         if not _is_number(item):
             raise TypeError(f"sum needs a list of numbers, this one has {kind_of(item)} in it")
-    return _checked(sum(items), *items)
+    return _checked(elementary.total(items), *items)
 
 
 def _ordered(name: str, items: list[Any]) -> list[Any]:
@@ -453,13 +460,13 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "floor": _numeric("floor", _keeping_unit(math.floor)),
     "ceil": _numeric("ceil", _keeping_unit(math.ceil)),
     "sqrt": _numeric("sqrt", _in_unit("", math.sqrt)),
-    "exp": _numeric("exp", _in_unit("1", math.exp)),
-    "log": _numeric("log", _in_unit("1", math.log), 1, 2),
-    "sin": _numeric("sin", _in_unit("rad", math.sin)),
-    "cos": _numeric("cos", _in_unit("rad", math.cos)),
-    "tan": _numeric("tan", _in_unit("rad", math.tan)),
-    "atan2": _numeric("atan2", _in_unit("", math.atan2), 2, 2),
-    "hypot": _numeric("hypot", _keeping_unit(math.hypot), 1, math.inf),
+    "exp": _numeric("exp", _in_unit("1", elementary.exp)),
+    "log": _numeric("log", _in_unit("1", _log), 1, 2),
+    "sin": _numeric("sin", _in_unit("rad", elementary.sin)),
+    "cos": _numeric("cos", _in_unit("rad", elementary.cos)),
+    "tan": _numeric("tan", _in_unit("rad", elementary.tan)),
+    "atan2": _numeric("atan2", _in_unit("", elementary.atan2), 2, 2),
+    "hypot": _numeric("hypot", _keeping_unit(elementary.hypot), 1, math.inf),
     "radians": _numeric("radians", _angle("rad", math.radians)),
     "degrees": _numeric("degrees", _angle("deg", math.degrees)),
     "int": _of_one("int", _converted(int, "a whole number")),

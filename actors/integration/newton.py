@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,12 +11,12 @@ from .stepper import Derivative, Limits, State
 
 Matrix = list[list[float]]
 
-_PRECISION: Final = 2.0**-52
+_PRECISION: Final = sys.float_info.epsilon
 # A difference of derivatives says too little if it is that small beside them, and the next one should be taken over
 # a wider or narrower stretch outside these bounds (D. E. Salane, Sandia report 86-1319, 1986).
-_USELESS: Final = 2.0**-45.5  # precision to the power of 7/8
-_SMALL: Final = 2.0**-39
-_LARGE: Final = 2.0**-13
+_USELESS: Final = 2e-14
+_SMALL: Final = 2e-12
+_LARGE: Final = 1e-4
 _LEAST: Final = 1e3 * _PRECISION
 
 
@@ -25,7 +26,7 @@ class Jacobian:
     def __init__(self, derivative: Derivative, size: int, threshold: float) -> None:
         self._derivative = derivative
         self._threshold = threshold  # a state counts as no smaller than this
-        self._widths = [2.0**-26] * size
+        self._widths = [1.5e-8] * size
 
     def at(self, time: float, state: State, rates: State) -> Matrix:
         """The matrix of d(rate of row)/d(state of column); ``rates`` are the derivatives there."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Final
 
-_PRECISION: Final = 2.0**-52
+_PRECISION: Final = sys.float_info.epsilon
 _HALVINGS: Final = 200  # more than bisection alone needs
 
 

@@ -127,7 +127,7 @@ class Stepper(ABC):
         trial = 1e-6 if size < 1e-5 or speed < 1e-5 else 0.01 * size / speed
         state = [value + trial * rate for value, rate in zip(self.state, self.rates, strict=True)]
         change = [new - old for new, old in zip(self.derivative(trial, state), self.rates, strict=True)]
-        bend = norm(change, scale) / trial if trial else math.nan
+        bend = norm(change, scale) / trial if trial else math.inf
         if speed <= 1e-15 and bend <= 1e-15:
             step = max(1e-6, trial * 1e-3)
         else:

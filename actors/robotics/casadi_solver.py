@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..core import EpicycleError
+from ..core.elementary import hypot
 from .messages import Array
 from .numerics.barrier import TOLERANCE, Solution
 from .numerics.constraints import violations
@@ -131,8 +132,8 @@ def _controls(result: Any, start: Array, problem: HorizonProblem) -> Array | Non
 def _respects_limits(problem: HorizonProblem, controls: Array) -> bool:
     positions, velocities = np.empty_like(controls), np.empty_like(controls)
     roll_out(problem.position, problem.velocity, controls.copy(), problem.period, positions, velocities)
-    slow = bool((np.hypot(*velocities[1:].T) <= problem.max_speed).all())
-    return slow and bool((np.hypot(*controls.T) <= problem.max_acceleration).all())
+    slow = all(hypot(x, y) <= problem.max_speed for x, y in velocities[1:].tolist())
+    return slow and all(hypot(x, y) <= problem.max_acceleration for x, y in controls.tolist())
 
 
 def _worst(problem: HorizonProblem, controls: Array) -> float:
@@ -149,12 +150,12 @@ def _excess(problem: HorizonProblem, controls: Array) -> Array:
     positions, velocities = np.empty_like(controls), np.empty_like(controls)
     roll_out(problem.position, problem.velocity, controls.copy(), problem.period, positions, velocities)
     away = positions - problem.obstacle_mean[0]
-    return np.asarray(np.maximum(np.hypot(*away.T) - problem.measurement_range, 0.0))
+    return np.array([max(hypot(x, y) - problem.measurement_range, 0.0) for x, y in away.tolist()])
 
 
 def _limits(problem: HorizonProblem, steps: int) -> Array:
-    speed, push = (_STRICT * problem.max_speed) ** 2, (_STRICT * problem.max_acceleration) ** 2
-    return np.concatenate([np.full(steps - 1, speed), np.full(steps, push)])
+    speed, push = _STRICT * problem.max_speed, _STRICT * problem.max_acceleration
+    return np.concatenate([np.full(steps - 1, speed * speed), np.full(steps, push * push)])
 
 
 # --- the program --------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter
+from ..core.elementary import hypot
 from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing, read_only
 from .objectives import Objective, ReachGoal
 from .solvers import Barrier, Solver
@@ -186,7 +187,7 @@ class RobustController(TargetModel, Actor):
         now, period = own.time, self.period
         position = np.array([x + period * vx, y + period * vy])
         vx, vy = vx + period * ux, vy + period * uy
-        velocity, speed = np.array([vx, vy]), math.hypot(vx, vy)
+        velocity, speed = np.array([vx, vy]), hypot(vx, vy)
         standing = self._standing
         tube_centre, tube_radius, starts = self._standing_plan(
             standing.position,

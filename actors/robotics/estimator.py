@@ -49,7 +49,9 @@ class _Estimator(TargetModel, Actor):
     period = Parameter(float, 0.1, unit="s", min=1e-9, doc="the time over which the process noise was measured")
     prior_mean = array_parameter((4,), (10.0, 0.0, 0.0, 0.0), doc="first guess of (x, y, vx, vy) in m and m/s")
     prior_variance = array_parameter((4,), (400.0, 400.0, 4.0, 4.0), min=0, doc="its variances, in m^2 and m^2/s^2")
-    max_delay = Parameter(float, 2.0, unit="s", min=0, doc="how old a measurement may be when it comes, to be fused")
+    max_delay = Parameter(
+        float, 2.0, unit="s", min=0, max=1e9, doc="how old a measurement may be when it comes, to be fused"
+    )
 
     noise_direction = Parameter(
         str,
@@ -173,7 +175,12 @@ def _order(measurement: Measurement) -> Any:
 
 
 class UnscentedEstimator(_Estimator):
-    """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once."""
+    """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once.
+
+    The estimate is of the time of the trigger, and each measurement is fused at its own time.  For one that comes later
+    the filter goes back to that time and runs again from there, so that from then on nothing tells that it was late;
+    what comes more than ``max_delay`` after it was made is not fused, and counted at ``too_late``.
+    """
 
     def initialize(self) -> None:
         from .numerics import ukf

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from ..core import EpicycleError, Parameter
+from ..core.elementary import hypot
 from .estimator import EXPECTED, _Estimator
 from .messages import RANGE, Array, Measurement
 
@@ -23,6 +23,8 @@ class FilterError(EpicycleError):
 
 class FilterPyEstimator(_Estimator):
     """A filter of FilterPy with the model of ``UnscentedEstimator``; fuses one measurement after another.
+
+    Late measurements are fused at their own time, as there.
 
     ``KalmanFilter`` and ``SquareRootKalmanFilter`` are linear and take relative positions only.
     """
@@ -80,13 +82,13 @@ class FilterPyEstimator(_Estimator):
 
         def observe(state: Array) -> Array:
             offset = state[:2] - observer
-            return np.array([math.hypot(offset[0], offset[1])]) if ranged else np.array(offset)
+            return np.array([hypot(*offset.tolist())]) if ranged else np.array(offset)
 
         def slope(state: Array) -> Array:
             if not ranged:
                 return np.eye(2, 4)
             offset = state[:2] - observer
-            return np.array([[*(offset / max(math.hypot(offset[0], offset[1]), 1e-9)), 0.0, 0.0]])
+            return np.array([[*(offset / max(hypot(*offset.tolist()), 1e-9)), 0.0, 0.0]])
 
         if self.filter in LINEAR:
             if ranged:

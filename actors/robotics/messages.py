@@ -71,7 +71,7 @@ class Measurement:
     value: Array  # (2,) m from observer to target, or (1,) m
     along: float  # standard deviation along the line of sight, m
     across: float  # standard deviation across it, m; no part of a range
-    time: float  # s, of the target's state that was measured
+    time: float  # s, when it was made
 
     def __init__(
         self, robot: str, observer: ArrayLike, kind: str, value: ArrayLike, along: float, across: float, time: float

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from itertools import combinations
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core.elementary import distance
 from .messages import BodyState
 
 
@@ -30,12 +30,12 @@ class GoalMonitor(Actor):
     def fire(self) -> None:
         position: list[float] = self.state.value.position.tolist()
         if self._last is not None:
-            self._length += math.dist(position, self._last)
+            self._length += distance(position, self._last)
         self._last = position
-        distance = math.dist(position, self.goal.tolist())
+        left = distance(position, self.goal.tolist())
         self.path_length.send(self._length)
-        self.distance.send(distance)
-        if distance <= self.tolerance and not self._has_arrived:
+        self.distance.send(left)
+        if left <= self.tolerance and not self._has_arrived:
             self._has_arrived = True
             self.time.send(self.state.value.time)
             self.arrived.send(True)
@@ -86,7 +86,7 @@ class DistanceMonitor(Actor):
         self._known.see(1, self.b.tokens)
         places = self._known.positions()
         if len(places) == 2:
-            self.distance.send(math.dist(*places))
+            self.distance.send(distance(*places))
 
 
 class SeparationMonitor(Actor):
@@ -106,4 +106,4 @@ class SeparationMonitor(Actor):
             self._known.see(body, states)
         places = self._known.positions()
         if len(places) >= 2:
-            self.distance.send(min(math.dist(a, b) for a, b in combinations(places, 2)))
+            self.distance.send(min(distance(a, b) for a, b in combinations(places, 2)))

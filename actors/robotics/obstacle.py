@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core.elementary import cos, sin
 from .messages import BodyState
 
 
@@ -34,12 +35,12 @@ class CircularMotion(Actor):
         chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
         direction, heading = self.heading + turned / 2.0, self.heading + turned
         x, y = self.start.tolist()
-        position = x + chord * math.cos(direction), y + chord * math.sin(direction)
-        velocity = self.speed * math.cos(heading), self.speed * math.sin(heading)
+        position = x + chord * cos(direction), y + chord * sin(direction)
+        velocity = self.speed * cos(heading), self.speed * sin(heading)
         self.state.send(BodyState(position, velocity, now))
 
 
 def _sinc(x: float) -> float:
     """sin(pi x) / (pi x), 1 at 0; np.sinc takes 10 us for one number."""
     angle = math.pi * x
-    return math.sin(angle) / angle if angle else 1.0
+    return sin(angle) / angle if angle else 1.0

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from ..core import Actor, InputPort, OutputPort, Parameter
+from ..core.elementary import hypot
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, enclosing
 
 
@@ -13,7 +12,8 @@ class Sensor(Actor):
 
     The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both
     of its components are drawn at every firing, whether used or not, so that neither ``kind`` nor
-    ``max_range`` moves the noise of later measurements.  A measurement is of the time of the target's state.
+    ``max_range`` moves the noise of later measurements.  A measurement is of the time of the robot's own
+    state, by the robot's own clock.
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
@@ -39,13 +39,13 @@ class Sensor(Actor):
         error_along, error_across = self._draw(2).tolist()
         if not (self.robot.present and self.target.present):
             return
-        position = self.robot.value.position
+        robot = self.robot.value
+        position = robot.position
         believed = self.location.value.position if self.location.present else position
         # Floats: arithmetic on arrays of two takes ten times as long.
-        target = self.target.value
-        (tx, ty), (x, y) = target.position.tolist(), position.tolist()
+        (tx, ty), (x, y) = self.target.value.position.tolist(), position.tolist()
         dx, dy = tx - x, ty - y
-        distance = math.hypot(dx, dy)
+        distance = hypot(dx, dy)
         if self.max_range is not None and distance > self.max_range:
             return
         along, across = self.along * error_along, self.across * error_across
@@ -54,4 +54,4 @@ class Sensor(Actor):
         else:
             nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
             value = [dx + along * nx - across * ny, dy + along * ny + across * nx]
-        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, target.time))
+        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, robot.time))

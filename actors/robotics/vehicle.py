@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core.elementary import hypot
 from .messages import BodyState, all_finite
 
 # Of floats: arithmetic on arrays of two takes ten times as long.
@@ -61,7 +60,7 @@ class Vehicle(Actor):
 def shortened(vector: Pair, longest: float) -> Pair:
     """The vector itself, or the one of length ``longest`` in its direction if it is longer."""
     x, y = vector
-    length = math.hypot(x, y)
+    length = hypot(x, y)
     return (x * (longest / length), y * (longest / length)) if length > longest else vector
 
 

@@ -22,7 +22,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Repeat the run, and compare its digest."""
     from ..engine import write_log
     from ..model import Problems
-    from ..show import draw_figures, figures_of, summary_table, write_folder
+    from ..show import check_folder, draw_figures, figures_of, summary_table, write_folder
     from ..study import open_study, plan_of_folder
     from ..study.one_run import again
 
@@ -31,6 +31,8 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     folder = options.out or options.folder / "replays" / row["run"][:12]
     model, results, simulation, error = again(plan, plan.condition(row["condition"]), row["seed"])
     figures = {} if error is not None else figures_of(model, Problems())
+    if replaced := check_folder(folder, model.name, ["epicycle", *given]):
+        complain(replaced)
     written = write_folder(folder, results, ["epicycle", *given], "" if error is None else str(error))
     written.append(folder / "log.parquet")
     write_log(simulation.log.records, written[-1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,13 +76,12 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Run the model, report and write what was asked for."""
     from epicycle.actors import EpicycleError
 
-    from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation, check_log_path, write_log
+    from ..engine import ActorError, LogFile, LogFilter, LoopError, Pace, Simulation
     from ..model import Problems
-    from ..show import FigureError, draw_figures, figures_of, summary_object, summary_table, write_folder
+    from ..show import FigureError, check_folder, draw_figures, figures_of, summary_object, summary_table, write_folder
 
-    if options.log is not None:
-        check_log_path(options.log)
-    elif options.log_where:
+    log = LogFile(options.log) if options.log is not None else None
+    if log is None and options.log_where:
         raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, to which the log is written")
     log_filter = LogFilter.of(options.log_where)
     until = seconds("--until", options.until) if options.until is not None else None
@@ -91,32 +90,35 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     folder = options.out or (None if options.json else Path("results") / model.name)
     if folder is not None and folder.exists() and not folder.is_dir():
         raise EpicycleError(f"--out {folder} is a file, not a folder")
-    simulation = Simulation(model, seed=options.seed, keep_log=log_filter if options.log is not None else False)
+    command = ["epicycle", *given]
+    if folder is not None and (replaced := check_folder(folder, model.name, command)):
+        complain(replaced)
+    keep_log, log_to = (False, None) if log is None else (log_filter, log.add)
+    simulation = Simulation(model, seed=options.seed, keep_log=keep_log, log_to=log_to)
     pace = Pace(options.realtime) if options.realtime is not None else None
-    with progress(model, until) as report:
+    if until is None and model.endless:
+        complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
+    with log or nullcontext(), progress(model, until) as report:
         try:
             results = simulation.run(until=until, progress=report, pace=pace)
         except (ActorError, LoopError, KeyboardInterrupt) as error:
             interrupted = isinstance(error, KeyboardInterrupt)
             results = simulation.results("interrupted" if interrupted else "failed")
-            if options.log is not None:
-                write_log(simulation.log.records, options.log)
             if folder is not None:
-                write_folder(folder, results, ["epicycle", *given], "interrupted" if interrupted else str(error))
+                write_folder(folder, results, command, "interrupted" if interrupted else str(error))
                 complain(f"what was recorded until then is in {folder}")
             raise
+        # Before the log is closed, which may fail.
+        saved = [] if folder is None else write_folder(folder, results, command)
     if pace is not None and pace.worst > NOTICEABLE:
         complain(
             f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
             f"{pace.behind:.3g} s at the end"
         )
-    if options.log is not None:
-        write_log(simulation.log.records, options.log)
     written, failed = [], list[FigureError]()
     if folder is not None:
-        written = write_folder(folder, results, ["epicycle", *given])
         drawn, failed = draw_figures(folder, results, figures)
-        written = [*drawn, *written]
+        written = [*drawn, *saved]
     if options.json:
         tell_json(summary_object(results))
     else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..printing import tell
+from ..printing import complain, tell
 from .options import DONE, add_model, load
 
 DESCRIPTION = "Check a model, or a study with all that it varies, without running it."
@@ -22,6 +22,13 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     if is_study(options.model):
         return check_study(options)
     model = load(options, strict=options.strict)
+    if model.endless:
+        told = f"warning: {model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
+        if options.strict:
+            from epicycle.actors import EpicycleError
+
+            raise EpicycleError(told.removeprefix("warning: "))
+        complain(told)
     tell(f"{options.model} is valid: {model.extent}")
     return DONE
 

@@ -2,7 +2,8 @@
 
 from .director import ActorError, Director, LoopError
 from .encoding import canonical, cell, leaves, plain
-from .log import EventLog, LogError, Record, check_log_path, write_log
+from .log import EventLog, LogError, Record
+from .log_file import LogFile, check_log_path, write_log
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
 from .results import Results
@@ -18,6 +19,7 @@ __all__ = [
     "EventLog",
     "Firing",
     "LogError",
+    "LogFile",
     "LogFilter",
     "LoopError",
     "Pace",

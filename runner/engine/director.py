@@ -32,12 +32,14 @@ from typing import Any
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake, readable
 from epicycle.aspects import Job
 
-from ..model import Position, describe, told_raised
+from ..model import NORMAL, RAISE_IT, Limits, Position, describe, told_raised
 from .agenda import Environment, Instant, Turn
 from .pace import Pace
 
 MAX_MICROSTEPS = 100_000
 MAX_STEPS = 1_000_000  # of SimPy at one instant
+REPORTED = 256  # tokens that come together at one port: so many at a time are counted
+SHOWN = 3  # ports in the message of a ``CrowdError``
 _START = 0
 
 
@@ -83,12 +85,51 @@ class LoopError(EpicycleError):
         )
 
 
+class CrowdError(LoopError):
+    """More at one tag, or still to come, than was meant to be; ``where`` are the ports at which most of it is."""
+
+    def __init__(self, tag: Tag, most: int, what: str, where: tuple[str, ...]) -> None:
+        super().__init__(tag.time, where)
+        self.args = (tag, most, what, where)
+        self.tag, self.most, self.what, self.where = self.args
+
+    def of(self, who: str) -> CrowdError:
+        """The same, with the name of who adds to it."""
+        return CrowdError(self.tag, self.most, self.what, (who,))
+
+    def __str__(self) -> str:
+        where = f", most of them at {', '.join(self.where)}" if self.where else ""
+        return readable(f"too much at {self.tag}: more than {self.most:,} {self.what}{where}; {RAISE_IT}")
+
+
+class Crowd:
+    """Counts what one tag holds, where there is much of it: those who add to it report many at a time."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self._tag: Tag | None = None
+        self._total = 0
+        self._by_port: dict[str, int] = {}
+
+    def add(self, tag: Tag, port: str, number: int) -> None:
+        """So many more at a port; raises ``CrowdError``."""
+        if tag != self._tag:
+            self._tag, self._total, self._by_port = tag, 0, {}
+        self._total += number
+        self._by_port[port] = self._by_port.get(port, 0) + number
+        if self._total > self.most:
+            ports = sorted(self._by_port, key=self._by_port.__getitem__, reverse=True)
+            raise CrowdError(tag, self.most, "tokens and acts of aspects", tuple(ports[:SHOWN]))
+
+
 class Director:
     """Fires the actors of one run."""
 
-    def __init__(self, order: dict[str, int], seed: int) -> None:
+    def __init__(self, order: dict[str, int], seed: int, limits: Limits = NORMAL) -> None:
         self.environment = Environment(initial_time=_START)
         self.seed = seed
+        self.crowd = Crowd(limits.tokens)
+        self._most_times = limits.times
         self.firings = 0
         self.present: Tag | None = None  # the tag that is being handled; None between, while SimPy does things
         self.last = Tag(_START, 0)  # the latest tag that was handled, or is being handled
@@ -151,6 +192,7 @@ class Director:
         turn = self.turn(stand_in or port.actor, self.ranks[port.path])
         rank, ready = turn.rank, self._ready
         put, put_channel = port.entry()
+        arrived = port.arrived
 
         def enter(token: Any) -> None:
             put(token)
@@ -160,6 +202,8 @@ class Director:
                 heappush(ready, rank)
                 if self.present is None:
                     self._await_present()
+            elif not len(arrived) % REPORTED:
+                self.crowd.add(self.tag, port.path, REPORTED)
 
         return enter
 
@@ -171,7 +215,10 @@ class Director:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
         now = self.tag
         tag = Tag(now.time + delay, 1) if delay > 0 else Tag(now.time, now.microstep + 1)
-        self._to_come(tag).deliveries.append(self.hold(deliver, token))
+        deliveries = self._to_come(tag).deliveries
+        deliveries.append(self.hold(deliver, token))
+        if len(deliveries) > self.crowd.most:
+            raise CrowdError(tag, self.crowd.most, "tokens that are on their way", self._who())
 
     def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
         """``deliver(token)``, to be called later."""
@@ -204,6 +251,11 @@ class Director:
 
     # -- the agenda -----------------------------------------------------------------------------------------------
 
+    def _who(self) -> tuple[str, ...]:
+        """The actor that fires now."""
+        turn = self._turns.get(self._rank)
+        return () if turn is None else (turn.actor.path,)
+
     def _want(self, turn: Turn) -> None:
         """Let an actor have a turn at the present tag."""
         if not turn.is_wanted:
@@ -230,6 +282,8 @@ class Director:
 
     def _await(self, tag: Tag) -> Instant:
         """Put a tag into the agenda."""
+        if len(self._instants) > self._most_times:
+            raise CrowdError(tag, self._most_times, "times at which something is still to come", self._who())
         heappush(self._times, tag.time)
         instant = self._instants[tag.time] = Instant(tag)
         return instant

@@ -7,7 +7,6 @@ import json
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, Tag, to_seconds
@@ -19,10 +18,12 @@ from .waiting import LARGE, WaitingTokens
 if TYPE_CHECKING:
     import pandas
 
+    from .director import Crowd
+
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
 _TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
-FORMATS = (".parquet", ".csv", ".jsonl")
-_PIECES = 3_000  # that are hashed together
+_PIECES = 3_000  # that are hashed together, when a tag is over
+_MOST_PIECES = 30_000
 
 Write = Callable[["Tag", Any], None]
 
@@ -70,10 +71,18 @@ class Record:
 
 
 class EventLog:
-    """Counts and digests every record, and keeps those that ``keeps(event, actor, port, aspect)`` says."""
+    """Counts and digests every record, and keeps those that ``keeps(event, actor, port, aspect)`` says.
 
-    def __init__(self, keeps: Callable[[str, str, str, str], bool] | None = None) -> None:
+    With ``log_to`` it keeps none of these, but gives them to that.
+    """
+
+    def __init__(
+        self,
+        keeps: Callable[[str, str, str, str], bool] | None = None,
+        log_to: Callable[[Record], None] | None = None,
+    ) -> None:
         self.records: list[Record] = []
+        self._log_to = log_to
         self._keeps = keeps
         self._writers: dict[tuple[str, str, str, str, int | None], Write] = {}
         # What the digest is made of, three pieces a record: tag, names, what was kept of the value.  Many are hashed at
@@ -84,6 +93,7 @@ class EventLog:
         self._hashed = 0  # records
         self._tag: Tag | None = None  # of the last record
         self._stamp = b""  # the same in bytes
+        self.crowd: Crowd | None = None  # is told of many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
@@ -106,15 +116,21 @@ class EventLog:
             if tag is not self._tag:
                 self._turn_to(tag)
             pieces.extend((self._stamp, head, kept))
-            if type(kept) is bytes and len(kept) > LARGE:
+            if len(pieces) > _MOST_PIECES:  # all of them at one tag, nearly
+                if self.crowd is not None:
+                    self.crowd.add(tag, f"{actor}.{port}", _MOST_PIECES // 3)
+                self._hash_pieces()
+            elif type(kept) is bytes and len(kept) > LARGE:
                 self._hash_pieces()
 
         if self._keeps is None or not self._keeps(event, actor, port, aspect):
             return write
 
+        keep = self._log_to or self.records.append
+
         def write_and_keep(tag: Tag, value: Any) -> None:
             write(tag, value)
-            self.records.append(Record(tag, event, actor, port, channel, aspect, value))
+            keep(Record(tag, event, actor, port, channel, aspect, value))
 
         return write_and_keep
 
@@ -140,7 +156,7 @@ class EventLog:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each record, with the columns of a log file; raises ``LogError`` if the records were not kept."""
-        if self._keeps is None:
+        if self._keeps is None or self._log_to is not None:
             raise LogError("the event log was not kept: make the run with Simulation(model, keep_log=True)")
         rows = [(*record.row()[:-1], record.value) for record in self.records]
         frame: pandas.DataFrame = pandas_module().DataFrame(rows, columns=list(COLUMNS))
@@ -151,45 +167,3 @@ class EventLog:
         """SHA-256 over all records so far, as hexadecimal text."""
         self._hash_pieces()
         return self._hash.hexdigest()
-
-
-def check_log_path(path: Path) -> None:
-    """Raise ``LogError`` early, before a run whose log could not be written."""
-    if path.suffix not in FORMATS:
-        raise LogError(f"{path} is no log file: its name must end in {', '.join(FORMATS)}")
-    if not path.parent.is_dir():
-        raise LogError(f"{path} cannot be written: there is no folder {path.parent}")
-
-
-def write_log(records: list[Record], path: Path) -> None:
-    """Write records as Parquet, CSV or JSON lines, by the ending of the file's name."""
-    rows = (record.row() for record in records)
-    if path.suffix == ".jsonl":
-        with path.open("w", encoding="utf-8") as file:
-            for row in rows:
-                values = dict(zip(COLUMNS, row, strict=True)) | {"value": json.loads(row[-1])}
-                file.write(json.dumps(values) + "\n")
-    elif path.suffix == ".csv":
-        import csv
-
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            writer.writerows(rows)
-    else:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        columns = list(zip(*rows, strict=True)) or [()] * len(COLUMNS)
-        types = (
-            pa.float64(),
-            pa.int64(),
-            pa.string(),
-            pa.string(),
-            pa.string(),
-            pa.int64(),
-            pa.string(),
-            pa.string(),
-        )
-        arrays = [pa.array(column, type=kind) for column, kind in zip(columns, types, strict=True)]
-        pq.write_table(pa.table(arrays, names=list(COLUMNS)), path)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from epicycle.actors import EpicycleError, to_nanoseconds, to_seconds
-from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, needed
+from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
 from ..model import WovenAspect
 from .local import Deliver
@@ -33,7 +33,7 @@ class Requests:
         def ask_for_firing(job: Job, point: JoinPoint) -> None:
             number = self._number[place] = self._number.get(place, -1) + 1
             self._jobs[place, number] = job
-            seconds = needed(self.model.times[place], job, ways[0].random) or 0.0
+            seconds = time_needed(self.model.times[place], job, ways[0].random) or 0.0
             point.act("requested", seconds)
             self.entries[place](FiringRequest(None, "", place, point.now, self.name, number, seconds))
 

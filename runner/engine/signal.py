@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,13 +75,17 @@ class Signal:
         found: list[Any] = self._tokens if self._kind is None else self._tokens.tolist()
         return found
 
+    def __iter__(self) -> Iterator[tuple[Tag, Any]]:
+        """Each token with its tag, of which there may be more than fit into memory all at once."""
+        return zip(map(Tag, self._times, self._microsteps), self._tokens, strict=True)
+
     def __len__(self) -> int:
         return len(self._times)
 
     @property
     def times(self) -> NDArray[np.float64]:
         """The times in seconds."""
-        return np.array([to_seconds(time) for time in self._times], dtype=float)
+        return np.fromiter(map(to_seconds, self._times), dtype=float, count=len(self))
 
     @property
     def microsteps(self) -> NDArray[np.int64]:
@@ -120,11 +124,13 @@ class Signal:
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each token, indexed by time in s: ``microstep``, and a column for each number or text in a token.
 
-        The column of a plain number is ``value``; others are called by their place, such as ``position[0]``.
+        The column of a plain number is ``value``; others are called by their place, such as ``position[0]``.  A field
+        ``time`` or ``microstep`` of the token itself is ``token.time`` or ``token.microstep``.
         """
         frames = pandas_module()
         index = frames.Index(self.times, name="time")
-        rows = [{place or "value": leaf for place, leaf in leaves(token)} for token in self.tokens]
+        named = {"": "value", "time": "token.time", "microstep": "token.microstep"}
+        rows = [{named.get(place, place): leaf for place, leaf in leaves(token)} for token in self.tokens]
         columns = dict.fromkeys(place for row in rows for place in row)
         frame: pandas.DataFrame = frames.DataFrame(rows, index=index, columns=list(columns))
         frame.insert(0, "microstep", self.microsteps)

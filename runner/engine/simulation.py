@@ -7,13 +7,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from epicycle.actors import Actor, to_nanoseconds, to_seconds
+from epicycle.actors import Actor, EpicycleError, to_nanoseconds, to_seconds
 
 from ..collection import without_collection
 from ..model import Model, WovenAspect, describe, raised_at
 from .director import ActorError, Director
 from .local import Deliver
-from .log import EventLog
+from .log import EventLog, Record
 from .log_filter import LogFilter
 from .measurement import Measurement
 from .pace import Pace
@@ -26,8 +26,9 @@ from .wiring import Wiring
 class Simulation:
     """One run of a model, which is checked first and may not be changed between this and ``run``.
 
-    A model can be run any number of times, each time by a Simulation of its own.  ``keep_log`` keeps the records of the
-    event log, all or those that a ``LogFilter`` lets pass.
+    A model can be run any number of times, one after the other, each time by a Simulation of its own.  ``keep_log``
+    keeps the records of the event log, all or those that a ``LogFilter`` lets pass; ``log_to``, such as
+    ``LogFile.add``, is given them instead.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
@@ -38,8 +39,10 @@ class Simulation:
         *,
         seed: int | None = None,
         keep_log: bool | LogFilter = False,
+        log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
     ) -> None:
+        _refuse_running(model)
         model.check()
         if keep_log is True:
             keep_log = LogFilter({})
@@ -52,8 +55,12 @@ class Simulation:
         self._tracer = tracer
         order = model.order()
         keeps = keep_log.keeps if keep_log else None
-        self.log = EventLog(keeps) if tracer is None else TracingLog(keeps, tracer)
-        self.director = Director(order, self.seed) if tracer is None else TracingDirector(order, self.seed, tracer)
+        self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
+        limits = model.graph.limits
+        self.director = (
+            Director(order, self.seed, limits) if tracer is None else TracingDirector(order, self.seed, tracer, limits)
+        )
+        self.log.crowd = self.director.crowd
         self.signals = {name: Signal(name) for name in model.recorded}
         self._measurements = {metric.name: Measurement(metric) for metric in model.metrics}
         self._has_run = False
@@ -109,17 +116,19 @@ class Simulation:
         """
         if self._has_run:
             raise RuntimeError("a Simulation runs once: make another one for another run")
+        _refuse_running(self.model)
         self._has_run = True
         stop = self._stop = self.model.stop_time if until is None else to_nanoseconds(until)
         actors = list(self.model.graph.actors.values())
         director = self.director
-        for actor in actors:
-            actor.enter(self._wiring.context_of(actor.path))
-            for port in actor.inputs.values():
-                port.clear()  # of what a failed run has left there
-        self._started = time.perf_counter()
         begun: list[Actor] = []
+        self.model.is_running = True
         try:
+            for actor in actors:
+                actor.enter(self._wiring.context_of(actor.path))
+                for port in actor.inputs.values():
+                    port.clear()  # of what a failed run has left there
+            self._started = time.perf_counter()
             for actor in actors:
                 self._call(actor, "initialize")
                 begun.append(actor)
@@ -130,10 +139,13 @@ class Simulation:
         except ActorError as error:
             raise self._placed(error) from _cause(error)
         finally:
-            self._wiring.close()
-            if self._tracer is not None:
-                self._tracer.end()
-            late = self._wrap_up(begun)
+            try:
+                self._wiring.close()
+                if self._tracer is not None:
+                    self._tracer.end()
+                late = self._wrap_up(begun)
+            finally:
+                self.model.is_running = False
         results = self.results(stopped)
         late = late or self._unreported
         if late is not None:
@@ -204,6 +216,15 @@ class Simulation:
             self._unreported = ActorError(f"aspect {woven.name}", self.director.tag, "report()", describe(error))
             self._unreported.__cause__ = error
             return {}
+
+
+def _refuse_running(model: Model) -> None:
+    """Its actors can be part of one run at a time."""
+    if model.is_running:
+        raise EpicycleError(
+            f"{model.name} is being run by another Simulation: wait until that is over, or load or build the model "
+            "once more"
+        )
 
 
 def _cause(error: ActorError) -> BaseException | None:

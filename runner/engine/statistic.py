@@ -153,13 +153,13 @@ class Spread(Statistic):
     def add(self, value: float, weight: int) -> None:
         self._weight += weight
         gap = value - self._mean
-        self._mean += gap * weight / self._weight
+        self._mean += gap * (weight / self._weight)
         self._squares += gap * (value - self._mean) * weight
 
     @property
     def value(self) -> float | None:
         weight = self._weight - self._is_sample
-        return math.sqrt(self._squares / weight) if weight > 0 else None
+        return math.sqrt(max(self._squares, 0.0) / weight) if weight > 0 else None  # rounding knows no sign
 
 
 class Quantile(Statistic):

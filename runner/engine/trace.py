@@ -12,6 +12,7 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import Job
 
+from ..model import Limits
 from .agenda import Turn
 from .director import Director
 from .execution import is_stand_in
@@ -100,8 +101,8 @@ class TracingLog(EventLog):
 class TracingDirector(Director):
     """A director that remembers why."""
 
-    def __init__(self, order: dict[str, int], seed: int, tracer: Tracer) -> None:
-        super().__init__(order, seed)
+    def __init__(self, order: dict[str, int], seed: int, tracer: Tracer, limits: Limits) -> None:
+        super().__init__(order, seed, limits)
         self._tracer = tracer
         self._arrivals: dict[str, list[Arrival]] = {}
         self._asked: dict[Wake, Tag | None] = {}

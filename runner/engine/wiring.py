@@ -21,7 +21,7 @@ from epicycle.actors import (
 from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint, Medium, Unit
 
 from ..model import Clock, Hop, Model, WovenAspect, describe
-from .director import ActorError, Director, LoopError
+from .director import ActorError, CrowdError, Director, LoopError
 from .execution import Execution
 from .local import Deliver, LocalDirector, Passage
 from .log import EventLog, Write
@@ -397,7 +397,10 @@ class Loom:
 
     def later(self, delay: int, deliver: Deliver, token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
-        self._local.later(delay, partial(self._deliver, deliver), token)
+        try:
+            self._local.later(delay, partial(self._deliver, deliver), token)
+        except CrowdError as error:
+            raise error.of(self._blame(error).path) from None
 
     def _deliver(self, deliver: Deliver, token: Any) -> None:
         try:

@@ -5,6 +5,7 @@ from .composite_class import CompositeClass, load_composite
 from .culprit import describe, raised_at
 from .ends import CompositePort, Instance
 from .graph import Hop, ModelGraph, Wire
+from .limits import NORMAL, RAISE_IT, Limits
 from .load import load_model
 from .model import Model
 from .observation import Metric
@@ -16,12 +17,15 @@ from .scope import Composite
 from .woven import WovenAspect, extent
 
 __all__ = [
+    "NORMAL",
+    "RAISE_IT",
     "Clock",
     "Composite",
     "CompositeClass",
     "CompositePort",
     "Hop",
     "Instance",
+    "Limits",
     "Metric",
     "Model",
     "ModelError",

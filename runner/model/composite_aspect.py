@@ -21,7 +21,7 @@ from .firing_times import without_port
 from .graph import Detour, ModelGraph
 from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect
 
 BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
@@ -41,7 +41,7 @@ class ModelWeaving(Weaving):
     def __init__(
         self,
         graph: ModelGraph,
-        ports: PathIndex,
+        paths: Paths,
         name: str,
         path: str,
         scope: str,
@@ -49,7 +49,7 @@ class ModelWeaving(Weaving):
         position: Position,
         cls: type[Aspect] = CompositeAspect,
     ) -> None:
-        super().__init__(graph, ports, name, cls, scope, problems)
+        super().__init__(graph, paths, name, cls, scope, problems)
         self.path = path
         self.position = position
         self.model = AspectModel(path, graph.composites[path], "", {})
@@ -67,16 +67,13 @@ class ModelWeaving(Weaving):
         self.model.response = self._only(self.outputs, "response", "output", self.position)
         if not self.requests and not self._is_unsure:
             self._request(PointcutText("", self.position))
-        if self._is_unsure:
-            self.graph.leave_open(self.path)
         for port in self.requests:
-            for hop in list(self.graph.incoming(port)):
+            for hop in self.graph.incoming(port):
                 self._problem(
                     f"{port} is for the tokens of this aspect, and nothing else can be connected to it",
                     hop.position,
                     "add another input for what else the composite needs",
                 )
-                self.graph.disconnect(hop)
             if isinstance(self.graph.ports.nodes[port]["port"], OutputPort):
                 self._problem(
                     f"{self.path} is the model of another aspect already",
@@ -88,7 +85,11 @@ class ModelWeaving(Weaving):
 
     def connect(self, woven: WovenAspect) -> None:
         """Let the tokens of all places come in, and go on when they are answered."""
+        if self._is_unsure:
+            self.graph.leave_open(self.path)
         for port in self.requests:
+            for hop in list(self.graph.incoming(port)):  # a problem, and told as such
+                self.graph.disconnect(hop)
             self.graph.open_requests(port)
         if self.model.response:
             self.graph.ports.nodes[self.model.response]["type"] = Request

@@ -13,6 +13,8 @@ from .declarations import CompositeText
 from .document import Entry, Mapping, Node
 from .files import data_file
 from .graph import ModelGraph
+from .limits import RAISE_IT
+from .patterns import TooManyError
 from .problems import Position, Problems, did_you_mean, nearest
 from .settings import Setting, Settings
 from .values import Values
@@ -86,7 +88,12 @@ class Configurator:
     def _setting(self, full: str) -> Setting | None:
         """The setting for a parameter, if there is one."""
         self.settable[full] = None
-        return self.settings.find(full)
+        try:
+            return self.settings.find(full)
+        except TooManyError as error:
+            self.problems.add(f"{full}: {error}", self.settings.position, RAISE_IT)
+            self.problems.raise_if_any()
+            raise AssertionError("too many paths are a problem") from None
 
     def _set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
         """The parameters of something that is made already which are set from outside, with their new values."""

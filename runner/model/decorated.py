@@ -9,10 +9,9 @@ from epicycle.aspects import Aspect, Decoration, decorations
 
 from .declarations import PointcutText
 from .graph import ModelGraph
-from .patterns import PathIndex
 from .problems import Position, Problems
 from .reading import Text
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .woven import WovenAspect
 
 Change = Callable[[str, Aspect], Mapping[str, object]]
@@ -57,9 +56,9 @@ def _weave(
         except EpicycleError as error:
             problems.add(f"aspect {name}: {error}", position)
             return None
-    index = PathIndex(port.path for port in own.values())
+    paths = Paths(graph, [port.path for port in own.values()])
     pointcuts = [PointcutText.of(Text(each, position)) for each in at_parameter]
-    weaving = Weaving(graph, index, name, type(aspect), actor.path, problems)
+    weaving = Weaving(graph, paths, name, type(aspect), actor.path, problems)
     woven = weaving.weave(aspect, pointcuts, lambda *_: position)
     woven.ports = [own[port].path for port in decoration.ports if port in own]
     woven.actors = {} if decoration.ports else {actor.path: actor.path}

@@ -178,10 +178,6 @@ def disturb(
     settings = Settings(settings_in(node, problems) if isinstance(node, Mapping) else [])
     catalogue = installed().with_types(types)
     composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
-    before = set(model.graph.composites)
     found = Elaborator(ModelText(root), composites, settings, problems, catalogue, broken).woven(model.graph)
-    if problems.found:  # then nothing has changed
-        for each in root.aspects.keys() & model.graph.composites.keys() - before:
-            model.forget(each)
     problems.raise_if_any()
     return found

@@ -21,10 +21,10 @@ from .configuration import Configurator, place_of
 from .declarations import CompositeText, PartText, PointcutText
 from .decorated import arranged, weave_decorations
 from .limits import RAISE_IT
-from .patterns import PathIndex
+from .patterns import TooManyError
 from .problems import Position, Problems, did_you_mean
 from .settings import Settings
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .woven import WovenAspect
 
 MAX_SHOWN = 12  # types in one message
@@ -54,9 +54,13 @@ class AspectElaborator(Configurator):
 
     def _weave(self) -> None:
         """Let all aspects stand where they are to, now that all ports exist."""
-        ports = PathIndex(self.graph.ports.nodes)
+        paths = Paths(self.graph)
         for name, scope, part, names in self._to_weave:
-            self._aspect(name, scope, part, names, ports)
+            try:
+                self._aspect(name, scope, part, names, paths)
+            except TooManyError as error:
+                self.problems.add(f"aspect {name}: {error}", part.position, RAISE_IT)
+                self.problems.raise_if_any()
         decorated = {cls for cls in set(map(type, self._actors)) if class_decorations(cls)}
         for actor in self._actors:
             if type(actor) in decorated and self.graph.actors.get(actor.path) is actor:
@@ -66,7 +70,7 @@ class AspectElaborator(Configurator):
         if check_nesting(self.aspects, self.graph, self.problems):
             self.graph.detours = detours(self.graph, self.aspects)
 
-    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], all_ports: PathIndex) -> None:
+    def _aspect(self, name: str, scope: str, part: PartText, names: dict[str, object], paths: Paths) -> None:
         cls = self._aspect_type(name, scope, part)
         if cls is None:
             return
@@ -81,9 +85,9 @@ class AspectElaborator(Configurator):
                 scope=scope,
             )
         self.graph.positions[f"aspect {name}"] = part.position
-        weaving = Weaving(self.graph, all_ports, name, cls, scope, self.problems)
+        weaving = Weaving(self.graph, paths, name, cls, scope, self.problems)
         if is_model and name in self.graph.composites:
-            weaving = ModelWeaving(self.graph, all_ports, name, name, scope, self.problems, part.position, cls)
+            weaving = ModelWeaving(self.graph, paths, name, name, scope, self.problems, part.position, cls)
             part = replace(part, at=[self._timed(pointcut, name, scope, names) for pointcut in part.at])
         is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
         try:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import networkx as nx
@@ -164,6 +165,38 @@ class ModelGraph:
             found.append(self._hops[order])
         return found[::-1]
 
+    def size(self) -> tuple[Any, ...]:
+        """How large it is, for ``shrink``."""
+        flags = {name: getattr(self, name) for name in ("is_wired", "detours", "_order")}
+        names = {name: set(getattr(self, name)) for name in ("empty_arrays", "unknown", "absent")}
+        return len(self.ports), [len(known) for known in self._by_path()], flags | names
+
+    def shrink(self, size: tuple[Any, ...]) -> None:
+        """Take out what was added since it had that size."""
+        ports, sizes, attributes = size
+        for hop in self.since(attributes["_order"]):
+            self.disconnect(hop)
+        self.ports.remove_nodes_from(list(islice(self.ports, ports, None)))
+        for actor in islice(self.actors.values(), sizes[0], None):
+            actor.home = None
+        for known, length in zip(self._by_path(), sizes, strict=True):
+            while len(known) > length:
+                known.popitem()
+        for members in self.members.values():
+            members[:] = [each for each in members if each in self.actors or each in self.clocks]
+        for border in self._borders.values():
+            for paths in border:
+                paths[:] = [path for path in paths if path in self.ports]
+        for name, value in attributes.items():
+            setattr(self, name, value)
+
+    def _by_path(self) -> tuple[dict[str, Any], ...]:
+        """What is known of parts, the actors first."""
+        return (
+            self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
+            self._borders,
+        )  # fmt: skip
+
     def remove(self, path: str) -> None:
         """Take out an actor, or a composite and all within, with their connections."""
 
@@ -176,10 +209,7 @@ class ModelGraph:
             self.ports.remove_node(port)
         for actor in [each for each in self.actors if is_within(each)]:
             self.actors[actor].home = None
-        by_path: tuple[dict[str, Any], ...] = (
-            self.actors, self.composites, self.positions, self.priorities, self.clocks, self.members, self._borders,
-        )  # fmt: skip
-        for known in by_path:
+        for known in self._by_path():
             for each in [each for each in known if is_within(each)]:
                 del known[each]
         for members in self.members.values():

@@ -26,6 +26,26 @@ class Limits:
         return 10 * self.actors
 
     @property
+    def watched(self) -> int:
+        """From how many ports metrics may take their numbers, a port counted for each metric."""
+        return 10 * self.actors
+
+    @property
+    def comparisons(self) -> int:
+        """With how many paths patterns may be compared, once they have been chosen by the names in them."""
+        return 250 * self.actors
+
+    @property
+    def tokens(self) -> int:
+        """How many tokens and acts of aspects one tag may hold in a run."""
+        return 10 * self.actors
+
+    @property
+    def times(self) -> int:
+        """At how many times something may still be to come in a run."""
+        return 50 * self.actors
+
+    @property
     def inherited(self) -> int:
         """How many actors, aspects, connections, ports and parameters classes may take over from others."""
         return 5 * self.actors

@@ -76,7 +76,7 @@ def load_model(
             without(text, change, problems)
         for change in aspects:
             change_aspect(text, change, problems)
-        elaborator = Elaborator(text, composites, Settings(settings), problems, catalogue, broken, limits)
+        elaborator = Elaborator(text, composites, Settings(settings, limits), problems, catalogue, broken, limits)
         model = elaborator.model()
         try_classes(composites, elaborator, broken)
         if model.figures:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from epicycle.actors import Tag, counted, declared_parameters
+from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..collection import without_collection
 from ..tables import Table, as_html, as_text, short
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .decorated import arranged
-from .ends import Port
+from .ends import Port, raising
 from .graph import ModelGraph
 from .measure import take_problem
 from .observation import Metric, Observation, checked_seed, nanoseconds
@@ -22,6 +22,7 @@ from .schedule import firing_order
 from .scope import Composite, Scope
 from .scopes import Scopes, is_within
 from .site import call_site
+from .transaction import all_or_nothing, transaction
 from .values import Values
 from .woven import WovenAspect, check_processors
 
@@ -67,6 +68,7 @@ class Model(Scope):
         self.figures: dict[str, tuple[str, dict[str, object], Position]] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
+        self.is_running = False
         self._order: dict[str, int] | None = None  # worked out since then
         self.stop = stop
 
@@ -79,12 +81,24 @@ class Model(Scope):
     def stop(self, stop: float | str | None) -> None:
         self.stop_time = None if stop is None else nanoseconds(stop)
 
+    @property
+    def endless(self) -> str:
+        """Why a run goes on for ever unless somebody ends it, in words; empty if that is not known."""
+        if self.stop_time is not None or self.stop_ports:
+            return ""
+        actors = self.graph.actors.values()
+        clock = next((actor.path for actor in actors if actor.is_endless), "")
+        if not clock or any(isinstance(actor, Stop) for actor in actors):
+            return ""
+        return f"{self.name} has no end: {clock} ticks for ever, and the model says neither stop nor stop_when"
+
     def local_tag(self, actor: str, tag: Tag) -> Tag:
         """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
         return self.graph.clocks[self.graph.director_of(actor)].tag(tag)
 
     # -- what disturbs it -----------------------------------------------------------------------------------------
 
+    @all_or_nothing
     def disturb(
         self, disturbance: str | Path, *, set: Mapping[str, object] | None = None, types: Iterable[type] = ()
     ) -> list[WovenAspect]:
@@ -129,17 +143,13 @@ class Model(Scope):
         self._watch([of], lambda observation, text: observation.metric(name, text, values, position))
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[Observation, Text], None]) -> None:
-        """Let an ``Observation`` do what it does for a model file; if something is wrong, nothing has changed."""
+        """Let an ``Observation`` do what it does for a model file."""
         position = call_site()
-        before = list(self.recorded), list(self.stop_ports), list(self.metrics)
-        problems = Problems()
-        observation = Observation(self, Values(problems), problems)
-        for port in ports:
-            path = port if isinstance(port, str) else port.path
-            ask(observation, Text(path, within(Text(path, position), path)))
-        if problems.found:
-            self.recorded, self.stop_ports, self.metrics = before
-        problems.raise_if_any()
+        with transaction(self), raising() as problems:
+            observation = Observation(self, Values(problems), problems)
+            for port in ports:
+                path = port if isinstance(port, str) else port.path
+                ask(observation, Text(path, within(Text(path, position), path)))
 
     # -- the whole ------------------------------------------------------------------------------------------------
 
@@ -179,7 +189,7 @@ class Model(Scope):
     def forget(self, path: str) -> None:
         """Engine: take out an actor or composite, and whatever stands at it or watches it."""
         self.graph.remove(path)
-        self.scopes.remove(path)
+        self.scopes.renew()
         for woven in self.aspects:
             woven.ports = [port for port in woven.ports if not is_within(port, path)]
             woven.actors = {actor: unit for actor, unit in woven.actors.items() if not is_within(actor, path)}

@@ -10,8 +10,9 @@ from epicycle.actors import Parameter, ParameterError, accepts, declared_paramet
 
 from .declarations import DeclarationReader, MetricText, ModelText
 from .document import Node, Scalar, plain
+from .limits import RAISE_IT
 from .measure import Measure
-from .patterns import PathIndex, PatternError
+from .patterns import PathIndex, PatternError, TooManyError
 from .problems import Position, Problems, did_you_mean
 from .reading import Text
 from .values import Values
@@ -46,17 +47,20 @@ class Observation:
         self.values = values
         self.problems = problems
         ports = self.graph.ports.nodes(data="direction")
-        self._outputs = PathIndex(path for path, direction in ports if direction == "output")
+        outputs = (path for path, direction in ports if direction == "output")
+        self._outputs = PathIndex(outputs, self.graph.limits)
+        self._recorded = set(model.recorded)
+        self._watched = 0
 
     def read(self, text: ModelText, names: dict[str, object]) -> None:
         """Everything that the model file says about it."""
         reader = DeclarationReader(self.problems)
         for key, entry in text.run.items():
             if key == "record":
-                for each in reader.texts(entry.value, key):
+                for each in _different(reader.texts(entry.value, key)):
                     self.record(each)
             elif key == "stop_when":
-                for each in reader.texts(entry.value, key):
+                for each in _different(reader.texts(entry.value, key)):
                     self.stop_when(each)
             else:
                 value = self.values.of(entry.value, names, key)
@@ -87,7 +91,9 @@ class Observation:
 
     def record(self, text: Text) -> None:
         """Keep what the ports behind a pattern send."""
-        self.model.recorded = list(dict.fromkeys([*self.model.recorded, *self._select(text, "record")]))
+        found = [path for path in self._select(text, "record") if path not in self._recorded]
+        self._recorded.update(found)
+        self.model.recorded += found
 
     def stop_when(self, text: Text) -> None:
         """End the run when a port behind the pattern sends something true."""
@@ -118,6 +124,11 @@ class Observation:
             return
         self.graph.positions[what] = position
         paths = self._select(of, what)
+        self._watched += len(paths)
+        limit = self.graph.limits.watched
+        if self._watched > limit:
+            self.problems.add(f"{what}: metrics are taken from more than {limit:,} ports", position, RAISE_IT)
+            self.problems.raise_if_any()
         self.model.metrics.append(Metric(name, paths, measure))
         if measure.kind.of == "any":
             return
@@ -161,6 +172,10 @@ class Observation:
         except PatternError as error:
             self.problems.add(f"{what}: {text.text!r} is no pattern: {error}", text.position)
             return []
+        except TooManyError as error:
+            self.problems.add(f"{what}: {error}", text.position, RAISE_IT)
+            self.problems.raise_if_any()
+            raise AssertionError("too many paths are a problem") from None
         if found or self.graph.is_excused(text.text):
             return found
         guess = self._outputs.did_you_mean(text.text)
@@ -175,6 +190,14 @@ class Observation:
                 *self._outputs.advice(text.text),
             )
         return []
+
+
+def _different(texts: list[Text]) -> list[Text]:
+    """The texts, each once: a pattern may select all of a model."""
+    found: dict[str, Text] = {}
+    for each in texts:
+        found.setdefault(each.text, each)
+    return list(found.values())
 
 
 def _words(node: Node) -> object:

@@ -7,20 +7,52 @@ segments.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, KeysView, Sequence
 from functools import cached_property, lru_cache
 
 from epicycle.actors import did_you_mean
+
+from .limits import NORMAL, Limits
 
 _SEGMENT = re.compile(r"(\*\*(?!\[)|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?\Z")
 
 _INDEX = re.compile(r"\[\d+\]")
 MAX_PATTERN = 1_000
+_FEW = 30  # paths for which to compile a pattern does not pay
+_MANY = 5  # how often all paths are gone through before they are sorted by their names
 MAX_SHOWN = 12  # names in a message
 
 
 class PatternError(ValueError):
     """Text that is no pattern; the message says why."""
+
+
+class TooManyError(Exception):
+    """There are more patterns and paths than can be compared soon."""
+
+
+class Comparisons:
+    """How many paths patterns may still be compared with; raises ``TooManyError``."""
+
+    def __init__(self, most: int) -> None:
+        self._most = self._left = most
+
+    def spend(self, number: int) -> None:
+        """Take some off."""
+        self._left -= number
+        if self._left < 0:
+            raise TooManyError(f"patterns are compared with more than {self._most:,} paths")
+
+
+def names_asked(pattern: str) -> list[str]:
+    """The segments of a pattern that a path must have, one for one: ``s[3]``, ``s[*]`` or ``s``."""
+    return [segment for segment in pattern.split(".") if not segment.startswith("*")]
+
+
+def names_of(path: str) -> set[str]:
+    """What patterns may ask for by ``names_asked``, of one path."""
+    names = set(path.split("."))
+    return names | {f"{name[: name.index('[')]}[*]" for name in names if name[-1:] == "]"}
 
 
 @lru_cache(maxsize=4096)
@@ -66,9 +98,48 @@ def _segments(text: str) -> list[tuple[str, str | None]]:
     return found
 
 
+def check_pattern(text: str) -> None:
+    """Raise ``PatternError`` if a text is no pattern."""
+    _segments(text)
+
+
 def matches(pattern: str, path: str) -> bool:
-    """Whether the pattern selects the path."""
-    return compile_pattern(pattern).fullmatch(f"{path}.") is not None
+    """Whether the pattern, which is one, selects the path; for a few paths sooner told than by ``compile_pattern``."""
+    head, *tails = _split(pattern.split("."), "**")
+    names = path.split(".")
+    if not tails:
+        return len(head) == len(names) and _fit(head, names)
+    *middle, last = tails
+    end = len(names) - len(last)
+    if not _fit(head, names[: len(head)]) or not _fit(last, names[max(0, end) :]):
+        return False
+    at = len(head)
+    for tail in middle:
+        at = next((place for place in range(at + 1, end) if _fit(tail, names[place : place + len(tail)])), end) + len(
+            tail
+        )
+    return at < end  # the last `**` stands for one at least
+
+
+def _split(segments: list[str], sign: str) -> list[list[str]]:
+    parts: list[list[str]] = [[]]
+    for segment in segments:
+        if segment == sign:
+            parts.append([])
+        else:
+            parts[-1].append(segment)
+    return parts
+
+
+def _fit(segments: list[str], names: list[str]) -> bool:
+    """Whether so many segments without ``**`` stand for these names."""
+    return len(segments) == len(names) and all(map(_fits, segments, names))
+
+
+def _fits(segment: str, name: str) -> bool:
+    if segment[:1] == "*" or segment == name:
+        return True
+    return segment[-3:] == "[*]" and name[-1:] == "]" and name.startswith(segment[:-2])
 
 
 def could_be_within(pattern: str, path: str, *, array: bool) -> bool:
@@ -97,10 +168,15 @@ def _always(_: str) -> bool:
 
 
 class PathIndex:
-    """Paths, for patterns to choose from without a look at each of them: a model may have many of both."""
+    """Paths, for patterns to choose from without a look at each of them: a model may have many of both.
 
-    def __init__(self, paths: Iterable[str]) -> None:
+    ``limits`` are those of the model: patterns that are to be compared with too many paths raise ``TooManyError``.
+    """
+
+    def __init__(self, paths: Iterable[str], limits: Limits = NORMAL) -> None:
         self._place = {path: place for place, path in enumerate(paths)}
+        self._comparisons = Comparisons(limits.comparisons)
+        self._compared = 0
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._place)
@@ -113,10 +189,19 @@ class PathIndex:
         if "*" not in pattern:
             _segments(pattern)
             return [pattern] if pattern in self._place else []
-        expression = compile_pattern(pattern)
+        check_pattern(pattern)
         # Where the first wildcard stands, `name[*]` still says the name.
         fixed = pattern.partition("*")[0].rstrip("[.")
-        candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else list(self._place)
+        candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else self._order
+        # To choose by the names in a pattern pays when there are many patterns.
+        if self._compared > _MANY * len(self._place):
+            others = [self._having.get(name, ()) for name in names_asked(pattern)]
+            candidates = min(candidates, *others, key=len) if others else candidates
+        self._compared += len(candidates)
+        self.spend(len(candidates))
+        if len(candidates) < _FEW:
+            return [path for path in candidates if matches(pattern, path)]
+        expression = compile_pattern(pattern)
         return [path for path in candidates if expression.fullmatch(f"{path}.")]
 
     def in_order(self, paths: Iterable[str]) -> list[str]:
@@ -155,9 +240,31 @@ class PathIndex:
         more = ", ..." if len(holders) > MAX_SHOWN else ""
         return (f"there are such ports at {', '.join(holders[:MAX_SHOWN])}{more}",)
 
-    def inside(self, scope: str) -> Iterable[str]:
+    @property
+    def paths(self) -> KeysView[str]:
+        """All of them, in their order."""
+        return self._place.keys()
+
+    def spend(self, number: int) -> None:
+        """Count paths that are gone through for another reason; raises ``TooManyError`` if there are too many."""
+        self._comparisons.spend(number)
+
+    def inside(self, scope: str) -> Collection[str]:
         """The paths within a composite; all of them if it is the model."""
-        return self._within.get(scope, ()) if scope else self._place
+        return self._within.get(scope, ()) if scope else self._place.keys()
+
+    @cached_property
+    def _order(self) -> list[str]:
+        return list(self._place)
+
+    @cached_property
+    def _having(self) -> dict[str, list[str]]:
+        """The paths by the names in them."""
+        found: dict[str, list[str]] = {}
+        for path in self._place:
+            for name in names_of(path):
+                found.setdefault(name, []).append(path)
+        return found
 
     @cached_property
     def _within(self) -> dict[str, list[str]]:

@@ -2,7 +2,7 @@
 
 A program makes and changes the same graph as a model file does, through the same rules: names, connections, pointcuts
 and metrics go to the classes that read them from YAML, and a mistake raises ``ModelError`` that points at the line of
-the program.  A call that fails changes nothing.
+the program.  A call that fails changes nothing (``transaction``).
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from .ends import (
     raising,
 )
 from .graph import Hop
-from .patterns import PathIndex
 from .problems import Position, Problems, did_you_mean
 from .reading import NAME, Text, within
 from .site import call_site, node_of
+from .transaction import all_or_nothing
 from .values import Values
-from .weave import Weaving
+from .weave import Paths, Weaving
 from .wiring import Child, Wiring
 from .woven import WovenAspect
 
@@ -61,6 +61,16 @@ class Scope:
         self._parts: dict[str, Child] = {}
 
     @property
+    def model(self) -> Model:
+        """The model that it is, or is in."""
+        return self._model
+
+    def forget_parts(self) -> None:
+        """Engine: what is in here is to be found anew."""
+        self._parts = {}
+        self._text.actors.clear()
+
+    @property
     def _children(self) -> dict[str, Child]:
         self._model.scopes.update()
         return self._parts
@@ -71,6 +81,7 @@ class Scope:
     def add(self, part: A, *, priority: int | None = None) -> A: ...
     @overload
     def add(self, part: Instance) -> Composite: ...
+    @all_or_nothing
     def add(self, part: Actor | Instance, *, priority: int | None = None) -> Actor | Composite:
         """Add an actor, or an instance of a composite class, and return it.
 
@@ -87,13 +98,14 @@ class Scope:
         with raising() as problems:
             full = self._free(part.path, position, problems)
         if isinstance(part, Actor):
+            name = part.path
             part.move(full)
             self._model.graph.add_actor(part, position)
             try:
                 with raising() as problems:
                     self._model.enlist(weave_decorations(part, self._model.graph, problems, position))
             except Exception:
-                self._model.forget(full)
+                part.move(name)  # it may be added elsewhere
                 raise
         else:
             part.unfold(full, self._model, position)
@@ -102,6 +114,7 @@ class Scope:
         self._model.changed()
         return part if isinstance(part, Actor) else self._model.scope(full)
 
+    @all_or_nothing
     def composite(
         self,
         name: str,
@@ -126,17 +139,14 @@ class Scope:
             self._model.graph.add_director(full, begin, speed)
         self._model.graph.positions.setdefault(full, position)
         made = self._model.scope(full)
-        try:
-            for port in inputs:
-                made.input(port)
-            for port in outputs:
-                made.output(port)
-        except Exception:
-            self.remove(name)
-            raise
+        for port in inputs:
+            made.input(port)
+        for port in outputs:
+            made.output(port)
         self._model.changed()
         return made
 
+    @all_or_nothing
     def remove(self, name: str) -> None:
         """Take out an actor or a composite with all that is connected to it, stands at it and watches it."""
         position = call_site()
@@ -152,13 +162,6 @@ class Scope:
                 )
             elif full != child.paths[-1]:
                 problems.add(f"{full} is not the last of its array", position, f"only {child.paths[-1]} can be removed")
-        assert child is not None
-        child.paths.pop()
-        del child.actors[len(child.paths) :]
-        child.count = len(child.paths)
-        if not child.paths:
-            del self._children[name.partition("[")[0]]
-            self._text.actors.pop(name.partition("[")[0], None)
         self._model.forget(full)
 
     def __getitem__(self, name: str) -> Any:
@@ -222,6 +225,7 @@ class Scope:
 
     # -- connections ----------------------------------------------------------------------------------------------
 
+    @all_or_nothing
     def connect(self, source: Ends, destination: Ends | None = None, *, delay: float | str | None = None) -> None:
         """Connect ports, given as such or as text: ``connect(a.output, b.input)``, ``connect("a.output -> b.input")``.
 
@@ -231,22 +235,17 @@ class Scope:
         """
         position = call_site()
         graph = self._model.graph
-        before, was_wired = graph.mark(), graph.is_wired
-        try:
-            with raising() as problems:
-                connection = self._connection(source, destination, delay, position, problems)
-                if connection is not None:
-                    wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
-                    wiring.connect(connection, {})
-                for hop in graph.since(before):
-                    self._judge(hop, problems)
-        except Exception:
+        before = graph.mark()
+        with raising() as problems:
+            connection = self._connection(source, destination, delay, position, problems)
+            if connection is not None:
+                wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
+                wiring.connect(connection, {})
             for hop in graph.since(before):
-                graph.disconnect(hop)
-            graph.is_wired = was_wired
-            raise
+                self._judge(hop, problems)
         self._model.changed()
 
+    @all_or_nothing
     def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
         """Take out the connections between ports, which are given as to ``connect``; there must be some."""
         position = call_site()
@@ -373,6 +372,7 @@ class Scope:
 
     # -- aspects --------------------------------------------------------------------------------------------------
 
+    @all_or_nothing
     def weave(
         self,
         name: str,
@@ -401,27 +401,20 @@ class Scope:
         if isinstance(aspect, Aspect):
             with raising() as problems:
                 pointcuts = self._pointcuts(at, type(aspect), position, problems)
-                weaving = Weaving(self._model.graph, self._ports, full, type(aspect), self.path, problems)
+                weaving = Weaving(self._model.graph, self._paths, full, type(aspect), self.path, problems)
                 woven = weaving.weave(aspect, pointcuts, lambda *_: position)
             self._model.enlist([woven])
             return woven
         model, kind = self._model, CompositeAspect if firing_time is None else CompositeExecutionAspect
         composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
-        try:
-            with raising() as problems:
-                pointcuts = self._pointcuts(at, kind, position, problems)
-                for pointcut in pointcuts:
-                    pointcut.firing_time = firing_time or 0.0
-                detour = ModelWeaving(
-                    model.graph, self._ports, full, composite.path, self.path, problems, position, kind
-                )
-                woven = detour.weave(kind(), pointcuts, lambda *_: position)
-                detour.check(woven)
-                check_nesting([*model.aspects, woven], model.graph, problems)
-        except Exception:
-            if composite is not aspect:
-                self.remove(composite.path.removeprefix(self._full("")))
-            raise
+        with raising() as problems:
+            pointcuts = self._pointcuts(at, kind, position, problems)
+            for pointcut in pointcuts:
+                pointcut.firing_time = firing_time or 0.0
+            detour = ModelWeaving(model.graph, self._paths, full, composite.path, self.path, problems, position, kind)
+            woven = detour.weave(kind(), pointcuts, lambda *_: position)
+            detour.check(woven)
+            check_nesting([*model.aspects, woven], model.graph, problems)
         detour.connect(woven)
         model.graph.positions.setdefault(f"aspect {full}", position)
         model.enlist([woven])
@@ -429,8 +422,8 @@ class Scope:
         return woven
 
     @property
-    def _ports(self) -> PathIndex:
-        return PathIndex(self._model.graph.ports.nodes)
+    def _paths(self) -> Paths:
+        return Paths(self._model.graph)
 
     def _pointcuts(
         self, at: Places | Mapping[str, Places], cls: type[Aspect], position: Position, problems: Problems
@@ -456,6 +449,7 @@ class Scope:
             return None
         return place.path
 
+    @all_or_nothing
     def unweave(self, name: str) -> None:
         """Take an aspect out, with its composite if it is a model."""
         full = self._full(name)
@@ -488,6 +482,7 @@ class Composite(Scope):
         """Add an output port."""
         return self._port(name, "output")
 
+    @all_or_nothing
     def _port(self, name: str, direction: str) -> CompositePort:
         position = call_site()
         full = self._full(name)

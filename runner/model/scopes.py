@@ -34,7 +34,8 @@ class Scopes:
             position = graph.positions.get(path, here)
             kind = graph.composites[path]
             label = path if kind == OF_NO_CLASS else kind
-            scope = self._known[path] = Composite(self._model, path, label, position)
+            if (scope := self._known.get(path)) is None:
+                scope = self._known[path] = Composite(self._model, path, label, position)
             self._enrol(path, Child([path], path.endswith("]"), scope.declaration, None, 1), position)
         for port, node in islice(graph.ports.nodes(data=True), ports, None):
             owner, _, name = port.rpartition(".")
@@ -54,11 +55,12 @@ class Scopes:
         """The scope of a composite."""
         return self._known[path]
 
-    def remove(self, path: str) -> None:
-        """Forget a composite and all within."""
-        self._known = {each: scope for each, scope in self._known.items() if not is_within(each, path)}
-        graph = self._model.graph
-        self._seen = (len(graph.composites), len(graph.ports), len(graph.actors))
+    def renew(self) -> None:
+        """Look at the whole graph next time: something has been taken out of it."""
+        self._known = {path: scope for path, scope in self._known.items() if path in self._model.graph.composites}
+        for scope in (self._model, *self._known.values()):
+            scope.forget_parts()
+        self._seen = (0, 0, 0)
 
 
 def is_within(path: str, outer: str) -> bool:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from .declarations import ModelText, PartText, PointcutText
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, read
-from .patterns import PatternError, matches
+from .limits import NORMAL, Limits
+from .patterns import Comparisons, PatternError, check_pattern, matches, names_asked, names_of
 from .problems import Position, Problems, did_you_mean
 from .reading import NAME, Text, split
 
@@ -32,24 +33,37 @@ class Setting:
 class Settings:
     """All that is set from outside, in the order in which it counts: the last one that fits a parameter wins."""
 
-    def __init__(self, settings: Iterable[Setting] = ()) -> None:
+    def __init__(self, settings: Iterable[Setting] = (), limits: Limits = NORMAL) -> None:
         self._all = list(settings)
-        # An overrides file may name thousands of paths: only patterns are tried one after the other.
+        # An overrides file may name thousands of paths: only patterns are tried one after the other, and of these only
+        # those that ask for a name that the path has, the one that fewest paths will have.
         self._exact: dict[str, list[int]] = {}
-        self._patterns: list[int] = []
+        self._patterns: dict[str, list[int]] = {}
+        self._comparisons = Comparisons(limits.comparisons)
         for number, setting in enumerate(self._all):
             if "*" in setting.path:
-                self._patterns.append(number)
+                asked = names_asked(setting.path)
+                rare = next((name for name in asked if "[" in name and "*" not in name), asked[-1] if asked else "")
+                self._patterns.setdefault(rare, []).append(number)
             else:
                 self._exact.setdefault(setting.path, []).append(number)
 
     def find(self, full: str) -> Setting | None:
-        """The setting for the parameter at this path; all that fit are marked as used."""
+        """The setting for the parameter at this path; all that fit are marked as used.  Raises ``TooManyError``."""
         found = self._exact.get(full, [])
-        found = found + [number for number in self._patterns if self._all[number].matches(full)]
+        if self._patterns:
+            likely = [number for name in ("", *names_of(full)) for number in self._patterns.get(name, ())]
+            self._comparisons.spend(len(likely))
+            found = found + [number for number in likely if self._all[number].matches(full)]
         for number in found:
             self._all[number].used = True
         return self._all[max(found)] if found else None
+
+    @property
+    def position(self) -> Position | None:
+        """Where the first of the patterns stands."""
+        numbers = [number for each in self._patterns.values() for number in each]
+        return self._all[min(numbers)].position if numbers else None
 
     def unused(self) -> list[Setting]:
         """Those that no parameter has taken."""
@@ -83,7 +97,7 @@ def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
 def is_pattern(path: str, position: Position, problems: Problems) -> bool:
     """Whether a text names parameters, alone or by a pattern; if not, that is noted."""
     try:
-        matches(path, "")
+        check_pattern(path)
     except PatternError as error:
         problems.add(f"{path!r} is no parameter path: {error}", position)
         return False

@@ -19,7 +19,7 @@ _OVERHEAD = 3  # what a class takes beside what is in it, as many actors
 def try_classes(composites: Mapping[str, CompositeText], model: Elaborator, broken: Collection[str] = ()) -> None:
     """Check what can be checked of every class of which the model has no instance.
 
-    All trials together may cost as much as a model of the largest size; of classes that are left over, a warning tells.
+    All trials together may cost as much as a model of half the largest size; a warning tells what is left over.
     """
     problems, limits = model.problems, model.graph.limits
     tried = set(model.made)
@@ -28,7 +28,7 @@ def try_classes(composites: Mapping[str, CompositeText], model: Elaborator, brok
         for composite in composites.values()
         for part in (*composite.actors.values(), *composite.aspects.values())
     }
-    left = limits.actors
+    most = left = limits.actors // 2
     untried: list[str] = []
     # Those that stand in no other come first, for the others are then tried as their parts.
     for name in sorted(composites, key=lambda name: name in inner):
@@ -50,7 +50,7 @@ def try_classes(composites: Mapping[str, CompositeText], model: Elaborator, brok
         )
         problems.warn(
             f"{names} not checked in full: the model has no instance of such a class, and to try all that it has none "
-            f"of takes more than {limits.actors:,} actors and composites",
+            f"of takes more than {most:,} actors and composites",
             composites[untried[0]].position,
             RAISE_IT,
         )

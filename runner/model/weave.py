@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from typing import Any
 
 from epicycle.actors import declared_parameters
@@ -24,20 +25,51 @@ from epicycle.aspects import (
 from .declarations import PointcutText
 from .firing_times import unknown_inputs
 from .graph import ModelGraph
-from .patterns import PathIndex, PatternError, matches
+from .patterns import PathIndex, PatternError
 from .problems import Position, Problems, did_you_mean, nearest
 from .reading import Text
 from .woven import WovenAspect
+
+
+class Paths:
+    """What the pointcuts of a model's aspects choose from, found out once for all of them; of ``ports``, or of all."""
+
+    def __init__(self, graph: ModelGraph, ports: Iterable[str] | None = None) -> None:
+        self._graph = graph
+        self.ports = PathIndex(graph.ports.nodes if ports is None else ports, graph.limits)
+
+    @cached_property
+    def actors(self) -> PathIndex:
+        """All actors."""
+        return PathIndex(self._graph.actors, self._graph.limits)
+
+    @cached_property
+    def holders(self) -> PathIndex:
+        """All actors and composites."""
+        return PathIndex([*self._graph.actors, *self._graph.composites], self._graph.limits)
+
+    @cached_property
+    def owners(self) -> PathIndex:
+        """All composites and actors, those that could not be made included."""
+        graph = self._graph
+        unmade = (graph.owner(path) for path, is_unmade in graph.ports.nodes(data="unmade") if is_unmade)
+        return PathIndex(dict.fromkeys((*graph.composites, *graph.actors, *unmade)), graph.limits)
+
+    @cached_property
+    def kinds(self) -> dict[str, str]:
+        """The types of all actors and composites."""
+        return {path: type(actor).__name__ for path, actor in self._graph.actors.items()} | self._graph.composites
 
 
 class Weaving:
     """Finds the places of one aspect; ``scope`` is the composite that declares it, to which its names are relative."""
 
     def __init__(
-        self, graph: ModelGraph, ports: PathIndex, name: str, cls: type[Aspect], scope: str, problems: Problems
+        self, graph: ModelGraph, paths: Paths, name: str, cls: type[Aspect], scope: str, problems: Problems
     ) -> None:
         self.graph = graph
-        self.ports = ports
+        self.paths = paths
+        self.ports = paths.ports
         self.name = name
         self.cls = cls
         self.scope = scope
@@ -144,7 +176,7 @@ class Weaving:
             try:
                 if any(self._fits(port) for port in self.ports.select(pattern)):
                     return False
-                actors = PathIndex(self.graph.actors).select(owner)
+                actors = self.paths.actors.select(owner)
             except PatternError:
                 return False  # which is told of it as a pattern of ports
         having = [path for path in actors or () if name in declared_parameters(type(self.graph.actors[path]))]
@@ -206,7 +238,8 @@ class Weaving:
         graph, owners = self.graph, self._chosen_owners(pointcut)
         if owners is None:
             return None
-        ports = [path for path in self.ports if graph.owner(path) in owners]
+        of_owners = dict.fromkeys(path for owner in owners for path in self.ports.inside(owner))
+        ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
         if pointcut.port is None:
             found = [path for path in ports if self._fits(path)]
             if not found and not any(path in graph.unknown for path in owners):
@@ -228,8 +261,10 @@ class Weaving:
     def _chosen_owners(self, pointcut: PointcutText) -> set[str] | None:
         """The actors and composites of a type, or with a tag."""
         graph = self.graph
-        kinds = {path: type(actor).__name__ for path, actor in graph.actors.items()} | graph.composites
-        inside = [path for path in kinds if not self.scope or path.startswith(f"{self.scope}.")]
+        kinds = self.paths.kinds
+        inside = self.paths.holders.inside(self.scope)
+        self.paths.holders.spend(len(inside))
+        inside = [path for path in inside if path in kinds]
         if pointcut.type is not None:
             owners = {path for path in inside if kinds[path] == pointcut.type.text}
             wanted, known = pointcut.type, {kinds[path] for path in inside}
@@ -254,22 +289,18 @@ class Weaving:
 
     def _select_actors(self, pointcuts: list[PointcutText]) -> dict[str, str]:
         """The actors that the pointcuts select, as such or with a composite around them, and what was aimed at."""
-        index = self._owners_index()
+        index = self.paths.owners
         aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
         spared = {path for pointcut in pointcuts if pointcut.exclude for path in self._aimed_at(pointcut, index)}
         found = {}
-        for actor in self.graph.actors:
+        actors = self.paths.actors
+        for actor in actors.in_order({each for unit in aimed for each in (unit, *actors.inside(unit))} & actors.paths):
             parts = actor.split(".")
             around = [".".join(parts[:length]) for length in range(1, len(parts) + 1)]
             unit = next((path for path in around if path in aimed), None)
             if unit is not None and not spared.intersection(around):
                 found[actor] = unit
         return found
-
-    def _owners_index(self) -> PathIndex:
-        """All actors and composites, those that could not be made included."""
-        unmade = (self.graph.owner(path) for path, is_unmade in self.graph.ports.nodes(data="unmade") if is_unmade)
-        return PathIndex(dict.fromkeys((*self.graph.composites, *self.graph.actors, *unmade)))
 
     def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> Iterable[str]:
         """The actors and composites that one pointcut selects."""
@@ -340,10 +371,12 @@ class Weaving:
             return []
         left, _, right = (part.strip() for part in pointcut.text.partition("->"))
         try:
+            ends = set(self.ports.select(self._full(right)))
             found = [
                 (hop.source, hop.destination)
-                for *_, hop in self.graph.ports.edges(data="hop")
-                if matches(self._full(left), hop.source) and matches(self._full(right), hop.destination)
+                for source in self.ports.select(self._full(left))
+                for hop in self.graph.outgoing(source)
+                if hop.destination in ends
             ]
         except PatternError as error:
             self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
@@ -368,7 +401,7 @@ class Weaving:
     ) -> list[str]:
         """What a pattern in the parameter ``name`` selects."""
         of_ports = isinstance(parameter, PortsParameter)
-        paths = self.ports if of_ports else PathIndex([*self.graph.actors, *self.graph.composites])
+        paths = self.ports if of_ports else self.paths.holders
         try:
             found = paths.select(self._full(pattern))
         except PatternError as error:

@@ -2,7 +2,7 @@
 
 from .drawing import FigureError, draw, figures_of
 from .figures import Figure, Histogram, TimeSeries, Trajectories
-from .folder import draw_figures, write_folder
+from .folder import check_folder, draw_figures, write_folder
 from .reference import aspects_at, described, detail, figure_types, markdown, overview, parts_described, weaving
 from .summary import summary_object, summary_table
 
@@ -13,6 +13,7 @@ __all__ = [
     "TimeSeries",
     "Trajectories",
     "aspects_at",
+    "check_folder",
     "described",
     "detail",
     "draw",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
@@ -11,12 +12,14 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Configurable, Parameter, array_parameter, texts_parameter
+from epicycle.actors import Configurable, Parameter, array_parameter, shortened, texts_parameter
+from epicycle.aspects import STAMP
 
 from ..engine import Results, Signal, cell, leaves
 from ..model.patterns import select
 from ..tables import short
 
+MAX_TEXT = 200  # characters of a label
 COLOURS = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")
 MAX_STATES = 24  # in a legend
 
@@ -165,8 +168,8 @@ class TimeSeries(Figure):
         for index, (name, (times, values)) in enumerate(lines.items()):
             if self.style == "steps" and times:
                 # What is over at the moment at which it comes is not seen; the last value holds to the run's end.
-                latest = {**dict(zip(times, values, strict=True)), max(results.end, times[-1]): values[-1]}
-                times, values = list(latest), list(latest.values())
+                latest = dict(zip(times, values, strict=True)) | {max(results.end, times[-1]): values[-1]}
+                times, values = array("d", latest), array("d", latest.values())
             colour = COLOURS[index % len(COLOURS)]
             axes.plot(times, values, color=colour, linewidth=1.2, markersize=4, label=name, **look[self.style])
         axes.set_xlabel("time (s)")
@@ -236,8 +239,7 @@ class Histogram(Figure):
 
     def draw(self, results: Results, path: Path) -> None:
         columns = {
-            name: [value for value in values if np.isfinite(value)]
-            for name, (_, values) in _numbers(self.signals, results).items()
+            name: np.array(values)[np.isfinite(values)] for name, (_, values) in _numbers(self.signals, results).items()
         }
         canvas, axes = _sheet(results, 6.0, 3.4)
         if not columns and (strips := _states(self.signals, results)):
@@ -250,12 +252,15 @@ class Histogram(Figure):
             axes.set_xlabel(f"{self.label or ', '.join(strips)}: how often{more}")
             save(canvas, path)
             return
-        everything = [value for values in columns.values() for value in values]
-        edges = np.histogram_bin_edges(everything or [0.0], self.bins)
+        ends = [end for values in columns.values() if len(values) for end in (values.min(), values.max())]
+        edges = np.histogram_bin_edges(ends or [0.0], self.bins)
         for index, (name, values) in enumerate(columns.items()):
-            label = f"{name}, mean {np.mean(values):.4g}" if values else f"{name}, no values"
+            label = f"{name}, mean {np.mean(values):.4g}" if len(values) else f"{name}, no values"
             colour = COLOURS[index % len(COLOURS)]
-            axes.hist(values, edges, density=bool(values), color=colour, alpha=0.55, label=label)
+            heights, _ = np.histogram(values, edges)
+            axes.hist(
+                edges[:-1], edges, weights=heights, density=bool(len(values)), color=colour, alpha=0.55, label=label
+            )
         axes.set_xlabel(self.label or (next(iter(columns)) if len(columns) == 1 else ""))
         axes.set_ylabel("share per unit")
         axes.legend(fontsize=8, frameon=False)
@@ -267,44 +272,38 @@ def _selected(patterns: tuple[str, ...], results: Results) -> list[str]:
     return list(dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals)))
 
 
-def _places(patterns: tuple[str, ...], results: Results, read: Callable[[Any], Any]) -> Columns:
-    """Times, and what is read of each leaf, by signal and place in the tokens; places with nothing are left out."""
-    found: Columns = {}
+def _leaves(patterns: tuple[str, ...], results: Results) -> Iterator[tuple[str, float, Any]]:
+    """The place, time and value of each leaf of the tokens, but for those that say of when a token is."""
     for name in _selected(patterns, results):
         signal = results.signals[name]
         for tag, token in zip(signal.tags, signal.tokens, strict=True):
             for place, leaf in leaves(token):
-                times, values = found.setdefault(f"{name}.{place}" if place else name, ([], []))
-                times.append(tag.seconds)
-                values.append(read(leaf))
-    return {name: column for name, column in found.items() if any(value is not None for value in column[1])}
+                if place.rpartition(".")[2] != STAMP:
+                    yield f"{name}.{place}" if place else name, tag.seconds, leaf
 
 
-def _numbers(patterns: tuple[str, ...], results: Results) -> Columns:
+def _numbers(patterns: tuple[str, ...], results: Results) -> dict[str, tuple[array[float], array[float]]]:
     """Times and values of all numbers, by signal and place in the tokens."""
-
-    def number(leaf: Any) -> float | None:
+    found: dict[str, tuple[array[float], array[float]]] = {}
+    for place, time, leaf in _leaves(patterns, results):
         kind, value, _ = cell(leaf)
-        return value if kind in ("int", "float") else None
-
-    found = _places(patterns, results, number)
-    for times, values in found.values():
-        if None in values:
-            kept = [(time, value) for time, value in zip(times, values, strict=True) if value is not None]
-            times[:], values[:] = map(list, zip(*kept, strict=True))
+        if kind in ("int", "float") and value is not None:
+            times, values = found.setdefault(place, (array("d"), array("d")))  # 16 bytes a number, not 100
+            times.append(time)
+            values.append(value)
     return found
 
 
 def _states(patterns: tuple[str, ...], results: Results) -> Columns:
     """Times and names of states, by signal and place in the tokens; None where there is something else."""
-
-    def state(leaf: Any) -> str | None:
+    found: Columns = {}
+    for place, time, leaf in _leaves(patterns, results):
         kind, value, text = cell(leaf)
-        if kind in ("int", "float", "none") or (hasattr(leaf, "__len__") and not isinstance(leaf, str)):
-            return None
-        return text if kind != "bool" else "true" if value else "false"
-
-    return _places(patterns, results, state)
+        is_state = kind not in ("int", "float", "none") and (isinstance(leaf, str) or not hasattr(leaf, "__len__"))
+        times, states = found.setdefault(place, ([], []))
+        times.append(time)
+        states.append((text if kind != "bool" else "true" if value else "false") if is_state else None)
+    return {place: column for place, column in found.items() if any(state is not None for state in column[1])}
 
 
 def _legible(state: str) -> str:
@@ -329,7 +328,11 @@ def _sheet(results: Results, width: float, height: float) -> tuple[Any, Any]:
 def save(canvas: Any, path: Path) -> None:
     """Write a matplotlib figure so that the same one gives the same file."""
     import matplotlib
+    from matplotlib.text import Text
 
+    for text in canvas.findobj(Text):  # whatever a model is called: a sheet grows with the texts on it
+        if len(text.get_text()) > MAX_TEXT:
+            text.set_text(shortened(text.get_text(), MAX_TEXT))
     with matplotlib.rc_context({"svg.hashsalt": "epicycle"}):
         metadata = {"Date": None} if path.suffix == ".svg" else {}
         canvas.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)

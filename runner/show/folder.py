@@ -4,17 +4,40 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from epicycle.actors import EpicycleError, read_regular
+
+from ..columns import categories, numbers, texts
 from ..engine import Results
 from ..provenance import versions
-from .columns import categories, numbers, texts
 from .drawing import FigureError, draw
 from .figures import Figure
 from .summary import summary_object
+
+
+def check_folder(folder: Path, model: str, command: list[str]) -> str:
+    """What is to be said before a command writes to a folder, as it replaces the results of another one.
+
+    Raises ``EpicycleError`` where there are results of another model, or of something else.
+    """
+    path = folder / "manifest.json"
+    choose = "\n   help: choose another folder with --out, or delete this one"
+    try:
+        found = json.loads(read_regular(path))
+        before, known = found["command"], found["model"]
+        shown = shlex.join(before)
+    except FileNotFoundError:
+        return ""
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        raise EpicycleError(f"{folder} holds other results than those of a run{choose}") from None
+    if known != model:
+        raise EpicycleError(f"{folder} holds results of the model {known!r}, not of {model!r}: {shown}{choose}")
+    return "" if before == command else f"replacing the results of '{shown}' in {folder}"
 
 
 def write_folder(folder: Path, results: Results, command: Iterable[str], error: str = "") -> list[Path]:

@@ -55,10 +55,10 @@ def summary_table(model: Model, results: Results) -> Group:
         f"  seed {results.seed}, {results.end:g} s of model time, ended by {visible(results.stopped)}",
     )
     table = Table(box=None, pad_edge=False, header_style="dim")
-    table.add_column("metric")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    table.add_column("", style="dim")
+    table.add_column("metric", overflow="fold")
+    table.add_column("value", justify="right", overflow="fold")
+    table.add_column("unit", overflow="fold")
+    table.add_column("", style="dim", overflow="fold")
     for metric in model.metrics:
         found = results.outcomes[metric.name]
         said = "; ".join([metric.measure.doc, *found.remarks] if metric.measure.doc else found.remarks)

@@ -221,7 +221,7 @@ def _ordered(claim: Claim, metric: str, where: Selection, samples: Samples) -> I
         inner = samples.homes([claim.per])
         at = {index: _number(samples.level(inner[0], index, claim.per)) for index in choices[inner[0]]}
         center = math.fsum(at.values()) / len(at)
-        spread = math.fsum((each - center) ** 2 for each in at.values())
+        spread = math.fsum((each - center) * (each - center) for each in at.values())
         slope = {index: (each - center) / spread for index, each in at.items()}
     others = [each for each in range(len(choices)) if each != home and each not in inner]
     for rest in samples.places(choices, dict.fromkeys([home, *inner], 0)):

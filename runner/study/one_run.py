@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, readable
 
 from ..engine import LogFilter, Results, Simulation
 from ..model import Model
@@ -62,7 +62,7 @@ class Runner:
         except Exception as error:
             told = str(error) if isinstance(error, EpicycleError) else f"{type(error).__name__}: {error}"
             row |= dict.fromkeys((metric.name for metric in self.plan.metrics), None)
-            row |= {"status": FAILED, "error": told}
+            row |= {"status": FAILED, "error": readable(told)}
         row["wall_time"] = time.perf_counter() - started
         return row
 

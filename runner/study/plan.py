@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
@@ -23,6 +24,8 @@ from .columns import Column, columns_of
 from .declaration import RESERVED, Study, study_of_text
 from .dimensions import Factor, Level
 from .metrics import StudyMetric
+
+_LOGGER = logging.getLogger("epicycle")
 
 MAX_TRIED = 20  # levels of a dimension with which the model is loaded before anything runs
 
@@ -121,6 +124,10 @@ class Plan:
         study.questions.check([metric.name for metric in metrics], problems)
         problems.raise_if_any()
         columns = columns_of(study.dimensions, metrics, read.models[0])
+        if endless := read.models[0].endless:
+            _LOGGER.warning(
+                "warning: %s\n   help: set 'stop' in its section 'run'; --run-timeout gives up runs", endless
+            )
         return cls(study, metrics, sources, extra, read.texts, columns, epicycle_version(), read.files)
 
     @classmethod

@@ -281,7 +281,7 @@ class StudyResults:
             file = pq.ParquetFile(pa.BufferReader(data))
             is_of_another = file.metadata.created_by != pq.read_metadata(buffer).created_by
             return is_of_another and bool(file.read().equals(self.table()))
-        except (OSError, pa.ArrowException):
+        except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it that is no UTF-8
             return False
 
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from epicycle.actors import random_stream
-from epicycle.actors.core import normal_quantile, normal_share
+from epicycle.actors import normal_quantile, normal_share, random_stream
 
 from ..student import student_quantile, student_tail
 
@@ -74,7 +74,9 @@ def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: 
     gaps = [value - plain.value for value in values]
     squares = math.fsum(gap * gap for gap in gaps)
     acceleration = math.fsum(gap * gap * gap for gap in gaps) / (6.0 * squares * math.sqrt(squares))
-    below = (bisect_left(means, plain.value) + bisect_right(means, plain.value)) / (2.0 * resamples)
+    rounding = 1e-12 * max(map(abs, values))  # of few values, many a resample has each of them once: the same mean
+    at_or_below = bisect_left(means, plain.value - rounding) + bisect_right(means, plain.value + rounding)
+    below = at_or_below / (2.0 * resamples)
     bias = normal_quantile(min(max(below, 0.5 / resamples), 1.0 - 0.5 / resamples))
     ends = []
     for share in ((1.0 - level) / 2.0, (1.0 + level) / 2.0):
@@ -89,13 +91,31 @@ def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:
     """Sums of bootstrap samples, in order; as many values are drawn alike wherever this is called."""
     import numpy as np
 
-    count, known, sums = len(values), np.asarray(values, float), np.zeros(number)
-    stream, rows = random_stream(0, "resampling"), max(1, 1_000_000 // len(values))
-    for start in range(0, number, rows):
-        part = sums[start : start + rows]
-        for column in stream.integers(count, size=(len(part), count)).T:
-            part += known[column]
+    known, sums = np.asarray(values, float), np.zeros(number)
+    for start, draws in _draws(len(values), number):
+        part = sums[start : start + draws.shape[1]]
+        for chosen in draws:
+            part += known[chosen]
     return sums
+
+
+def _draws(count: int, number: int) -> Iterable[tuple[int, NDArray[np.int64]]]:
+    """Which values bootstrap samples take, a million of choices at a time: (choice, sample), from the first one on."""
+    return _few_draws(count, number) if count * number <= 2_000_000 else _all_draws(count, number)
+
+
+@lru_cache(maxsize=2)
+def _few_draws(count: int, number: int) -> list[tuple[int, NDArray[np.int64]]]:
+    return list(_all_draws(count, number))
+
+
+def _all_draws(count: int, number: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    import numpy as np
+
+    stream, rows = random_stream(0, "resampling"), max(1, 1_000_000 // count)
+    for start in range(0, number, rows):
+        size = (min(rows, number - start), count)
+        yield start, np.ascontiguousarray(stream.integers(count, size=size).T)
 
 
 def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:

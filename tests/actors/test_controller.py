@@ -2,6 +2,7 @@
 
 import functools
 import logging
+import math
 import sys
 import threading
 import time
@@ -116,6 +117,23 @@ def test_distance_to_a_silent_peer_grows_from_the_second_period_on(now: float, l
         driven.append(place)
     age = round(now * 10)
     assert problem.peer_mean[0] == pytest.approx(np.array(driven[age : age + 10]))
+
+
+@pytest.mark.parametrize("age", [0.03, 0.08, 0.24, -0.04])
+def test_a_peer_between_two_of_its_steps_is_on_its_way(age: float) -> None:
+    harness, recorder = make()
+    controls = np.array([[1.0, 0.0], [0.0, 3.0], *[[2.0, 1.0]] * 9])
+    known = Plan("b", 1.0 - age, state(20.0, 2.0, 5.0, -1.0, time=1.0 - age), controls)
+    harness.fire(1.0, trigger=0, state=state(time=1.0), peer_plans=[known])
+    place, speed, steps = np.array([20.0, 2.0]), np.array([5.0, -1.0]), []
+    for k in range(20):
+        steps.append((place, speed))
+        place, speed = place + 0.1 * speed, speed + 0.1 * (controls[k] if k < 11 else np.zeros(2))
+    expected = []
+    for step in range(1, 11):
+        whole = math.floor((age + 0.1 * step) / 0.1 + 1e-9)
+        expected.append(steps[whole][0] + (age + 0.1 * step - 0.1 * whole) * steps[whole][1])
+    assert recorder.records[0][0].peer_mean[0] == pytest.approx(np.array(expected))
 
 
 def test_the_latest_plan_counts_whatever_the_order_of_arrival() -> None:

@@ -280,7 +280,7 @@ def test_a_copy_is_not_fused_again_and_the_future_is_now() -> None:
 
 def test_estimate_and_measurement_are_of_the_time_of_what_they_describe() -> None:
     sensor, estimator = Harness(Sensor("main.sensor")), Harness(UnscentedEstimator("main.estimator"))
-    sensor.fire(0.35, robot=body(0.0, 0.0, 0.3), target=body(3.0, 4.0, 0.3))
+    sensor.fire(0.35, robot=body(0.0, 0.0, 0.3), target=body(3.0, 4.0, 0.31))
     assert sensor.last("measurement").time == 0.3
     estimator.fire(0.4, trigger=0, measurements=[sensor.last("measurement")])
     assert estimator.last("estimate").time == 0.4

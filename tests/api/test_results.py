@@ -75,6 +75,9 @@ def test_frame_has_a_column_for_each_leaf() -> None:
     assert list(frame.columns) == ["microstep", "position[0]", "position[1]", "label"]
     assert frame["position[1]"].tolist() == [2.0, 4.0]
     assert signal(3, 4).to_pandas()["value"].tolist() == [3, 4]
+    # Two columns of one name could not be told apart, nor could the index become one.
+    stamped = signal({"time": 0.5, "microstep": 3}).to_pandas().reset_index()
+    assert list(stamped.columns) == ["time", "microstep", "token.time", "token.microstep"]
     assert list(signal().to_pandas().columns) == ["microstep"]
     ragged = signal([1.0], [1.0, 2.0]).to_pandas()
     assert np.isnan(ragged["[1]"].iloc[0])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epicycle.actors import EpicycleError, ParameterError
+from epicycle.actors import BodyState, EpicycleError, ParameterError, Plan
 from epicycle.aspects import (
     Aspect,
     Bias,
@@ -257,6 +257,24 @@ def test_stuck() -> None:
     low, high = stats.binom.interval(SURE, int((~stuck).sum()), 0.05)
     assert low <= len(starts) <= high
     assert Bench(StuckAt(p=1)).play(range(4)).tokens == [0, 0, 0, 0]
+
+
+def test_when_a_token_is_of_is_no_number_to_be_altered() -> None:
+    """But for whoever names it.  A stuck sensor repeats what it saw, and does not know that this is old."""
+    plan = Plan("b", 1.5, BodyState([1.0, 2.0], [0.0, 0.0], 1.5), np.zeros((2, 2)))
+    biased, named = (Bench(Bias(by=1, fields=names)).play([plan]).tokens[0] for names in ((), ("time",)))
+    assert (biased.time, biased.state.time, biased.state.position.tolist()) == (1.5, 1.5, [2.0, 3.0])
+    assert (named.time, named.state.time, named.state.position.tolist()) == (2.5, 1.5, [1.0, 2.0])
+    assert Bench(Bias(by=1)).play([{"time": 1.0, "speed": 2.0}]).tokens == [{"time": 1.0, "speed": 3.0}]
+    states = [BodyState([float(n), 0.0], [0.0, 0.0], float(n)) for n in range(3)]
+    stuck = Bench(StuckAt(p=1)).play(states).tokens
+    assert [(each.position[0], each.time) for each in stuck] == [(0.0, 0.0), (0.0, 1.0), (0.0, 2.0)]
+    stamped = [{"time": 0.0, "x": 1.0}, {"time": 1.0, "x": 2.0}, {"x": 3.0}]
+    assert Bench(StuckAt(p=1)).play(stamped).tokens == [
+        {"time": 0.0, "x": 1.0},
+        {"time": 1.0, "x": 1.0},
+        {"time": 0.0, "x": 1.0},
+    ]
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "bit_flip"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -103,3 +104,35 @@ def test_a_file_that_cannot_be_had(
         Path(file).write_text(text, encoding="utf-8")
     assert main(["validate", "m.yaml", "--types", file]) == 2
     assert capsys.readouterr().err == f"error: --types {file}: {message}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("raise SystemExit(3)", "SystemExit: 3 (line 1)"),
+        ("class Own(BaseException): pass\nraise Own('x')", "Own: x (line 2)"),
+        ("class Own(KeyboardInterrupt): pass\nraise Own('x')", "Own: x (line 2)"),
+        ("raise GeneratorExit", "GeneratorExit:  (line 1)"),
+        (
+            "import sys\ndel sys.modules[__name__]\nsys.path.pop(0)\n1 / 0",
+            "ZeroDivisionError: division by zero (line 4)",
+        ),
+    ],
+)
+def test_whatever_a_file_raises(text: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("raising_of_mine.py").write_text(text)
+    Path("m.yaml").write_text("model: m\n")
+    assert main(["validate", "m.yaml", "--types", "raising_of_mine.py"]) == 2
+    assert capsys.readouterr().err == f"error: --types raising_of_mine.py: {told}\n"
+
+
+def test_a_command_ends_though_a_thread_of_the_run_does_not() -> None:
+    Path("threads_of_mine.py").write_text(
+        "import threading\nfrom epicycle.actors import Actor\n\nclass Starter(Actor):\n    def fire(self): pass\n\n"
+        "    def initialize(self):\n        threading.Thread(target=threading.Event().wait, name='mine').start()\n"
+    )
+    Path("m.yaml").write_text("model: m\nactors: {a: {type: Starter}}\nrun: {stop: 1}\n")
+    command = [sys.executable, "-m", "epicycle.runner.cli", "run", "m.yaml", "--types", "threads_of_mine.py", "--json"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert done.stderr.endswith("threads that the run has started are still at work, and are ended: mine\n")

@@ -18,6 +18,7 @@ connections:
   - clock.output -> seen.input
   - {from: "also[*].output", to: "also[1, 0].input", delay: 1}
   - {from: "also[0].output", to: idle.input, delay: 1}
+run: {stop: 1 s}
 """
 WARNING = """m.yaml:6:3: {}: also[0] can never fire: it is no source, and only the loop also[0], also[1] feeds it
     6 |   also: {{type: Merge, count: 2}}

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Generator
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
+from epicycle.actors import Actor, Clock, InputPort, OutputPort, Parameter, Process, Scale
 from epicycle.aspects import Aspect, JoinPoint
+from epicycle.runner import Model
 from epicycle.runner.engine import ActorError, Simulation
 from tests.engine.engine_parts import load
 
@@ -202,3 +204,58 @@ def test_who_when_and_where(part: str, wires: str, more: str, message: str) -> N
     results = simulation.results("failed")  # what was recorded is kept
     assert (results.events, results.stopped) == (len(simulation.log.records), "failed")
     assert all(record.tag <= caught.value.tag for record in simulation.log.records)
+
+
+PACKAGED = """
+import numpy as np
+from epicycle.actors import Actor
+
+
+class Packaged(Actor):
+    is_source = True
+
+    def initialize(self):
+        np.linalg.inv(np.zeros((2, 2))) if self.path == "first" else json_of(self)
+
+
+def json_of(value):
+    import json
+    json.dumps(value)
+"""
+
+
+def test_an_actor_of_an_installed_package(tmp_path: Path) -> None:
+    """Its own line is shown, not that of the library which it calls, nor that of a function beside it."""
+    home = tmp_path / "site-packages" / "acme"
+    home.mkdir(parents=True)
+    (home / "actors.py").write_text(PACKAGED, encoding="utf-8")
+    spec = spec_from_file_location("acme_of_mine", home / "actors.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for name, reason in (
+        ("first", "LinAlgError: Singular matrix"),
+        ("second", "TypeError: Object of type Packaged is not JSON serializable"),
+    ):
+        model = Model("m", stop=1)
+        model.add(module.Packaged(name))
+        with pytest.raises(ActorError) as caught:
+            Simulation(model).run()
+        head, at, line, carets, declared = str(caught.value).splitlines()
+        assert head == f"{name} failed in initialize() at (0 s, 1): {reason}"
+        assert at == f"   raised at {home / 'actors.py'}:10:{9 if name == 'first' else 70}"
+        assert line[carets.index("^") :].startswith("np.linalg.inv(" if name == "first" else "json_of(self)")
+        assert declared.startswith("   declared at ")
+
+
+def test_an_actor_of_epicycles_own_needs_no_line() -> None:
+    model = Model("m", stop=1)
+    clock = model.add(Clock("clock", period=1, values=[[1, 2]]))
+    scale = model.add(Scale("scale", factor=0.5))
+    model.connect(clock.output, scale.input)
+    with pytest.raises(ActorError) as caught:
+        Simulation(model).run()
+    first, declared = str(caught.value).splitlines()
+    assert first.startswith("scale failed in fire() at (0 s, 1): TypeError: ")
+    assert declared.startswith("   declared at ")

@@ -16,6 +16,7 @@ from epicycle.runner.engine.measurement import Measurement, Outcome
 from epicycle.runner.engine.statistic import Total
 from epicycle.runner.model import Metric
 from epicycle.runner.model.measure import TAKES, Measure
+from epicycle.runner.show import summary_object
 from tests.engine.engine_parts import simulate
 
 SECOND = 10**9
@@ -178,12 +179,14 @@ def test_what_came_before_the_warm_up_was_over_spoils_nothing() -> None:
 
 def test_a_run_is_not_lost_for_a_metric_of_something_odd() -> None:
     _, results = simulate(
-        "actors: {t: {type: Ticker, limit: 3}, odd: {type: Spread}}\n"
-        "connections: [t.output -> odd.input]\n"
+        "actors: {t: {type: Ticker, limit: 3}, odd: {type: Spread}, probe: {type: Probe}}\n"
+        "connections: [t.output -> odd.input, odd.output -> probe.input]\n"
         "metrics: {up: {of: odd.output, take: share, when: value > 0}, last: {of: odd.output, take: count}}",
         until=2.5,
     )
-    assert results.metrics == {"up": None, "last": 0} or results.outcomes["up"].missing.startswith("odd.output sent")
+    assert results.metrics["up"] is None
+    assert results.outcomes["up"].missing.startswith("odd.output sent 0/0, of which 'value > 0' cannot be told")
+    assert results.metrics["last"] == 3
 
 
 def test_time_runs_until_the_stop_time_only_if_that_ended_the_run() -> None:
@@ -371,3 +374,36 @@ def test_every_take_is_measured_somehow() -> None:
         assert list(Measure(take=take, **options).misfits()) == []
         if kind.settles:
             assert measured(tokens, 60 * SECOND, take=take, after="mser5", **options).value is not None, take
+
+
+def test_what_there_is_to_say_is_in_results_and_json() -> None:
+    _, results = simulate(
+        "actors: {t: {type: Ticker, period: 0.5}, s: {type: Scale, factor: -1}}\n"
+        "connections: [t.output -> s.input]\n"
+        "metrics:\n"
+        "  rate: {of: t.output, take: rate, interval: 0.9, to: 1/min}\n"
+        "  late: {of: s.output, take: mean, after: 1 h}\n"
+        "  last: {of: s.output}\n",
+        until=100.25,
+    )
+    rate, late = results.outcomes["rate"], results.outcomes["late"]
+    assert results.metrics == {"rate": pytest.approx(201 / 100.25 * 60), "late": None, "last": -200.0}
+    assert results.units == {"rate": "1/min", "late": "", "last": ""}
+    assert list(results.intervals) == ["rate"]
+    assert rate.interval is not None
+    assert rate.interval.low < 120 < rate.interval.high
+    reason = "the run ended at 100.25 s, before its warm-up of 3600 s was over"
+    assert late.missing == reason
+    told = summary_object(results)
+    assert told["metrics"]["late"] is None
+    assert told["outcomes"] == {
+        "rate": {
+            "level": 0.9,
+            "low": rate.interval.low,
+            "high": rate.interval.high,
+            "batches": 20,
+            "autocorrelation": rate.interval.autocorrelation,
+        },
+        "late": {"missing": reason},
+    }
+    assert f"no value, because {reason}" in str(results)

@@ -70,7 +70,7 @@ def test_the_real_clock() -> None:
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, 9e-10, 1e-320, float("inf"), float("nan")])
 def test_a_pace_that_is_none(factor: float) -> None:
-    with pytest.raises(ValueError) as caught:
+    with pytest.raises(ValueError, match="a pace is") as caught:
         Pace(factor)
     message = f"a pace is a number of model seconds in a second, 1e-09 or more, not {factor:g}"
     assert str(caught.value) == message

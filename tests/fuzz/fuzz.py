@@ -38,11 +38,13 @@ from hypothesis import strategies as st
 
 from epicycle.runner import Simulation
 from epicycle.runner.engine import ActorError, LoopError
-from epicycle.runner.model import ModelError, load_model
+from epicycle.runner.model import NORMAL, ModelError, load_model
 from epicycle.runner.model.catalogue import built_in
 from epicycle.runner.model.load import model_folders
 from tests.fuzz.mutants import Mutation, Seedling, of_options, of_text, of_tree, seedling
+from tests.fuzz.recipes import cooked
 
+SOURCES = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent / "models"
 BAD_MODELS = Path(__file__).parents[1] / "bad_models"
 MAX_SECONDS = 2.0  # user CPU time for one mutant
@@ -50,6 +52,7 @@ MAX_MEMORY = 500  # MB at the peak
 OF_ITS_OWN = 200  # MB that a process takes with all that it imports
 ADDRESS_SPACE = 3_000_000_000
 CHUNK = 500
+LARGEST = 5_000  # actors of a model that is large on purpose
 # All that loading a model may do beside computing; files are judged by where they lie.
 HARMLESS = {"compile", "object.__getattr__", "object.__setattr__", "sys._getframe", "builtins.id", "array.__new__"}
 READING = {"open", "os.listdir", "os.scandir", "pathlib.Path.glob"}
@@ -61,15 +64,15 @@ FAULTY = ("many_faults", "extends", "loop_through_composites", "data_file", "not
 WHOLE = ("is empty", "is larger than", "there is no", "is a folder", "cannot read", "is UTF-16", "a way of more than")
 
 
-class Hang(BaseException):
-    """A mutant took too long; no handler of Exception must catch this."""
+class Hang(KeyboardInterrupt):
+    """A mutant took too long; no handler but that of Ctrl-C must catch this."""
 
 
-class Enough(BaseException):
+class Enough(KeyboardInterrupt):
     """A run has shown that it goes on."""
 
 
-class Intrusion(BaseException):
+class Intrusion(KeyboardInterrupt):
     """A mutant made us do what a model must not."""
 
 
@@ -86,6 +89,9 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
         if event in READING:
             path = arguments[0]
             writes = event == "open" and (arguments[2] or 0) & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
+            named = isinstance(path, (str, bytes, Path)) and Path(os.fsdecode(path))
+            if named and not writes and named.suffix == ".py" and named.resolve().is_relative_to(SOURCES):
+                return  # a line of ours in a message
             fine = isinstance(path, (str, bytes, Path)) and Path(os.fsdecode(path)).resolve().is_relative_to(folder)
             if not fine or writes:
                 raise Intrusion(f"{event} {arguments!r}")
@@ -172,18 +178,33 @@ class Plot:
         finally:
             plant.changing.write_text(plant.text, encoding="utf-8")
 
+    def try_recipe(self, kind: int, one: int, other: int, tally: Tally) -> str:
+        """Load and run a model that is large, deep or extreme; its text."""
+        text = cooked(kind, one, other, built_in())
+        grown = self.folder / "grown" / "grown.yaml"
+        grown.parent.mkdir(exist_ok=True)
+        grown.write_text(text, encoding="utf-8")
+        try:
+            self._try(Seedling(grown, grown, (), text, b"", ()), {}, tally, is_short=True)
+        except BaseException as error:
+            error.add_note(text[:20_000])
+            raise
+        return text
+
     def try_options(self, plant: Seedling, options: dict[str, list[str]], tally: Tally) -> None:
         """Load a good model with mutant options."""
         self._try(plant, options, tally)
 
-    def _try(self, plant: Seedling, options: dict[str, list[str]], tally: Tally) -> None:
+    def _try(self, plant: Seedling, options: dict[str, list[str]], tally: Tally, *, is_short: bool = False) -> None:
+        """Load a model and run it for a moment; one that ``is_short`` has no step that may take its time."""
         tally.mutants += 1
         forget_peak()
         self.memory = peak_memory()
         started = time.process_time()
         try:
             with watched(plant.model.parent):
-                model = load_model(plant.model, disturb=plant.disturb, **options)
+                most = LARGEST if is_short else NORMAL.actors
+                model = load_model(plant.model, disturb=plant.disturb, max_actors=most, **options)
         except ModelError as error:
             tally.rejected += 1
             check_problems(error)
@@ -208,6 +229,8 @@ class Plot:
             except (ActorError, LoopError):
                 tally.failed += 1
             except Hang:
+                if is_short:
+                    raise
                 tally.long += 1  # what a good model computes may take its time, and what it takes up meanwhile
                 return
             except Enough:
@@ -292,11 +315,14 @@ def sow(folder: str, seed: int, count: int) -> tuple[Tally, str]:
         suppress_health_check=list(HealthCheck),
         print_blob=False,
     )
-    @given(st.sampled_from(range(len(beds))), st.integers(0, 9), mutations)
+    @given(st.sampled_from(range(len(beds))), st.integers(0, 10), mutations)
     def holds(bed: int, kind: int, changes: list[Mutation]) -> None:
         plant, what = beds[bed], cast(Any, "")
         try:
-            if kind == 9:
+            if kind == 10:
+                what = changes[0]
+                garden.try_recipe(*changes[0], tally)
+            elif kind == 9:
                 what = of_options(plant, changes)
                 garden.try_options(plant, what, tally)
             else:

@@ -10,12 +10,13 @@ import contextlib
 import hashlib
 import io
 import json
-import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from epicycle.actors import random_stream
 from epicycle.runner import Simulation, load_model
@@ -97,15 +98,14 @@ def table() -> str:
 
 def tutorial(path: Path) -> str:
     """What a tutorial prints, but for the time it takes."""
-    before, reader = os.getcwd(), Reader()
-    modules = set(sys.modules)
-    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as end:
-        os.chdir(folder)
-        end.callback(os.chdir, before)
-        sys.path.insert(0, folder)
-        end.callback(sys.path.remove, folder)
-        end.callback(reader.close)
-        lines = [line for _, _, printed in reader.outputs(blocks(path)) for line in printed.splitlines()]
+    reader, modules = Reader(), set(sys.modules)
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as here:
+        here.chdir(folder)
+        here.syspath_prepend(folder)
+        try:
+            lines = [line for _, _, printed in reader.outputs(blocks(path)) for line in printed.splitlines()]
+        finally:
+            reader.close()
     for name in set(sys.modules) - modules:
         if str(getattr(sys.modules[name], "__file__", "")).startswith(folder):
             del sys.modules[name]

@@ -45,7 +45,7 @@ actors:
   clock: {type: Clock, period: 0.1 s}
   wheel: {type: CircularMotion, start: [0, 2], speed: "${speed}", turn_rate: "${speed / radius}"}
 connections: [clock.output -> wheel.trigger]
-run: {stop: 2 s}
+run: {stop: 2 s, record: [wheel.state]}
 metrics: {ticks: {of: clock.output, take: count}}
 figures: {way: {type: Trajectories, robots: wheel.state}}
 """

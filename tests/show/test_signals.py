@@ -146,10 +146,13 @@ def restored(row: dict[str, Any]) -> Any:
     return made.get(kind, lambda: text)()
 
 
+DURATIONS = {"collision_avoidance": 2.0, "machine_shop": 100_000.0}  # s
+
+
 @pytest.mark.parametrize("name", sorted(packaged_models()))
 def test_what_models_send_can_be_read_from_the_file(name: str, tmp_path: Path) -> None:
     """Every port of every packaged model, recorded or not."""
-    results = Simulation(load_model(name), keep_log=True).run(until=100_000.0 if name == "machine_shop" else 5.0)
+    results = Simulation(load_model(name), keep_log=True).run(until=DURATIONS.get(name, 100.0))
     results.signals = {}
     for record in results.log.records:
         if record.event == "send":

@@ -125,6 +125,25 @@ def test_students_t_at_its_ends() -> None:
             student_quantile(p, freedom)
 
 
+def test_wilsons_interval_is_scipys() -> None:
+    for successes, count in ((0, 7), (3, 7), (7, 7), (120, 4000)):
+        expected = stats.binomtest(successes, count).proportion_ci(0.9, method="wilson")
+        found = rate(successes, count, 0.9)
+        assert found.low == pytest.approx(expected.low, abs=1e-15)
+        assert found.high == pytest.approx(expected.high, rel=1e-13)
+
+
+@pytest.mark.parametrize("count", [8, 40, 400])
+def test_bootstrap_is_scipys_but_for_chance(count: int) -> None:
+    values = np.random.default_rng(count).exponential(1.0, count)
+    expected = stats.bootstrap((values,), np.mean, confidence_level=0.9, n_resamples=9_999, rng=0)
+    found = bootstrap_mean(values.tolist(), 0.9)
+    width = expected.confidence_interval.high - expected.confidence_interval.low
+    assert found.low == pytest.approx(expected.confidence_interval.low, abs=0.04 * width)
+    assert found.high == pytest.approx(expected.confidence_interval.high, abs=0.04 * width)
+    assert found.error == pytest.approx(expected.standard_error, rel=0.04)
+
+
 def test_students_t_has_these_bits() -> None:
     """Made of + - * / and square roots, they are the same everywhere."""
     found = [student_quantile(p, freedom).hex() for p, freedom in ((0.975, 19), (0.995, 9), (0.95, 250))]

@@ -10,7 +10,8 @@ from .exponential import cosh, exp, expm1, sinh, tanh
 from .gamma import log_gamma
 from .length import distance, hypot
 from .logarithm import log, log1p, log2, log10
-from .power import pow  # noqa: A004 (as in the module math)
+from .powers import pow, power  # noqa: A004 (as in the module math)
+from .sums import total
 
 __all__ = [
     "acos",
@@ -29,8 +30,10 @@ __all__ = [
     "log10",
     "log_gamma",
     "pow",
+    "power",
     "sin",
     "sinh",
     "tan",
     "tanh",
+    "total",
 ]

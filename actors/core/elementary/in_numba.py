@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic, overload
 
-from . import arcs, circle, double, exponential, gamma, length, logarithm, outside, power
+from . import arcs, circle, double, exponential, gamma, length, logarithm, outside, powers
 
 _OPTIONS: Any = {"error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
@@ -61,7 +61,7 @@ def _compile_as(function: Callable[..., Any], twin: Callable[..., Any]) -> None:
 @functools.cache
 def register() -> None:
     """Let compiled code call the elementary functions by the names that Python code calls."""
-    for module in (arcs, circle, double, exponential, gamma, logarithm, power):
+    for module in (arcs, circle, double, exponential, gamma, logarithm, powers):
         for function in list(vars(module).values()):
             if inspect.isfunction(function) and function.__module__ == module.__name__:
                 _compile_as(function, _twin(function))

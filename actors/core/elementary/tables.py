@@ -26,9 +26,10 @@ def _pairs(numbers: list[int], bits: int = 100) -> tuple[tuple[float, ...], tupl
 def _series(numerator: int, denominator: int, sign: int, one: int = _ONE) -> int:
     """artanh (``sign`` 1) or arctan (-1) of a small ratio, by its power series."""
     power, total, odd = one * numerator // denominator, 0, 1
-    while power:
-        total += power // odd if sign > 0 or odd % 4 == 1 else -(power // odd)
-        power = power * numerator**2 // denominator**2
+    above, below = sign * numerator * numerator, denominator * denominator
+    while power not in (0, -1):  # -1 is what is left of a negative one
+        total += power // odd
+        power = power * above // below
         odd += 2
     return total
 
@@ -71,23 +72,26 @@ ARC_HIGH, ARC_LOW = _pairs(
     + [_QUARTER + arc for arc in _arcs]
 )
 
-# pi/2 in three parts of 33 bits and a rest: the product of a part and a number below 2**20 is exact.
-HALF_PI, HALF_PI_LOW = _pair(_QUARTER, bits=52)
+# pi by Machin's formula, with so many digits that angles of any size can be reduced.
+_LONG_BITS = 1280
+_LONG = 1 << _LONG_BITS
+_PI = 4 * (4 * _series(1, 5, -1, _LONG) - _series(1, 239, -1, _LONG))
+
+# 2/pi in 52 digits of 24 bits, which stand after 4 zeros.
+_TWO_OVER_PI = 2 * _LONG * _LONG // _PI
+TWO_OVER_PI = (0,) * 4 + tuple(_TWO_OVER_PI >> (_LONG_BITS - 24 * (k + 1)) & 0xFFFFFF for k in range(52))
+
+# pi/2 as a pair, and in three parts of 33 bits and a rest: a part times a number below 2**20 is exact.
+HALF_PI, HALF_PI_LOW = _pair(_PI >> (_LONG_BITS - _BITS + 1), bits=52)
 
 
 def _parts(number: int) -> tuple[float, ...]:
     found = []
     for bits in (32, 65, 98):
-        part = number >> (_BITS - bits)
+        part = number >> (_LONG_BITS - bits)
         found.append(part * ldexp(1.0, -bits))
-        number -= part << (_BITS - bits)
-    return (*found, number / _ONE)
+        number -= part << (_LONG_BITS - bits)
+    return (*found, number / _LONG)
 
 
-HALF_PI_1, HALF_PI_2, HALF_PI_3, HALF_PI_4 = _parts(_QUARTER)
-
-# 2/pi in 52 digits of 24 bits, by Machin's formula; they stand after 4 zeros.
-_LONG = 1 << 1280
-_PI = 4 * (4 * _series(1, 5, -1, _LONG) - _series(1, 239, -1, _LONG))
-_TWO_OVER_PI = 2 * _LONG * _LONG // _PI
-TWO_OVER_PI = (0,) * 4 + tuple(_TWO_OVER_PI >> (1280 - 24 * (k + 1)) & 0xFFFFFF for k in range(52))
+HALF_PI_1, HALF_PI_2, HALF_PI_3, HALF_PI_4 = _parts(_PI >> 1)

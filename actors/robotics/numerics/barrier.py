@@ -25,7 +25,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .compiled import borrower, inner, kernel
+from ...core.elementary import hypot, log
+from .compiled import borrower, inlined, inner, kernel
 from .constraints import (
     BOUND,
     MARGIN,
@@ -224,11 +225,11 @@ def _objective(task: _Task, mu: float) -> float:
         value += gamma * t
         product *= t * over
         if not 1e-100 < product < 1e100:
-            value -= mu * math.log(product)
+            value -= mu * log(product)
             product = 1.0
         slope = mu / over
         add(stages, s, slope, slope, mu / (over * over + t * t), gx, gy, hxx, hxy, hyy)
-    return value - mu * math.log(product)
+    return value - mu * log(product)
 
 
 @borrower
@@ -256,7 +257,7 @@ def _evaluate(task: _Task, phase: float, mu: float, dual: float, limit: float) -
             stages[s, VELOCITY], stages[s, VELOCITY + 1] = gx, gy
             stages[s, VELOCITY + 2], stages[s, VELOCITY + 3], stages[s, VELOCITY + 4] = hxx, hxy, hyy
         if product < 1e-100:
-            value -= mu * math.log(product)
+            value -= mu * log(product)
             product = 1.0
     if phase == _RESTORE:
         for i in range(constraints.shape[0]):
@@ -270,7 +271,7 @@ def _evaluate(task: _Task, phase: float, mu: float, dual: float, limit: float) -
                 add(stages, s, over, over, 1.0, gx, gy, hxx, hxy, hyy)
                 if value > limit:  # what is to come is not negative
                     break
-        return value - mu * math.log(product)
+        return value - mu * log(product)
     for i in range(constraints.shape[0]):
         s = int(constraints[i, WHEN])
         h, gx, gy, hxx, hxy, hyy = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])
@@ -279,11 +280,11 @@ def _evaluate(task: _Task, phase: float, mu: float, dual: float, limit: float) -
             return math.inf
         product *= slack
         if not 1e-100 < product < 1e100:
-            value -= mu * math.log(product)
+            value -= mu * log(product)
             product = 1.0
         slope = 1.0 / slack
         add(stages, s, mu * slope, dual * slope, dual * slope * slope, gx, gy, hxx, hxy, hyy)
-    return value - mu * math.log(product) + _objective(task, mu)
+    return value - mu * log(product) + _objective(task, mu)
 
 
 @borrower
@@ -294,6 +295,11 @@ def _share(x: float, y: float, dx: float, dy: float, radius: float) -> float:
     if c > 0.0:  # from outside, the nearer crossing
         return c / (root - b)
     return -c / (root + b) if b > 0.0 else (root - b) / a
+
+
+@inlined
+def _squared(x: float, y: float) -> float:
+    return x * x + y * y
 
 
 @borrower
@@ -309,12 +315,12 @@ def _longest(task: _Task, phase: float) -> float:
     for s in range(plan.shape[0]):
         plan[s, _MOVED], plan[s, _MOVED + 1] = px, py
         x, y = plan[s, _VELOCITY], plan[s, _VELOCITY + 1]
-        if (x + vx) ** 2 + (y + vy) ** 2 >= task.max_speed**2 and s > 0:
+        if _squared(x + vx, y + vy) >= task.max_speed * task.max_speed and s > 0:
             share = min(share, _share(x, y, vx, vy, task.max_speed))
         px += h * vx
         py += h * vy
         x, y, dx, dy = plan[s, _TAKEN], plan[s, _TAKEN + 1], stages[s, STEP], stages[s, STEP + 1]
-        if (x + dx) ** 2 + (y + dy) ** 2 >= task.max_acceleration**2:
+        if _squared(x + dx, y + dy) >= task.max_acceleration * task.max_acceleration:
             share = min(share, _share(x, y, dx, dy, task.max_acceleration))
         vx += h * dx
         vy += h * dy
@@ -325,7 +331,7 @@ def _longest(task: _Task, phase: float) -> float:
             s = int(constraints[i, WHEN])
             x, y = plan[s, _POSITION] - constraints[i, PLACE], plan[s, _POSITION + 1] - constraints[i, PLACE + 1]
             dx, dy = plan[s, _MOVED], plan[s, _MOVED + 1]
-            then, near = (x + dx) ** 2 + (y + dy) ** 2, constraints[i, ROW] == 0.0
+            then, near = _squared(x + dx, y + dy), constraints[i, ROW] == 0.0
             radius = constraints[i, NEED] + (constraints[i, BOUND] if near else -constraints[i, BOUND])
             if then >= radius * radius if near else then <= radius * radius and radius > 0.0:
                 share = min(share, _share(x, y, dx, dy, radius))
@@ -340,7 +346,7 @@ def _crowd(task: _Task) -> float:
     beside the gap, which is their number times the barrier parameter.
     """
     share: float = (2 * task.plan.shape[0] + task.constraints.shape[0]) / _MANY
-    return max(1.0, share) ** 2
+    return max(1.0, share * share)
 
 
 @borrower
@@ -391,11 +397,11 @@ def _inside(task: _Task) -> bool:
     vx, vy = task.vx, task.vy
     for s in range(plan.shape[0]):
         ux, uy = plan[s, _TAKEN], plan[s, _TAKEN + 1]
-        if not ux * ux + uy * uy < task.max_acceleration**2:
+        if not ux * ux + uy * uy < task.max_acceleration * task.max_acceleration:
             return False
         vx += task.period * ux
         vy += task.period * uy
-        if s < plan.shape[0] - 1 and not vx * vx + vy * vy < task.max_speed**2:
+        if s < plan.shape[0] - 1 and not vx * vx + vy * vy < task.max_speed * task.max_speed:
             return False
     return True
 
@@ -404,7 +410,7 @@ def _inside(task: _Task) -> bool:
 def _brake(task: _Task, share: float) -> None:
     """Take controls that brake with at most ``share`` of f2's limit, and in a step with that of the speed left."""
     plan = task.plan
-    speed = math.hypot(task.vx, task.vy)
+    speed = hypot(task.vx, task.vy)
     moving = 1e-9 < speed < math.inf
     left = speed
     for s in range(plan.shape[0]):
@@ -435,7 +441,8 @@ def _restore(task: _Task) -> tuple[int, float]:
             return iterations, 0.0
         left = 0.0
         for i in range(constraints.shape[0]):
-            left += max(0.0, constraints[i, VALUE]) ** 2
+            violation = max(0.0, constraints[i, VALUE])
+            left += violation * violation
         if last and excess <= _SLACK:
             last, least = least == _RESTORE_ON, _RESTORE_ON
         if _is_hopeless(task, left):
@@ -445,7 +452,7 @@ def _restore(task: _Task) -> tuple[int, float]:
             break
         dual, mu = mu, max(_REDUCTION * mu, least)
     # A plan that touches a bound without breaking it still ranks behind a strictly feasible one.
-    return iterations, max(left, TOLERANCE**2)
+    return iterations, max(left, TOLERANCE * TOLERANCE)
 
 
 @borrower

@@ -11,6 +11,9 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from ...core import elementary
+from ...core.elementary.in_numba import register
+
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
@@ -52,7 +55,7 @@ def inlined(function: Function) -> Function:
 
 @contextmanager
 def _cache_of_these_sources() -> Iterator[None]:
-    """Compiled code lies in a folder named after all sources of this package.
+    """Compiled code lies in a folder named after all sources of this package and of the elementary functions.
 
     By itself numba looks only at the file of a kernel, and would go on with old code of what that calls from others.
     """
@@ -72,4 +75,6 @@ def _cache_of_these_sources() -> Iterator[None]:
 
 
 _HERE = Path(__file__).parent
-_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_HERE.glob("*.py")))).hexdigest()[:16]
+_FILES = [path for folder in (_HERE, Path(elementary.__file__).parent) for path in sorted(folder.glob("*.py"))]
+_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
+register()

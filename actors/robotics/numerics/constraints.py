@@ -86,9 +86,11 @@ def _within_reach(
     h = problem.period
     px, py = problem.position[0], problem.position[1]
     vx, vy = problem.velocity[0], problem.velocity[1]
-    driven = math.sqrt((px + s * h * vx - x) ** 2 + (py + s * h * vy - y) ** 2)
+    dx, dy = px + s * h * vx - x, py + s * h * vy - y
+    driven = math.sqrt(dx * dx + dy * dy)
     pushed = 0.5 * problem.max_acceleration * h * h * s * (s - 1.0)
-    begun = math.sqrt((px + h * vx - x) ** 2 + (py + h * vy - y) ** 2)
+    dx, dy = px + h * vx - x, py + h * vy - y
+    begun = math.sqrt(dx * dx + dy * dy)
     raced = (s - 1.0) * h * problem.max_speed
     if near:
         return not min(driven + pushed, begun + raced) < distance - spare
@@ -113,8 +115,8 @@ def certainly_kept(table: Array, i: int, x: float, y: float) -> bool:
     dx, dy, need, bound = x - table[i, PLACE], y - table[i, PLACE + 1], table[i, NEED], table[i, BOUND]
     squared = dx * dx + dy * dy
     if table[i, ROW] == 0.0:
-        return bool(need + bound > 0.0 and squared <= (need + bound) ** 2)
-    return bool(table[i, MARGIN] == 0.0 and squared >= (need - bound) ** 2)
+        return bool(need + bound > 0.0 and squared <= (need + bound) * (need + bound))
+    return bool(table[i, MARGIN] == 0.0 and squared >= (need - bound) * (need - bound))
 
 
 @kernel

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from ...core.elementary import exp, hypot, log
 from .compiled import borrower, inner, kernel
 from .typing import Array
 
@@ -28,10 +29,11 @@ def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) ->
     for r in range(robots.shape[0]):
         for i in range(count):
             x, y = sigma_positions[i, 0] - robots[r, last, 0], sigma_positions[i, 1] - robots[r, last, 1]
-            ranges[i] = math.hypot(x, y)
+            ranges[i] = hypot(x, y)
         for i in range(count):
             for j in range(count):
-                distance[i, j] += (ranges[i] - ranges[j]) ** 2 / (2.0 * variance)
+                difference = ranges[i] - ranges[j]
+                distance[i, j] += difference * difference / (2.0 * variance)
     return distance
 
 
@@ -97,7 +99,7 @@ def informed(points: Array, x: float, y: float, variance: float) -> tuple[float,
         total = weight
         for j in range(i):
             difference = r - points[j, _RANGE]
-            likeness = math.exp(-0.5 * precision * difference * difference - points[i, _PAIRS + 2 * j])
+            likeness = exp(-0.5 * precision * difference * difference - points[i, _PAIRS + 2 * j])
             points[i, _PAIRS + 2 * j + 1] = likeness
             total += points[j, _WEIGHT] * likeness
             points[j, _SUM] += weight * likeness
@@ -107,7 +109,7 @@ def informed(points: Array, x: float, y: float, variance: float) -> tuple[float,
         weight, r, share = points[i, _WEIGHT], points[i, _RANGE], 1.0 / points[i, _SUM]
         ux, uy = points[i, _DIRECTION], points[i, _DIRECTION + 1]
         bxx, bxy, byy = points[i, _BEND], points[i, _BEND + 1], points[i, _BEND + 2]
-        value += weight * math.log(points[i, _SUM])
+        value += weight * log(points[i, _SUM])
         points[i, _SUM] = share
         mx = my = 0.0
         for j in range(i):

@@ -78,7 +78,8 @@ def peer_tubes(
     Each row of ``plans`` is one plan: x, y, vx, vy when it was made, the time (s) of that, how many controls follow,
     and these, the accelerations from then on; past the last of them the velocity is kept.  To the ``radius`` (N,) of
     eq. (3), eq. (4) adds ``growth`` for every period that has passed since but one, which is normal latency.  Plans
-    older than ``OLDEST`` count as that old: what they say is lost in the distance to keep.
+    older than ``OLDEST`` count as that old: what they say is lost in the distance to keep.  A peer whose periods begin
+    at other times is where it is on its way between two of its steps.
     """
     count, steps = plans.shape[0], radius.shape[0]
     positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
@@ -86,14 +87,22 @@ def peer_tubes(
         px, py, vx, vy = plans[i, 0], plans[i, 1], plans[i, 2], plans[i, 3]
         age = _age(now - plans[i, 4], period, OLDEST)
         planned = int(plans[i, 5])
+        ahead = now - plans[i, 4] - age * period  # less than half a period, or the plan is from the future or too old
+        if not _SAME * period < abs(ahead) <= period:
+            ahead = 0.0
         for k in range(age + steps):
             px += period * vx
             py += period * vy
+            before_x, before_y = vx, vy
             if k < planned:
                 vx += period * plans[i, 6 + 2 * k]
                 vy += period * plans[i, 7 + 2 * k]
             if k >= age:
                 positions[i, k - age, 0], positions[i, k - age, 1] = px, py
+                if ahead < 0.0:
+                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * before_x, py + ahead * before_y
+                elif ahead > 0.0:
+                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * vx, py + ahead * vy
         lost = max(0, age - 1)
         for s in range(steps):
             distances[i, s] = safe_distance + margin * (radius[s] + growth * lost)

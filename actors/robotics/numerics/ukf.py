@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ...core.elementary import hypot
 from .compiled import inner, kernel
 from .typing import Array
 
@@ -119,13 +120,14 @@ def measurement_noise(points: Array, weights: Array, measurements: Array) -> Arr
     """
     noises = np.zeros((measurements.shape[0], 3))
     for m in range(measurements.shape[0]):
-        a, b = measurements[m, _ALONG] ** 2, measurements[m, _ACROSS] ** 2
+        along, across = measurements[m, _ALONG], measurements[m, _ACROSS]
+        a, b = along * along, across * across
         if measurements[m, _KIND] == RANGE:
             noises[m, 0] = a
             continue
         for i in range(points.shape[0]):
             dx, dy = points[i, 0] - measurements[m, _OBSERVER], points[i, 1] - measurements[m, _OBSERVER + 1]
-            length = math.hypot(dx, dy)
+            length = hypot(dx, dy)
             nx, ny = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
             noises[m, 0] += weights[i] * (a * nx * nx + b * ny * ny)
             noises[m, 1] += weights[i] * (a - b) * nx * ny
@@ -159,7 +161,7 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
         observed[row] = measurements[m, _VALUE]
         if measurements[m, _KIND] == RANGE:
             for i in range(count):
-                images[i, row] = math.hypot(points[i, 0] - x, points[i, 1] - y)
+                images[i, row] = hypot(points[i, 0] - x, points[i, 1] - y)
             row += 1
         else:
             noise[row, row + 1] = noise[row + 1, row] = noises[m, 1]

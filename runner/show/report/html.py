@@ -1,10 +1,12 @@
-"""A page of HTML from nested elements; whatever is text is escaped."""
+"""A page of HTML from nested elements; whatever is text is escaped, and what would hide in it is shown."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
 from typing import TypeAlias
+
+from epicycle.actors import visible_lines
 
 _VOID = frozenset({"img", "meta", "br"})
 
@@ -25,7 +27,7 @@ def html(content: Content) -> Html:
     if isinstance(content, Html):
         return content
     if isinstance(content, str):
-        return Html(escape(content))
+        return Html(escape(visible_lines(content)))
     return Html("".join(html(each) for each in content))
 
 

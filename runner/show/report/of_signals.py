@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
@@ -154,7 +155,7 @@ def over_time(
     means, halves = [], []
     for column in columns.T[kept]:
         values = column[~np.isnan(column)].tolist()
-        means.append(sum(values) / len(values))
+        means.append(math.fsum(values) / len(values))
         halves.append(half_width(values) if len(values) > 1 else 0.0)
     return times[kept], np.array(means), np.array(halves)
 

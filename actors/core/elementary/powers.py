@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import copysign, floor, inf
+from typing import Any
 
 from .double import product
 from .exponential import exponential_parts, scaled
@@ -52,3 +53,14 @@ def _far_power(x: float, y: float) -> float:
     if not -1e19 < y < 1e19:
         return infinite(1.0) if (size > 1.0) == (y > 0.0) else 0.0
     return sign * _positive_power(size, y)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """``base ** exponent`` of whole numbers and floats, as Python has it, but a ``ValueError`` where it is complex."""
+    if isinstance(base, int) and isinstance(exponent, int) and exponent >= 0:
+        return base**exponent
+    if base == 0 and exponent < 0:
+        raise ZeroDivisionError("0 cannot be raised to a negative power")
+    if base < 0 and exponent % 1 != 0 and abs(exponent) != inf:
+        raise ValueError("the result is not a real number")
+    return pow(float(base), float(exponent))

@@ -1,0 +1,276 @@
+"""What changes a model does all of it or nothing; and a model is part of one run at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from epicycle.actors import Actor, Clock, EpicycleError, InputPort, Merge, Recorder, Scale, Server
+from epicycle.aspects import CommunicationAspect, JoinPoint, PacketLoss
+from epicycle.runner import Model, ModelError, Simulation, load_composite, load_model
+
+LIBRARY = """
+composites:
+  Line:
+    parameters: {factor: {value: 1}}
+    inputs: [request, other]
+    outputs: [response]
+    actors: {scale: {type: Scale, factor: "${factor}", count: 2}, last: {type: Recorder}}
+    connections:
+      - request -> scale[0].input
+      - scale[0].output -> scale[1].input, last.input
+      - scale[1].output -> response
+    aspects: {lossy: {type: PacketLoss, probability: 0.5, at: "scale[*].input"}}
+"""
+MODEL = """
+model: m
+include: [library.yaml]
+parameters: {factor: 2, none: 0}
+actors:
+  clock: {type: Clock, period: 1}
+  line: {type: Line, factor: "${factor}"}
+  more: {type: Line, count: 2}
+  absent: {type: Scale, count: "${none}"}
+  shop: {type: Server, service_time: 0.1}
+  beside: {type: Line}
+connections:
+  - clock.output -> line.request, more[*].request, shop.input
+  - clock.output -> beside.request
+aspects:
+  loss: {type: PacketLoss, probability: 0.3, at: shop.input}
+run: {stop: 20, record: [line.response], stop_when: clock.output}
+metrics: {ticks: {of: clock.output, take: count}}
+"""
+DISTURBANCE = """
+disturbance: d
+composites:
+  Wait:
+    inputs: [request]
+    outputs: [response]
+    actors: {wait: {type: Scale}, again: {type: Scale}}
+    connections: [request -> wait.input, wait.output -> again.input, again.output -> response]
+aspects:
+  wait: {type: Wait, at: shop.input}
+  first: {type: PacketLoss, probability: 0.1, at: line.request}
+  second: {type: PacketLoss, probability: 7, at: shop.nowhere}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, text in (("library.yaml", LIBRARY), ("m.yaml", MODEL), ("d.yaml", DISTURBANCE)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def state(model: Model) -> Any:
+    """All that a model consists of."""
+    graph = model.graph
+    nodes = graph.ports.nodes.items()
+    by_path = (graph.composites, graph.members, graph.priorities, graph.positions, graph.tags)
+    scopes = [model, *map(model.__getitem__, graph.composites)]
+    return {
+        "ports": [(path, sorted((key, str(value)) for key, value in node.items())) for path, node in nodes],
+        "edges": list(graph.ports.edges(keys=True)),
+        "hops": [(str(hop), hop.order, hop.delay) for hop in graph.since(0)],
+        "ways": [[str(hop) for hop in (*graph.incoming(port), *graph.outgoing(port))] for port in graph.ports],
+        "actors": [(path, id(actor), actor.path, actor.home is graph) for path, actor in graph.actors.items()],
+        "by path": [deepcopy(list(each.items())) for each in by_path],
+        "borders": [deepcopy(graph.borders(path)) for path in graph.composites],
+        "clocks": list(graph.clocks),
+        "names": [set(each) for each in (graph.empty_arrays, graph.unknown, graph.absent)],
+        "rest": (graph.is_wired, graph.mark(), list(map(str, graph.detours)), model.is_checked),
+        "aspects": [(woven.name, id(woven), repr(woven)) for woven in model.aspects],
+        "watched": (model.recorded[:], model.stop_ports[:], [repr(metric) for metric in model.metrics], model.stop),
+        "scopes": [(id(scope), list(scope._children), repr(scope)) for scope in scopes],
+    }
+
+
+@PacketLoss(probability=0.1).at("nowhere", name="odd")
+class Misfit(Actor):
+    """Comes with an aspect for a port that its instances do not have."""
+
+    input = InputPort(float)
+
+    def own_ports(self) -> dict[str, Any]:
+        return {}
+
+
+class Nosy(CommunicationAspect):
+    """Asks what it must not."""
+
+    def __init__(self, doing: Callable[[], object]) -> None:
+        super().__init__()
+        self.doing = doing
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        self.doing()
+
+
+def line(folder: Path, name: str = "fresh", **values: object) -> Any:
+    return load_composite(folder / "library.yaml", "Line")(name, **values)
+
+
+REFUSED: dict[str, Callable[[Model, Path], object]] = {
+    "disturb: a file that is wrong": lambda m, f: m.disturb(f / "d.yaml"),
+    "disturb: no such file": lambda m, f: m.disturb("nothing.yaml"),
+    "add: a name that is taken": lambda m, f: m.add(Scale("shop")),
+    "add: no name": lambda m, f: m.add(Scale("a b")),
+    "add: not the next of its array": lambda m, f: m.add(line(f, "more[4]")),
+    "add: an aspect of its own that is wrong": lambda m, f: m.add(Misfit("misfit")),
+    "add: a class with a wrong parameter": lambda m, f: m.add(line(f, factor="red")),
+    "add: no actor": lambda m, f: m.add("actor"),  # type: ignore[call-overload]
+    "add: inside": lambda m, f: m["line"].add(Scale("last")),
+    "composite: a wrong port": lambda m, f: m.composite("inner", inputs=["a", "b", "a"], director=True),
+    "composite: a wrong clock": lambda m, f: m.composite("inner", director=True, drift=0),
+    "composite: in another": lambda m, f: m["more[1]"].composite("inner", outputs=["o", "o"]),
+    "input: there is one": lambda m, f: m["line"].input("request"),
+    "output: no name": lambda m, f: m["line"].output("1"),
+    "connect: one of several": lambda m, f: m.connect("clock.output", ["line.other", "more[*].other", "shop.nothing"]),
+    "connect: two writers": lambda m, f: m.connect("line.response -> shop.input"),
+    "connect: a wrong delay": lambda m, f: m.connect("clock.output -> line.other", delay="red"),
+    "connect: not a port": lambda m, f: m.connect(m["clock"], m["shop"].input),
+    "disconnect: not connected": lambda m, f: m.disconnect("clock.output -> line.other"),
+    "weave: nowhere": lambda m, f: m.weave("more_loss", PacketLoss(probability=0.1), at=["shop.input", "nowhere.*"]),
+    "weave: the name is taken": lambda m, f: m.weave("loss", PacketLoss(probability=0.1), at="shop.input"),
+    "weave: a model, nowhere": lambda m, f: m.weave("by", line(f), at={"request": "shop.input", "other": "nowhere"}),
+    "weave: a model by no port of it": lambda m, f: m.weave("by", line(f), at={"nothing": "shop.input"}),
+    "weave: a composite that is connected": lambda m, f: m.weave("by", m["beside"], at={"request": "shop.input"}),
+    "weave: a composite by no port of it": lambda m, f: m.weave("by", m["beside"], at="shop.input"),
+    "weave: no aspect": lambda m, f: m.weave("by", PacketLoss, at="shop.input"),  # type: ignore[arg-type]
+    "unweave: none of that name": lambda m, f: m.unweave("nothing"),
+    "unweave: of a class": lambda m, f: m["line"].unweave("nothing"),
+    "remove: none of that name": lambda m, f: m.remove("nothing"),
+    "remove: not the last": lambda m, f: m.remove("more[0]"),
+    "record: one of several": lambda m, f: m.record("shop.output", "nothing.output"),
+    "stop_when: an input": lambda m, f: m.stop_when("line.response", "shop.input"),
+    "metric: the name is taken": lambda m, f: m.metric("ticks", of="shop.output"),
+    "metric: no such port": lambda m, f: m.metric("tocks", of="shop.nothing"),
+    "stop: a colour": lambda m, f: setattr(m, "stop", "red"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_refused_leaves_no_trace(what: str, folder: Path) -> None:
+    model = load_model(folder / "m.yaml")
+    digest = Simulation(load_model(folder / "m.yaml")).run().digest
+    before = state(model)
+    for _ in range(2):
+        with pytest.raises((EpicycleError, AttributeError)):
+            REFUSED[what](model, folder)
+        assert state(model) == before
+    assert Simulation(model).run().digest == digest
+    # All that is there is still found, and can be changed.
+    model.remove("shop")
+    model.remove("more[1]")
+    model["line"].disconnect("scale[1].output -> response")
+    model.unweave("line.lossy")
+    assert "shop" not in model.graph.actors
+    assert [woven.name for woven in model.aspects] == ["more[0].lossy", "beside.lossy", "loss"]
+
+
+def test_an_actor_that_was_refused_can_be_added_elsewhere() -> None:
+    model = Model("m")
+    inner = model.composite("inner")
+    actor = Misfit("misfit")
+    for _ in range(2):
+        with pytest.raises(ModelError, match="misfit has no port 'nowhere'"):
+            inner.add(actor)
+        assert (actor.path, actor.home, actor.input.path) == ("misfit", None, "misfit.input")
+    clock = Clock("clock", period=1)
+    inner.add(clock)
+    with pytest.raises(ModelError, match="is part of a model already"):
+        model.add(clock)
+    assert clock.path == "inner.clock"
+
+
+def test_after_a_refused_disturbance_what_it_would_have_added_is_not_there(folder: Path) -> None:
+    model = load_model(folder / "m.yaml")
+    with pytest.raises(ModelError):
+        model.disturb(folder / "d.yaml")
+    with pytest.raises(ModelError) as caught:
+        model.remove("wait")
+    (problem,) = caught.value.problems
+    assert problem.message == "m has no actor 'wait'"
+    assert problem.help == ("valid actors: line, more[0], more[1], beside, clock, shop",)
+    (folder / "d.yaml").write_text(DISTURBANCE.rpartition("  second")[0], encoding="utf-8")
+    assert [woven.name for woven in model.disturb(folder / "d.yaml")] == ["wait", "first"]
+    model.remove("wait")
+    assert [woven.name for woven in model.aspects if "." not in woven.name] == ["loss", "first"]
+
+
+def test_a_scope_survives_what_is_removed_beside_it(folder: Path) -> None:
+    model = load_model(folder / "m.yaml")
+    inner = model["line"]
+    model.remove("shop")
+    assert model["line"] is inner
+    inner.add(Scale("third"))
+    inner.connect("other -> third.input")
+    with pytest.raises(ModelError, match=r"there is a line\.third already"):
+        inner.add(Scale("third"))
+
+
+def running(doing: Callable[[Model], object]) -> str:
+    """What is said of something that is done while a model runs."""
+    model = Model("busy", stop=3)
+    clock, recorder = model.add(Clock("clock", period=1)), model.add(Recorder("recorder"))
+    model.connect(clock.output, recorder.input)
+    caught: list[str] = []
+
+    def do() -> None:
+        try:
+            doing(model)
+        except EpicycleError as error:
+            caught.append(_told(error))
+
+    model.weave("nosy", Nosy(do), at=recorder.input)
+    results = Simulation(model).run()
+    assert results.end == 3  # the run goes on
+    assert len(set(caught)) == 1
+    assert Simulation(model).run().digest == results.digest
+    return caught[0]
+
+
+def _told(error: EpicycleError) -> str:
+    return error.problems[0].message if isinstance(error, ModelError) else str(error)
+
+
+def test_a_model_is_part_of_one_run_at_a_time() -> None:
+    waiting: list[Simulation] = []
+    refusal = "busy is being run by another Simulation: wait until that is over, or load or build the model once more"
+    assert running(Simulation) == refusal
+    first = Model("busy", stop=1)
+    first.add(Clock("clock", period=1))
+    waiting.append(Simulation(first))
+    first.is_running = True  # as while another one runs
+    with pytest.raises(EpicycleError) as caught:
+        waiting[0].run()
+    assert str(caught.value) == refusal
+    first.is_running = False
+    assert waiting[0].run().end == 1  # it has not been used up
+
+
+def test_a_model_that_runs_is_not_changed() -> None:
+    for change in (
+        lambda model: model.add(Merge("merge")),
+        lambda model: model.remove("clock"),
+        lambda model: model.record("clock.output"),
+        lambda model: model.unweave("nosy"),
+    ):
+        assert running(change) == "busy is being run and cannot be changed"
+
+
+def test_a_run_that_fails_frees_its_model() -> None:
+    model = Model("m", stop=3)
+    server = model.add(Server("server", service_time=1))
+    clock = model.add(Clock("clock", period=1))
+    model.connect(clock.output, server.input)
+    woven = model.weave("nosy", Nosy(lambda: 1 / 0), at=server.input)
+    with pytest.raises(EpicycleError, match="aspect nosy failed"):
+        Simulation(model).run()
+    model.unweave(woven.name)
+    assert Simulation(model).run().end == 3
