@@ -92,7 +92,7 @@ def test_tests_of_a_line_are_asked_until_one_fails(project: Path) -> None:
 
 def test_heaps_of_tests_are_small_at_first() -> None:
     tests = [f"t{number}" for number in range(40)]
-    heaps = list(stages(tests, dict.fromkeys(tests, 0.1)))
+    heaps = list(stages(tests, dict.fromkeys(tests, 0.05)))
     assert [len(heap) for heap, _ in heaps] == [25, 15]
     assert list(stages(["slow", "quick"], {"slow": 5.0, "quick": 0.1})) == [(["slow"], 5.0), (["quick"], 0.1)]
 
