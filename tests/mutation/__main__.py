@@ -37,12 +37,11 @@ COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
-    "tests/actors", "tests/api", "tests/aspects", "tests/cli", "tests/conformance", "tests/core", "tests/engine",
-    "tests/library", "tests/model", "tests/numerics", "tests/test_demo_models.py", "tests/test_disturbances.py",
-    "tests/test_models.py", "tests/test_reference.py",
+    "tests/actors", "tests/api", "tests/aspects", "tests/conformance", "tests/core", "tests/engine", "tests/library",
+    "tests/model", "tests/numerics", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
-TESTS_OF_KERNELS = ("tests/numerics", "tests/actors", "tests/core")
-LONGEST = {True: 8.0, False: 12.0}  # s; a test that takes longer, compiled or not, is not asked
+TESTS_OF_KERNELS = ("tests/numerics", "tests/core")
+LONGEST = {True: 6.0, False: 4.0}  # s; a test that takes longer, compiled or not, is not asked
 STAGES = ((25, 2.0), (150, 6.0), (400, 12.0))  # so many tests, of so many seconds together; each the next ones
 
 
@@ -93,7 +92,7 @@ def maps(trees: Sequence[Path], jobs: int) -> dict[bool, dict[str, Any]]:
     tasks = [
         (trees[number % jobs], files, compiled)
         for compiled, places in ((True, TESTS), (False, TESTS_OF_KERNELS))
-        for number, files in enumerate(chunks(trees[0], places, 4 * jobs))
+        for number, files in enumerate(chunks(trees[0], places, 8 * jobs))
     ]
     found: dict[bool, dict[str, Any]] = {True: {}, False: {}}
     with multiprocessing.get_context("fork").Pool(jobs) as pool:

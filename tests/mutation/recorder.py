@@ -31,7 +31,7 @@ class Recorder:
     def __init__(self, root: Path, limit: float, compiled: bool) -> None:
         self.root = root.resolve()
         self.limit = limit
-        self.patience = 1e6 if compiled else 2.0 * limit  # a solve that is not compiled may take minutes
+        self.patience = 3.0 * limit + 60.0 * compiled  # a solve that is not compiled may take minutes
         self.found: dict[str, tuple[float, dict[str, list[int]]]] = {}
         self.failed: list[str] = []
         self._passed: set[str] = set()
