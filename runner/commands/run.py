@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import time
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 DESCRIPTION = "Run a model once and report what came of it."
 
 
+PATIENCE = 5.0  # s after which a run can be judged
+LONG = 600.0  # s that are worth a word
 NOTICEABLE = 0.05  # s by which a run may be late without our saying so: the operating system alone takes as much
 
 
@@ -128,6 +131,25 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     return complain_of(failed, options)
 
 
+def outlook(end: float, clock: Callable[[], float] = time.monotonic) -> Callable[[float], None]:
+    """Says once, when a run has gone on for a while, that it will take long: a clock of 1 ns is easily written."""
+    started, is_told = clock(), False
+
+    def look(now: float) -> None:
+        nonlocal is_told
+        elapsed = clock() - started
+        if is_told or elapsed < PATIENCE:
+            return
+        is_told = True
+        if (left := elapsed * (end - now) / max(now, 1e-9)) > LONG:
+            complain(
+                f"after {elapsed:.0f} s the run is at {now:.3g} s of {end:g} s: at this pace it takes "
+                f"{left / 3_600:,.1f} h more; Ctrl-C ends it, and what was recorded is kept"
+            )
+
+    return look
+
+
 @contextmanager
 def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None] | None]:
     """A bar on a terminal's standard error, and notices of what takes long."""
@@ -135,10 +157,10 @@ def progress(model: Model, until: float | None) -> Iterator[Callable[[float], No
 
     terminal = console(stderr=True)
     with notices(terminal):
-        if not terminal.is_terminal:
-            yield None
-            return
         end = until if until is not None else model.stop
+        if not terminal.is_terminal:
+            yield None if end is None else outlook(end)
+            return
         text = TextColumn("{task.description} {task.completed:.1f} s of model time", markup=False)
         with Progress(text, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
             task = bar.add_task(model.name, total=end)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epicycle.runner.cli import main
 from epicycle.runner.model import ModelError, load_model
 from epicycle.runner.model.limits import RAISE_IT
 from epicycle.runner.model.patterns import PathIndex, compile_pattern, matches
@@ -159,3 +160,33 @@ def test_an_index_chooses_the_same_paths_when_it_has_sorted_them() -> None:
     ]
     for pattern in patterns * 20:
         assert index.select(pattern) == [path for path in paths if matches(pattern, path)]
+
+
+def test_a_clock_is_not_set_to_the_end_of_all_time(tmp_path: Path) -> None:
+    text = f"model: m\nactors:\n{END}aspects:\n  o: {{type: ClockOffset, offset: 1e18, at: c}}\n"
+    wanted = "a number in s from -1000000000 to 1000000000"
+    assert refused(tmp_path, text) == f"m.yaml:8:34: error: aspect o.offset: 1e+18 is out of bounds, expected {wanted}"
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        (
+            "{from: 1, to: 1.0000000000000000001, step: 1e-19}",
+            (
+                "m.yaml:4:49: error: the range of 'n' has values that cannot be told apart as floats: "
+                "from 1 to 1.0000000000000000001 in steps of 1E-19"
+            ),
+        ),
+        (
+            "{from: 0 Mm, to: 1e308 Mm, step: 1e307 Mm}",
+            "m.yaml:4:39: error: the range of 'n': 1e+307 Mm is too large for a number in SI units",
+        ),
+    ],
+)
+def test_ranges_of_studies(tmp_path: Path, values: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "simple.yaml").write_text(f"model: m\nparameters: {{n: 1.0}}\nactors:\n{END}", encoding="utf-8")
+    file = tmp_path / "m.yaml"
+    file.write_text(f"study: s\nmodel: simple.yaml\nvary:\n  n: {values}\nreplications: 1\n", encoding="utf-8")
+    assert main(["study", str(file), "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.replace(f"{tmp_path}/", "").split("\n")[0] == told

@@ -162,8 +162,12 @@ def test_runs_that_fail_hang_or_die_are_rows(tmp_path: Path, capsys: pytest.Capt
     rows = {row["status"]: row for row in results.failures()}
     place = tmp_path / "walk.yaml"
     assert rows["failed"]["seed"] == 23
+    source = THIS.read_text(encoding="utf-8").splitlines()
+    [(number, line)] = [(number, line) for number, line in enumerate(source, 1) if "is unlucky" in line]
     assert rows["failed"]["error"] == (
-        f"walk failed in initialize() at (0 s, 1): ValueError: seed 23 is unlucky\n   declared at {place}:5:3"
+        "walk failed in initialize() at (0 s, 1): ValueError: seed 23 is unlucky\n"
+        f"   raised at {os.path.relpath(THIS)}:{number}:13\n{number:>5} | {line}\n"
+        f"      | {' ' * 12}{'^' * len(line.strip())}\n   declared at {place}:5:3"
     )
     assert (rows["timeout"]["seed"], rows["timeout"]["error"]) == (25, "it took longer than 1 s")
     assert (rows["killed"]["seed"], rows["killed"]["error"]) == (27, "its process ended 3 times (exit code 3)")
