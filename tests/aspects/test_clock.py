@@ -209,3 +209,31 @@ def test_bounds() -> None:
     with pytest.raises(EpicycleError) as caught:
         ClockDrift(gain=-1)
     assert str(caught.value) == "ClockDrift.gain: -1 is out of bounds, expected a number from -0.999999 to 1000000"
+
+
+class Fixed:
+    """A stream that always draws the same."""
+
+    def __init__(self, draw: float) -> None:
+        self.draw = draw
+
+    def standard_normal(self) -> float:
+        return self.draw
+
+
+@pytest.mark.parametrize(
+    ("aspect", "draw", "error"),
+    [
+        (ClockDrift(gain=0.1), 2.0, (0, Fraction(11, 10))),
+        (ClockDrift(gain=0.25, deviation=0.5), -2.0, (0, Fraction(1, 4))),
+        (ClockDrift(gain=0.25, deviation=0.5), 0.5, (0, Fraction(3, 2))),
+        (ClockDrift(gain=-0.5, deviation=1.0), -3.0, (0, Fraction(1, 1_000_000))),  # it never stands still
+        (ClockDrift(gain=-0.5, deviation=0.499999), -1.0, (0, Fraction(1, 1_000_000))),
+        (ClockDrift(gain=-0.5, deviation=0.4999), -1.0, (0, Fraction(1, 10_000))),
+        (ClockOffset(offset=1.5), 3.0, (1_500_000_000, Fraction(1))),
+        (ClockOffset(offset=1.5, deviation=0.25), -2.0, (1_000_000_000, Fraction(1))),
+        (ClockOffset(offset=-1.0, deviation=0.5), 4.0, (1_000_000_000, Fraction(1))),
+    ],
+)
+def test_the_error_of_a_clock(aspect: ClockAspect, draw: float, error: tuple[int, Fraction]) -> None:
+    assert aspect.error(Fixed(draw)) == error  # type: ignore[arg-type]

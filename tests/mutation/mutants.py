@@ -6,15 +6,15 @@ import ast
 import itertools
 import random  # noqa: TID251 (of the tool, not of a model)
 import re
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from cosmic_ray.commands.init import init
+from cosmic_ray.ast import ast_nodes, get_ast_from_path
 from cosmic_ray.mutating import mutate_code
-from cosmic_ray.plugins import get_operator
-from cosmic_ray.work_db import WorkDB, use_db
+from cosmic_ray.plugins import get_operator, operator_names
 
 GUARDED = ("actors/core", "actors/robotics", "aspects", "runner/engine")
 
@@ -30,17 +30,13 @@ TOLERANCES = {
 
 
 class Mutant(NamedTuple):
-    """One change of one file, by one of cosmic-ray's operators; ``job`` is its name in the session.
-
-    ``text`` is the file with the change in it, where it has been made.
-    """
+    """One change of one file, by one of cosmic-ray's operators; ``text`` is the file with it, if it has been made."""
 
     file: str
     line: int
     column: int
     operator: str
     occurrence: int
-    job: str
     text: str = ""
 
     def made(self, original: str) -> Mutant:
@@ -53,19 +49,19 @@ class Mutant(NamedTuple):
         return next(((old.strip(), new.strip()) for old, new in pairs if old != new), ("", ""))
 
 
-def session(root: Path, file: Path) -> Iterator[Mutant]:
-    """All mutants that say something, noted in a new session of cosmic-ray."""
-    sources = [path.relative_to(root) for folder in GUARDED for path in sorted((root / folder).rglob("*.py"))]
-    file.unlink(missing_ok=True)
-    with use_db(file, WorkDB.Mode.create) as db:
-        init(sources, db, {})
-        for item in db.work_items:
-            (mutation,) = item.mutations
-            found = Mutant(
-                str(mutation.module_path), *mutation.start_pos, mutation.operator_name, mutation.occurrence, item.job_id
-            )
-            if not _says_nothing(root / found.file, found):
-                yield found
+def mutants_of(root: Path) -> Iterator[Mutant]:
+    """All mutants that say something."""
+    operators = [(name, get_operator(name)()) for name in operator_names() if not get_operator(name).arguments()]
+    operators = [(name, operator) for name, operator in operators if not _is_no_mistake_to_make(name)]
+    for path in (path for folder in GUARDED for path in sorted((root / folder).rglob("*.py"))):
+        file, counts = str(path.relative_to(root)), Counter[str]()
+        for node in list(ast_nodes(get_ast_from_path(path))):
+            for name, operator in operators:
+                for start, _ in operator.mutation_positions(node):
+                    found = Mutant(file, *start, name, counts[name])
+                    counts[name] += 1
+                    if not _says_nothing(path, found):
+                        yield found
 
 
 def sample(root: Path, mutants: list[Mutant], count: int, seed: int) -> list[Mutant]:
@@ -95,9 +91,7 @@ def _is_python(mutant: Mutant) -> bool:
 
 
 def _says_nothing(path: Path, mutant: Mutant) -> bool:
-    """Whether it changes what is never run (annotations) or a tolerance, or fails or is the same wherever it is run."""
-    if _is_no_mistake_to_make(mutant.operator):
-        return True
+    """Whether it changes what is never run (annotations), or a tolerance, or how a kernel is compiled."""
     if mutant.operator.endswith("RemoveDecorator") and mutant.file.startswith(KERNELS):
         return True  # it would run as it is, or be compiled otherwise, to the same bits
     text, ranges = _annotations(path)

@@ -51,7 +51,7 @@ def changes(found: list[Mutant]) -> set[tuple[int, str]]:
 
 
 def test_what_runs_is_mutated_and_what_does_not_is_not(project: Path) -> None:
-    found = changes(list(mutants.session(project, project / "session.sqlite")))
+    found = changes(list(mutants.mutants_of(project)))
     assert {line for line, _ in found} == {5, 10, 11, 12}
     assert {(5, "LIMIT = 4"), (5, "LIMIT = 2"), (10, "if value is not None:")} <= found
     assert (12, "return value * 2 if value <= limit else value") in found
@@ -59,13 +59,13 @@ def test_what_runs_is_mutated_and_what_does_not_is_not(project: Path) -> None:
 
 
 def test_a_sample_is_spread_over_all_places_and_the_same_each_time(project: Path) -> None:
-    every = list(mutants.session(project, project / "session.sqlite"))
+    every = list(mutants.mutants_of(project))
     places = {mutant[:3] for mutant in every}
     whole = mutants.sample(project, every, 100, 1)
     assert {mutant[:3] for mutant in whole} == places
     assert len(whole) == len(places)
     few = mutants.sample(project, every, 4, 1)
-    assert [mutant[:-2] for mutant in few] == [mutant[:-2] for mutant in mutants.sample(project, every, 4, 1)]
+    assert [mutant[:-1] for mutant in few] == [mutant[:-1] for mutant in mutants.sample(project, every, 4, 1)]
     assert len({mutant.line for mutant in few}) >= 3
     assert all(compile(mutant.text, "some.py", "exec") for mutant in whole)
 
@@ -79,7 +79,7 @@ def test_tests_of_a_line_are_asked_until_one_fails(project: Path) -> None:
     assert known.tests("actors/core/some.py", SOURCE, 5) == [test]
     assert known.tests("actors/core/other.py", SOURCE, 5) == []
     results = {}
-    for mutant in mutants.session(project, project / "session.sqlite"):
+    for mutant in mutants.mutants_of(project):
         if mutant.operator.endswith(("_Mul_Add", "_Sub_Add")):
             result = attempt(mutant.made(SOURCE), project, {True: known, False: known})
             results[result.after] = (result.killed, result.by)
@@ -92,7 +92,7 @@ def test_tests_of_a_line_are_asked_until_one_fails(project: Path) -> None:
 
 def test_heaps_of_tests_are_small_at_first() -> None:
     tests = [f"t{number}" for number in range(40)]
-    heaps = list(stages(tests, dict.fromkeys(tests, 0.1)))
+    heaps = list(stages(tests, dict.fromkeys(tests, 0.05)))
     assert [len(heap) for heap, _ in heaps] == [25, 15]
     assert list(stages(["slow", "quick"], {"slow": 5.0, "quick": 0.1})) == [(["slow"], 5.0), (["quick"], 0.1)]
 
