@@ -101,7 +101,10 @@ class Map:
                 own = sorted(found, key=lambda test: (self.seconds[test] > 1.0, self._cost(test, file), test))
                 return own[:FEW] + reference + own[FEW:]
             reference = [test for test in self.seconds if test.startswith(REFERENCE)]
-        return reference
+        # Nobody runs it but at import: those that run its neighbours.
+        folder = file.rpartition("/")[0]
+        near = {test for other, tests in self._files.items() if other.rpartition("/")[0] == folder for test in tests}
+        return reference + sorted(near, key=lambda test: (self.seconds[test], test))
 
     def _cost(self, test: str, file: str) -> float:
         """Small for what is quick and about this file."""
