@@ -37,7 +37,8 @@ COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
-    "tests/actors", "tests/api", "tests/aspects", "tests/conformance", "tests/core", "tests/engine", "tests/library",
+    "tests/actors", "tests/api", "tests/aspects", "tests/cli/test_output.py", "tests/conformance", "tests/core",
+    "tests/engine", "tests/library",
     "tests/model", "tests/numerics", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
 TESTS_OF_KERNELS = ("tests/numerics", "tests/core")

@@ -22,7 +22,7 @@ def _ring(*_: object) -> None:
     pytest.fail("it takes too long")
 
 
-REFERENCE, FEW = "tests/test_reference.py::", 60
+REFERENCE = "tests/test_reference.py::"
 
 
 class Recorder:
@@ -90,21 +90,24 @@ class Map:
                     self._tests[file, line].append(test)
 
     def tests(self, file: str, source: str, line: int) -> list[str]:
-        """The tests of a line; of a line that runs at import, those of its class or else of its file.
+        """The tests of a line, then those of its function, its class, its file, and its folder.
 
-        What is declared there is in the reference, too, which is made in a process of its own.
+        What keeps its results runs a line only when it is asked first, and what stands in a class runs at import: the
+        reference tells of it, too, which is made in a process of its own.
         """
-        reference: list[str] = []
-        for lines in self._neighbourhoods(source, line):
-            found = {test for each in lines for test in self._tests.get((file, each), ())}
-            if found:
-                own = sorted(found, key=lambda test: (self.seconds[test] > 1.0, self._cost(test, file), test))
-                return own[:FEW] + reference + own[FEW:]
-            reference = [test for test in self.seconds if test.startswith(REFERENCE)]
-        # Nobody runs it but at import: those that run its neighbours.
+        found: dict[str, None] = {}
+        for number, lines in enumerate(self._neighbourhoods(source, line)):
+            ran = {test for each in lines for test in self._tests.get((file, each), ())}
+            found.update(dict.fromkeys(sorted(ran, key=lambda test: self._key(test, file))))
+            if number == 0 and not ran:
+                found.update(dict.fromkeys(test for test in self.seconds if test.startswith(REFERENCE)))
         folder = file.rpartition("/")[0]
         near = {test for other, tests in self._files.items() if other.rpartition("/")[0] == folder for test in tests}
-        return reference + sorted(near, key=lambda test: (self.seconds[test], test))
+        found.update(dict.fromkeys(sorted(near, key=lambda test: (self.seconds[test], test))))
+        return list(found)
+
+    def _key(self, test: str, file: str) -> tuple[bool, float, str]:
+        return self.seconds[test] > 1.0, self._cost(test, file), test
 
     def _cost(self, test: str, file: str) -> float:
         """Small for what is quick and about this file."""
