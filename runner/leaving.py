@@ -8,21 +8,26 @@ import threading
 import time
 from contextlib import suppress
 
-from .printing import complain
-
 PATIENCE = 1.0  # s that threads have to come to their end
 
 
 def leave(code: int) -> int:
-    """``code``, to be handed on; but if an actor's thread would keep Python from ending, the process ends here."""
-    until = time.monotonic() + PATIENCE
-    for each in _others():
-        each.join(max(0.0, until - time.monotonic()))
+    """``code``, to be handed on; if a thread of the run would keep Python from ending, the process ends all the same.
+
+    Python waits for threads when it ends, and tells those of executors to end; so it is watched from a daemon thread.
+    """
+    if _others():
+        threading.Thread(target=_end, args=(code,), daemon=True).start()
+    return code
+
+
+def _end(code: int) -> None:
+    time.sleep(PATIENCE)
     if not (left := _others()):
-        return code
+        return
     names = ", ".join(each.name for each in left[:3]) + (", ..." if len(left) > 3 else "")
     with suppress(OSError, ValueError):  # there may be nobody any more who would read it
-        complain(f"threads that the run has started are still at work, and are ended: {names}")
+        print(f"threads that the run has started are still at work, and are ended: {names}", file=sys.stderr)
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):
             stream.flush()
@@ -31,5 +36,4 @@ def leave(code: int) -> int:
 
 def _others() -> list[threading.Thread]:
     """The threads for which Python would wait."""
-    own = (threading.main_thread(), threading.current_thread())
-    return [each for each in threading.enumerate() if each not in own and not each.daemon and each.is_alive()]
+    return [each for each in threading.enumerate() if each is not threading.main_thread() and not each.daemon]

@@ -70,7 +70,7 @@ def factor(text: str) -> float:
     if not SLOWEST <= number < math.inf:
         # The model, perhaps, which stands behind the option.
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a number from {SLOWEST:g} on (write MODEL before --realtime)"
+            f"{text!r} is not a number of {SLOWEST:g} or more (write MODEL before --realtime)"
         )
     return number
 

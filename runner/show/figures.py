@@ -172,7 +172,7 @@ class TimeSeries(Figure):
                 times, values = array("d", latest), array("d", latest.values())
             colour = COLOURS[index % len(COLOURS)]
             axes.plot(times, values, color=colour, linewidth=1.2, markersize=4, label=name, **look[self.style])
-        axes.set_xlabel("time (s)")
+        axes.set_xlabel("" if strips and lines else "time (s)")
         axes.set_ylabel(self.label or (next(iter(lines)) if len(lines) == 1 else ""))
         axes.set_xlim(0.0 if self.start is None and self.end is not None else self.start, self.end)
         if len(lines) > 1:

@@ -100,7 +100,7 @@ AT_WORK: list[Aspect] = [
     ExecutionTime(time="1.5 ms"),
     SkipFiring(probability=0.5),
     Processor(time="0.1 ms"),
-    CrashRestart(mtbf="5 ms", repair="1 ms", tokens="kept", until="5 s"),
+    CrashRestart(mtbf="5 ms", repair="4 ms", tokens="kept", until="10 s"),
 ]
 
 

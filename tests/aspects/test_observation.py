@@ -149,7 +149,7 @@ def test_fields_of_tokens_are_known_before_the_run() -> None:
         )
     assert str(caught.value).splitlines()[0::3] == [
         "command line:1:38: error: aspect safe: that: token.sped at obstacle.state: BodyState has no field 'sped'",
-        "   help: its fields: position, velocity",
+        "   help: its fields: position, velocity, time",
     ]
 
 

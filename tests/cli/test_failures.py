@@ -183,7 +183,10 @@ def test_what_fails_in_a_run_is_told_with_its_line(how: str, capsys: pytest.Capt
     assert capsys.readouterr().err == "what was recorded until then is in out\n" + RUNNING[how]
     assert Path("out/signals.parquet").is_file()
     assert run(how, "--debug") == 1
-    said = capsys.readouterr().err.removeprefix("what was recorded until then is in out\n")
+    replaced, kept, said = capsys.readouterr().err.split("\n", 2)
+    command = f"epicycle run m.yaml --types own_of_mine.py --set how={how} --out out"
+    assert replaced == f"replacing the results of '{command}' in out"
+    assert kept == "what was recorded until then is in out"
     assert said.startswith("Traceback (most recent call last):\n")
     assert said.endswith(RUNNING[how])
     assert said.count("own_of_mine.py") > 1

@@ -116,7 +116,7 @@ def test_simple_sources(source: str, feeds: Feeds, expected: list[tuple[float, i
         ("Clock, period: 1 s, values: [1, 2.5]", float),
         ("Const, value: text", str),
         ("SingleEvent", bool),
-        ("Sequence, values: [1, a]", Any),
+        ("Sequence, values: [1, a]", int | str),
         ("Random, distribution: {type: RandomInteger}", int),
         ("Random, distribution: {type: Choice, values: [a, b]}", str),
     ],
@@ -124,7 +124,7 @@ def test_simple_sources(source: str, feeds: Feeds, expected: list[tuple[float, i
 def test_outputs_have_the_type_of_what_they_send(source: str, port_type: Any) -> None:
     feeds: Feeds = [("trigger", [[0, 0]])] if source.startswith(("Sequence", "Random")) else []
     actor: Actor = load(text(f"{{type: {source}}}", feeds), types=[Feed]).graph.actors["it"]
-    assert actor.outputs["output"].type is port_type
+    assert actor.outputs["output"].type == port_type
 
 
 # -- random tokens ------------------------------------------------------------------------------------------------

@@ -105,18 +105,20 @@ def older_packages(folder: Path) -> Setting | None:
     return Setting(", ".join(OLD).replace("==", " "), {"PYTHONPATH": str(folder)})
 
 
-def outcome(setting: Setting) -> tuple[dict[str, str], str, float]:
-    """The digests under a setting, what went wrong if anything did, and how long it took."""
+def outcome(setting: Setting, cache: str = "") -> tuple[dict[str, str], str, float]:
+    """The digests under a setting, what went wrong if anything did, and how long it took.
+
+    ``cache`` is a folder for compiled kernels; numba tells apart there what it has compiled for different processors.
+    """
     before = time.monotonic()
-    with tempfile.TemporaryDirectory() as cache:
-        done = subprocess.run(
-            [*setting.command, sys.executable, "-W", "ignore", "-m", "tests.portable.digests", *setting.parts],
-            check=False,
-            cwd=ROOT,
-            env={**os.environ, "NUMBA_CACHE_DIR": cache, **setting.variables},
-            capture_output=True,
-            text=True,
-        )
+    done = subprocess.run(
+        [*setting.command, sys.executable, "-W", "ignore", "-m", "tests.portable.digests", *setting.parts],
+        check=False,
+        cwd=ROOT,
+        env={**os.environ, **({"NUMBA_CACHE_DIR": cache} if cache else {}), **setting.variables},
+        capture_output=True,
+        text=True,
+    )
     found = dict(json.loads(line) for line in done.stdout.splitlines() if line.startswith("["))
     wrong = done.stderr.strip().splitlines()[-1] if done.returncode and done.stderr.strip() else ""
     return found, wrong or (f"exit code {done.returncode}" if done.returncode else ""), time.monotonic() - before
@@ -140,10 +142,13 @@ def main() -> int:
         return 0
     wanted, bad = json.loads(GOLDEN.read_text()), 0
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        older = older_packages(Path(folder))
+        cache = f"{folder}/kernels"
+        older = older_packages(Path(folder, "older"))
         chosen = [*settings(), *([older] if older else [])]
         print(f"{len(parts())} digests of functions, laws, models, studies and tutorials; {len(chosen)} settings")
-        for setting, (found, wrong, seconds) in zip(chosen, pool.map(outcome, chosen), strict=True):
+        for setting, (found, wrong, seconds) in zip(
+            chosen, pool.map(outcome, chosen, [cache] * len(chosen)), strict=True
+        ):
             others = differences(found, wanted)
             missing = len(setting.parts or parts()) - len(found)
             said = (
