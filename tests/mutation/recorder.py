@@ -22,7 +22,7 @@ def _ring(*_: object) -> None:
     pytest.fail("it takes too long")
 
 
-REFERENCE = "tests/test_reference.py::"
+REFERENCE, FEW = "tests/test_reference.py::", 40
 
 
 class Recorder:
@@ -95,16 +95,18 @@ class Map:
         What keeps its results runs a line only when it is asked first, and what stands in a class runs at import: the
         reference tells of it, too, which is made in a process of its own.
         """
-        found: dict[str, None] = {}
-        for number, lines in enumerate(self._neighbourhoods(source, line)):
+        levels: list[list[str]] = []
+        for lines in self._neighbourhoods(source, line):
             ran = {test for each in lines for test in self._tests.get((file, each), ())}
-            found.update(dict.fromkeys(sorted(ran, key=lambda test: self._key(test, file))))
-            if number == 0 and not ran:
-                found.update(dict.fromkeys(test for test in self.seconds if test.startswith(REFERENCE)))
+            levels.append(sorted(ran, key=lambda test: self._key(test, file)))
+            if not levels[0] and len(levels) == 1:
+                levels.append([test for test in self.seconds if test.startswith(REFERENCE)])
         folder = file.rpartition("/")[0]
         near = {test for other, tests in self._files.items() if other.rpartition("/")[0] == folder for test in tests}
-        found.update(dict.fromkeys(sorted(near, key=lambda test: (self.seconds[test], test))))
-        return list(found)
+        levels.append(sorted(near, key=lambda test: (self.seconds[test], test)))
+        # Those of each level that know most of this file, then all others.
+        first = [test for level in levels for test in level[:FEW]]
+        return list(dict.fromkeys([*first, *(test for level in levels for test in level)]))
 
     def _key(self, test: str, file: str) -> tuple[bool, float, str]:
         return self.seconds[test] > 1.0, self._cost(test, file), test
