@@ -7,9 +7,9 @@ from typing import Any
 
 import hypothesis
 
-# The examples of a property are the same in every run, so that one that passes here passes elsewhere; `make fuzz`
-# tries others each time.
-hypothesis.settings.register_profile("the same", derandomize=True)
+# The examples of a property are the same in every run and take the time they take, so that one that passes here passes
+# elsewhere; `make fuzz` tries others each time.
+hypothesis.settings.register_profile("the same", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("the same")
 
 

@@ -104,6 +104,27 @@ def test_peers_present_at_the_very_first_firing_count() -> None:
     assert problem.peer_distance[0] == pytest.approx(2.0 + 2.0 * (0.2 + 0.4 * np.arange(1, 11)))
 
 
+def test_plans_of_any_length_are_heard_and_the_latest_of_each_counts() -> None:
+    harness, recorder = make()
+    for now, count in ((0.0, 3), (0.1, 11), (0.2, 2), (0.3, 20)):
+        heard = [plan("b", now, x=20.0 + 10.0 * now, controls=np.full((count, 2), 1.0)), plan("c", 0.0, y=9.0)]
+        harness.fire(now, trigger=0, state=state(time=now), peer_plans=heard)
+        place, speed, driven = np.array([20.0 + 10.0 * now, 2.0]), np.zeros(2), []
+        for k in range(10):
+            place, speed = place + 0.1 * speed, speed + 0.1 * (k < count)
+            driven.append(place)
+        problem = recorder.records[-1][0]
+        assert problem.peer_mean[0] == pytest.approx(np.array(driven))
+        assert problem.peer_mean[1] == pytest.approx(np.tile([20.0, 9.0], (10, 1)))
+    assert problem.obstacle_covariance.shape == (0, 10, 3)
+
+
+def test_a_plan_from_before_the_start_counts_until_there_is_another() -> None:
+    harness, recorder = make()
+    harness.fire(0.0, trigger=0, state=state(), peer_plans=[plan("b", -0.2, y=7.0)])
+    assert recorder.records[-1][0].peer_mean[0, :, 1].tolist() == [7.0] * 10
+
+
 @pytest.mark.parametrize(("now", "lost"), [(0.0, 0), (0.1, 0), (0.2, 1), (0.3, 2), (1.5, 14)])
 def test_distance_to_a_silent_peer_grows_from_the_second_period_on(now: float, lost: int) -> None:
     harness, recorder = make()

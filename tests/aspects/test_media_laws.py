@@ -329,3 +329,28 @@ def test_wrong_parameters(make: Callable[[], Medium], message: str) -> None:
     with pytest.raises(EpicycleError) as caught:
         make()
     assert str(caught.value) == message
+
+
+def test_a_radio_needs_a_length_of_its_messages() -> None:
+    with pytest.raises(EpicycleError) as caught:
+        RadioMedium(rate=1)
+    assert str(caught.value) == ("messages take no time: give message_length, number_length, length_field or overhead")
+    for given in ({"message_length": 1}, {"number_length": 1}, {"overhead": 1}, {"length_field": "bits"}):
+        assert RadioMedium(rate=1, **given).window == 16
+
+
+def test_times_of_a_radio_to_the_nanosecond() -> None:
+    bench = Bench(radio=radio(window=1, overhead="1 us")).play_at([(0.0, "a.radio", 1), (0.01, "a.radio", 2)])
+    assert bench.out == [(0.001001, "a.radio", 1), (0.011001, "a.radio", 2)]
+    report = bench.report()
+    assert report["mean_delay"] == 0.001001
+    assert report["utilisation"] == report["throughput"] == 2 * 1_001_000 / 11_001_000
+    assert Bench(radio=radio()).report() == pytest.approx(
+        dict.fromkeys(("utilisation", "throughput", "collision_rate", "mean_delay"), math.nan), nan_ok=True
+    )
+
+
+def test_times_of_a_bus_to_the_nanosecond() -> None:
+    bench = Bench(a=Bus(factor="1 ms")).play_at([(0.001, "a", 1), (0.0015, "a", 2), (0.0015, "a", 3)])
+    assert bench.out == [(0.002, "a", 1), (0.003, "a", 2), (0.004, "a", 3)]
+    assert bench.report() == pytest.approx({"utilisation": 0.75, "mean_wait": 0.002 / 3, "mean_queue": 0.5}, rel=1e-12)

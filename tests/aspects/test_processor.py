@@ -315,3 +315,16 @@ def test_two_processors_in_python() -> None:
     with pytest.raises(ModelError) as caught:
         Simulation(model)
     assert "aspect two: s runs on the processor 'one' already" in str(caught.value)
+
+
+def test_figures_of_a_processor_to_the_nanosecond() -> None:
+    _, results = simulate(
+        "actors: {t: {type: Ticker, period: 10 ms}, a: {type: Scale}, b: {type: Scale}}\n"
+        "connections: ['t.output -> a.input, b.input']\n"
+        "aspects: {cpu: {type: Processor, time: 2 ms, at: [a, b]}}",
+        until=0.02,
+    )
+    figures = results.aspects["cpu"]
+    assert figures["mean_response"] == 0.003  # 2 ms and 4 ms; those of 20 ms are not over
+    assert figures["max_response"] == 0.004
+    assert figures["utilisation"] == 0.4

@@ -179,3 +179,13 @@ def test_what_is_drawn_counts_in_the_unit_of_the_parameter() -> None:
     assert Parameter(Distribution).convert(given).mean == 1500.0  # type: ignore[attr-defined]
     assert Exponential(mean="25 min").mean == 1500.0
     assert Server("s", distribution={"type": "Gamma", "mean": "2 min", "shape": 3}).distribution.mean == 120.0
+
+
+def test_quantities_that_are_equal() -> None:
+    one, same, more = Quantity(1.0, "km"), Quantity(1000.0, "m"), Quantity(1.5, "km")
+    assert (one <= same, one >= same, one < same, one > same, one == same, one != same) == (
+        True, True, False, False, True, False,
+    )  # fmt: skip
+    assert (one <= more, one < more, one >= more, one > more, one == more) == (True, True, False, False, False)
+    assert (abs(-one).to("m"), abs(one).to("m"), (-one).to("m"), (+one).to("m")) == (1000.0, 1000.0, -1000.0, 1000.0)
+    assert (more // one, more % one, divmod(more, one)) == (1.0, Quantity(0.5, "km"), (1.0, Quantity(0.5, "km")))

@@ -140,6 +140,24 @@ def test_only_unit_errors_come_out(text: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("unit", "kind"),
+    [
+        ("m", "a length"), ("m^2", "an area"), ("m^3", "a volume"), ("s", "a time"), ("m/s", "a speed"),
+        ("m/s^2", "an acceleration"), ("m/s^3", "a jerk"), ("kg", "a mass"), ("A", "a current"),
+        ("kg*m^2", "a moment of inertia"), ("N", "a force"), ("J", "an energy or a torque"), ("W", "a power"),
+        ("N*m", "an energy or a torque"), ("V", "a voltage"), ("bit", "an amount of data"), ("bit/s", "a data rate"),
+ ("deg", "an angle"),
+        ("rad/s", "an angular speed"), ("Hz", "a frequency"), ("1/s", "a rate"), ("rad/s^2", "an angular acceleration"),
+        ("m^2/s^2", "a quantity in m^2/s^2"),
+    ],
+)  # fmt: skip
+def test_kinds_of_quantities_in_messages(unit: str, kind: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        convert(f"1 {unit}", "K")
+    assert str(caught.value) == f"'1 {unit}' is {kind}, expected a temperature in K"
+
+
+@pytest.mark.parametrize(
     ("number", "words"), [(0, "0 ports"), (1, "1 port"), (2, "2 ports"), (-1, "-1 ports"), (12_345, "12,345 ports")]
 )
 def test_counted(number: int, words: str) -> None:

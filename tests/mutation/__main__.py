@@ -37,12 +37,13 @@ COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
-    "tests/actors", "tests/api", "tests/aspects", "tests/conformance", "tests/core", "tests/engine", "tests/library",
+    "tests/actors", "tests/api", "tests/aspects", "tests/cli/test_output.py", "tests/conformance", "tests/core",
+    "tests/engine", "tests/library",
     "tests/model", "tests/numerics", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
-TESTS_OF_KERNELS = ("tests/numerics", "tests/core")
+TESTS_OF_KERNELS = ("tests/numerics", "tests/core", "tests/actors")
 LONGEST = {True: 6.0, False: 4.0}  # s; a test that takes longer, compiled or not, is not asked
-STAGES = ((25, 2.0), (150, 6.0), (400, 12.0))  # so many tests, of so many seconds together; each the next ones
+STAGES = ((25, 1.5), (100, 3.0), (300, 5.0))  # so many tests, of so many seconds together; each the next ones
 
 
 class Result(NamedTuple):
@@ -70,7 +71,8 @@ def chunks(tree: Path, places: Iterable[str], number: int) -> list[list[str]]:
         },
         key=lambda path: -path.stat().st_size,
     )
-    return [[str(path.relative_to(tree)) for path in files[first::number]] for first in range(number)]
+    heaps = [[str(path.relative_to(tree)) for path in files[first::number]] for first in range(number)]
+    return [heap for heap in heaps if heap]
 
 
 def record(task: tuple[Path, list[str], bool]) -> dict[str, Any]:
@@ -100,6 +102,22 @@ def maps(trees: Sequence[Path], jobs: int) -> dict[bool, dict[str, Any]]:
             found[compiled] |= each
             print(f"{number} of {len(tasks)} heaps of tests have been run", flush=True)
     return found
+
+
+def warm_up(tree: Path) -> None:
+    """Compile what is compiled once: the kernels, all modules and all tests."""
+
+    def work() -> bool:
+        import pytest
+
+        pytest.main([*trial.OPTIONS, "--collect-only", *TESTS])
+        from epicycle.actors.robotics.numerics.warm_up import compile_kernels
+
+        compile_kernels()
+        return True
+
+    if trial.in_child(tree, True, 300.0, work)[0] is None:
+        raise SystemExit("the kernels cannot be compiled")
 
 
 # --- one mutant ----------------------------------------------------------------------------------------
@@ -251,9 +269,7 @@ def main() -> int:
     options.add_argument("--only", default="", help="mutants of files that begin so")
     given = options.parse_args()
     began = time.monotonic()
-    mutants = [
-        each for each in mutants_module.session(ROOT, CACHE / "session.sqlite") if each.file.startswith(given.only)
-    ]
+    mutants = [each for each in mutants_module.mutants_of(ROOT) if each.file.startswith(given.only)]
     chosen = mutants_module.sample(ROOT, mutants, given.count, given.seed)
     print(f"{len(mutants):,} mutants, of which {len(chosen)} are tried", flush=True)
     trial.preload()
@@ -266,7 +282,8 @@ def main() -> int:
             found = maps(trees, given.jobs)
             if given.map is not None:
                 recorder.save(given.map, found)
-        trial.share_bytecode(trees)
+        with multiprocessing.get_context("fork").Pool(given.jobs) as pool:
+            pool.map(warm_up, trees)
         by_kind = {compiled: recorder.Map(each) for compiled, each in found.items()}
         print(f"{len(found[True])} tests, {len(found[False])} of kernels; {time.monotonic() - began:.0f} s", flush=True)
         results: dict[Mutant, Result] = {}

@@ -22,7 +22,7 @@ def _ring(*_: object) -> None:
     pytest.fail("it takes too long")
 
 
-REFERENCE, FEW = "tests/test_reference.py::", 60
+REFERENCE, FEW = "tests/test_reference.py::", 40
 
 
 class Recorder:
@@ -90,18 +90,26 @@ class Map:
                     self._tests[file, line].append(test)
 
     def tests(self, file: str, source: str, line: int) -> list[str]:
-        """The tests of a line; of a line that runs at import, those of its class or else of its file.
+        """The tests of a line, then those of its function, its class, its file, and its folder.
 
-        What is declared there is in the reference, too, which is made in a process of its own.
+        What keeps its results runs a line only when it is asked first, and what stands in a class runs at import: the
+        reference tells of it, too, which is made in a process of its own.
         """
-        reference: list[str] = []
+        levels: list[list[str]] = []
         for lines in self._neighbourhoods(source, line):
-            found = {test for each in lines for test in self._tests.get((file, each), ())}
-            if found:
-                own = sorted(found, key=lambda test: (self.seconds[test] > 1.0, self._cost(test, file), test))
-                return own[:FEW] + reference + own[FEW:]
-            reference = [test for test in self.seconds if test.startswith(REFERENCE)]
-        return reference
+            ran = {test for each in lines for test in self._tests.get((file, each), ())}
+            levels.append(sorted(ran, key=lambda test: self._key(test, file)))
+            if not levels[0] and len(levels) == 1:
+                levels.append([test for test in self.seconds if test.startswith(REFERENCE)])
+        folder = file.rpartition("/")[0]
+        near = {test for other, tests in self._files.items() if other.rpartition("/")[0] == folder for test in tests}
+        levels.append(sorted(near, key=lambda test: (self.seconds[test], test)))
+        # Those of each level that know most of this file, then all others.
+        first = [test for level in levels for test in level[:FEW]]
+        return list(dict.fromkeys([*first, *(test for level in levels for test in level)]))
+
+    def _key(self, test: str, file: str) -> tuple[bool, float, str]:
+        return self.seconds[test] > 1.0, self._cost(test, file), test
 
     def _cost(self, test: str, file: str) -> float:
         """Small for what is quick and about this file."""

@@ -77,7 +77,8 @@ def test_tests_of_a_line_are_asked_until_one_fails(project: Path) -> None:
     assert known.tests("actors/core/some.py", SOURCE, 12) == [test]
     assert known.tests("actors/core/some.py", SOURCE, 11) == [test]  # nobody runs it: those that run its function
     assert known.tests("actors/core/some.py", SOURCE, 5) == [test]
-    assert known.tests("actors/core/other.py", SOURCE, 5) == []
+    assert known.tests("actors/core/other.py", SOURCE, 5) == [test]  # its neighbours'
+    assert known.tests("aspects/other.py", SOURCE, 5) == []
     results = {}
     for mutant in mutants.mutants_of(project):
         if mutant.operator.endswith(("_Mul_Add", "_Sub_Add")):

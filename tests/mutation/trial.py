@@ -60,19 +60,6 @@ def copy_project(root: Path, to: Path) -> Path:
     return to
 
 
-def share_bytecode(trees: Sequence[Path]) -> None:
-    """What was compiled in one copy is so in the others: their sources have the same times."""
-    for tree in trees:
-        for folder in tree.rglob("__pycache__"):
-            for other in trees:
-                if other != tree and not folder.is_symlink():
-                    to = other / folder.relative_to(tree)
-                    to.mkdir(exist_ok=True)
-                    for file in folder.glob("*.pyc"):
-                        if not (to / file.name).exists():
-                            shutil.copy2(file, to)
-
-
 class Verdict(NamedTuple):
     """What came of tests: ``failed`` is the first that failed, or what ended them."""
 

@@ -109,6 +109,11 @@ PROBLEMS: dict[str, dict[str, Any]] = {
         **informed([(3.0, -2.0)], 0.0, 1.0),
         "position": [4.0, 3.0],
     },
+    "informed within reach": {
+        **obstacle(0.3, 0.1, 1.0, 0.5, 0.3, 0.1, 0.2),
+        **informed([(3.0, -2.0)], 0.5, 9.0),
+        "position": [5.0, -4.0],
+    },
     "informed of nobody": {**informed([], 0.001, 3.0), "obstacle_mean": np.empty((0, STEPS, 2))},
 }
 

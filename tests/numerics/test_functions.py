@@ -272,6 +272,49 @@ def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> N
         assert distances[row] == pytest.approx(2.0 + 3.0 * (radius + 0.4 * max(0, age - 1)))
 
 
+@pytest.mark.parametrize("elapsed", [0.0, 0.03, 0.08, 0.1, 0.24, 0.36, -0.04, 1.17])
+def test_a_peer_between_two_of_its_steps_is_on_the_line_between_them(
+    random: np.random.Generator, elapsed: float
+) -> None:
+    state, plan, radius = random.normal(size=4), random.normal(size=(5, 2)), 0.2 + 0.4 * np.arange(1, 11)
+    table = np.array([[*state, 7.0 - elapsed, 5, *plan.ravel()]])
+    positions, distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0)
+    place, speed, steps = state[:2], state[2:], [state[:2]]
+    for k in range(30):
+        place, speed = place + 0.1 * speed, speed + 0.1 * (plan[k] if k < 5 else 0.0)
+        steps.append(place)
+    times = elapsed + 0.1 * np.arange(1, 11)
+    expected = [[np.interp(time, 0.1 * np.arange(31), np.array(steps)[:, c]) for c in range(2)] for time in times]
+    assert positions[0] == pytest.approx(np.array(expected), abs=1e-12)
+    assert distances[0] == pytest.approx(2.0 + 3.0 * (radius + 0.4 * max(0, round(elapsed / 0.1) - 1)))
+
+
+@pytest.mark.parametrize(
+    ("elapsed", "whole", "part"), [(0.03, 0, 0.3), (0.23, 2, 0.3), (0.28, 2, 0.8), (-0.04, 0, -0.4)]
+)
+@pytest.mark.parametrize("is_widened", [False, True])
+def test_an_estimate_between_two_steps_is_predicted_to_now(
+    random: np.random.Generator, elapsed: float, whole: int, part: float, is_widened: bool
+) -> None:
+    mean, covariance, noise = random.normal(size=4), spread(random, 4), np.diag([0.002, 0.002, 0.4, 0.4])
+    found = reachability.expected_target(mean, covariance, noise, is_widened, 0.5, 0.1, elapsed, 10)
+    transition = ukf.constant_velocity(0.1)
+    for _ in range(whole):
+        mean, covariance = ukf.predict(mean, covariance, transition, noise)
+    mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.1 * part), abs(part) * noise)
+    means, covariances = reachability.propagate(mean, covariance, transition, noise if is_widened else 0.0 * noise, 10)
+    assert found[0][0] == pytest.approx(means)
+    assert found[1][0] == pytest.approx(covariances)
+    points, weights = ukf.sigma_points(mean, covariance, 0.5)
+    moved = points @ np.linalg.matrix_power(transition, 10).T
+    if is_widened:
+        for _ in range(10):
+            mean, covariance = ukf.predict(mean, covariance, transition, noise)
+        moved, weights = ukf.sigma_points(mean, covariance, 0.5)
+    assert found[2] == pytest.approx(moved[:, :2])
+    assert found[3] == pytest.approx(weights)
+
+
 @pytest.mark.parametrize("made_at", [-1e5, -1e12, -1.7e308])
 def test_plans_from_time_immemorial_are_lost_in_the_distance_to_keep(made_at: float) -> None:
     table, radius = np.array([[1.0, 2.0, 0.0, 0.0, made_at, 2.0, 0.0, 0.0, 0.0, 0.0]]), np.ones(10)

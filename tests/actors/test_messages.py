@@ -1,0 +1,88 @@
+"""Tokens of robots: nobody changes them, and they tell whether they can be used."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError
+from typing import Any
+
+import numpy as np
+import pytest
+
+from epicycle.actors import BodyState, Estimate, Measurement, Plan
+
+
+def state(**changes: Any) -> BodyState:
+    return BodyState(**{"position": [1.0, 2.0], "velocity": [3.0, 4.0], "time": 0.5, **changes})
+
+
+def measurement(**changes: Any) -> Measurement:
+    given = {"robot": "a", "observer": [0.0, 1.0], "kind": "relative_position", "value": [2.0, 3.0]}
+    return Measurement(**{**given, "along": 0.2, "across": 2.0, "time": 0.5, **changes})
+
+
+def estimate(**changes: Any) -> Estimate:
+    return Estimate(**{"mean": np.arange(4.0), "covariance": np.eye(4), "time": 0.5, "sources": ("a",), **changes})
+
+
+def plan(**changes: Any) -> Plan:
+    return Plan(**{"robot": "a", "time": 0.5, "state": state(), "controls": np.ones((3, 2)), **changes})
+
+
+@pytest.mark.parametrize("make", [state, measurement, estimate, plan])
+def test_a_token_is_what_it_was_when_it_was_sent(make: Any) -> None:
+    token = make()
+    with pytest.raises(FrozenInstanceError):
+        token.time = 3.0
+    with pytest.raises((AttributeError, TypeError)):
+        token.colour = "red"
+    assert not hasattr(token, "__dict__")
+    assert token != make()  # arrays are not compared: it is itself, and no other
+    assert token == token  # noqa: PLR0124
+    assert token.finite
+
+
+def test_arrays_are_copies_that_nobody_writes_to() -> None:
+    given = np.array([1.0, 2.0])
+    token = state(position=given)
+    given[0] = 9.0
+    assert token.position.tolist() == [1.0, 2.0]
+    for array in (token.position, token.velocity, measurement().value, estimate().covariance, plan().controls):
+        assert (array.dtype, array.flags.writeable) == (np.dtype(float), False)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_cannot_be_used(bad: float) -> None:
+    tokens = [
+        state(position=[bad, 0.0]), state(velocity=[0.0, bad]), state(time=bad),
+        measurement(observer=[0.0, bad]), measurement(value=[bad, 0.0]), measurement(time=bad),
+        measurement(along=bad), measurement(across=bad), measurement(kind="range", value=[bad]),
+        estimate(mean=[0.0, 0.0, bad, 0.0]), estimate(covariance=bad * np.eye(4)), estimate(time=bad),
+        plan(time=bad), plan(state=state(position=[0.0, bad])), plan(controls=[[0.0, bad]]),
+    ]  # fmt: skip
+    assert [token.finite for token in tokens] == [False] * len(tokens)
+
+
+@pytest.mark.parametrize(
+    ("token", "usable"),
+    [
+        (measurement(along=0.0), False),
+        (measurement(across=0.0), False),
+        (measurement(along=-1.0), False),
+        (measurement(along=1e-300, across=1e300), True),
+        (measurement(value=[1.0]), False),
+        (measurement(kind="range", value=[1.0]), True),
+        (measurement(kind="range", value=[1.0], across=0.0), True),
+        (measurement(kind="range", value=[1.0], along=0.0), False),
+        (measurement(kind="range", value=[1.0, 2.0]), False),
+        (state(position=[1e308, 1e308], velocity=[1e308, 1e308]), True),  # whose sum is not finite
+        (plan(controls=np.ones((1, 2))), True),
+        (plan(controls=np.ones((0, 2))), False),
+        (plan(controls=np.ones((3, 1))), False),
+        (plan(controls=np.ones((3, 3))), False),
+        (plan(controls=np.ones(2)), False),
+        (plan(controls=np.ones((1, 2, 2))), False),
+    ],
+)
+def test_what_can_be_used(token: Any, usable: bool) -> None:
+    assert token.finite is usable
