@@ -90,6 +90,15 @@ def test_sensor_on_top_of_the_target_is_finite() -> None:
     assert harness.last("measurement").finite
 
 
+def test_sensor_on_top_of_the_target_looks_along_x() -> None:
+    for parameters, place in (({"across": 0.0}, 0), ({"along": 0.0}, 1)):
+        harness = Harness(Sensor("main.sensor", **parameters))
+        harness.fire(0.0, robot=body(1.0, 2.0), target=body(1.0, 2.0))
+        value = harness.last("measurement").value
+        assert value[place] != 0.0
+        assert value[1 - place] == 0.0
+
+
 def test_channel_sends_to_all_but_the_speaker() -> None:
     harness = Harness(BroadcastChannel("plans"), widths={"input": 3, "output": 3})
     harness.fire(0.0, input=["a", None, "c"])

@@ -296,6 +296,19 @@ def test_corruption(kind: str) -> None:
         assert stats.chisquare(np.bincount(which.astype(int), minlength=64)).pvalue > 1 - SURE
 
 
+def test_each_field_drifts_by_itself() -> None:
+    ends = np.array(
+        [
+            list(Bench(Drift(walk=1.0), seed).play([{"x": 0.0, "y": 0.0}] * 3, period=500).tokens[-1].values())
+            for seed in range(400)
+        ]
+    )
+    low, high = stats.chi2.interval(SURE, 400)
+    for variance in ends.var(axis=0):
+        assert low <= 400 * variance <= high
+    assert abs(np.corrcoef(ends.T)[0, 1]) < 4 / math.sqrt(400)
+
+
 # -- what all have in common -----------------------------------------------------------------------------------------
 
 
