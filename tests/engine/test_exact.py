@@ -79,7 +79,7 @@ def test_sizes_of_tokens_that_can_wait(token: Any, size: int) -> None:
 @pytest.mark.parametrize(
     "token",
     [2**63, -(2**63) - 1, [1], {"a": 1}, np.arange(2.0), READ_ONLY[1:], Loose(1.0), (1, [2]), object()],
-    ids=repr,
+    ids=lambda token: type(token).__name__,
 )
 def test_tokens_that_cannot_wait(token: Any) -> None:
     assert weight(token) > LARGE
