@@ -23,7 +23,7 @@ from .digests import SMALL, parts
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).with_name("golden.json")
-OLD = ("numpy==1.26.4", "scipy==1.11.4")  # beside whatever is installed
+OLD = ("numpy==2.0.2", "scipy==1.13.1")  # beside whatever is installed; an older NumPy needs an older pyarrow
 NO_FMA = "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"
 
 
