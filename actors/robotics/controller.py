@@ -156,7 +156,7 @@ class RobustController(TargetModel, Actor):
         if not violation < math.inf and not all_finite(controls.ravel().tolist()):
             controls, violation = starts[1], math.inf  # braking
         self._send(own, problem, controls)
-        self._infeasible += violation > 0.0
+        self._infeasible += bool(violation > 0.0)  # which may be one of NumPy's
         self.violation.send(float(violation))
         self.infeasible.send(self._infeasible)
         self.iterations.send(int(solution.iterations))

@@ -94,10 +94,11 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     if folder is not None and folder.exists() and not folder.is_dir():
         raise EpicycleError(f"--out {folder} is a file, not a folder")
     command = ["epicycle", *given]
-    if folder is not None and (replaced := check_folder(folder, model.name, command)):
-        complain(replaced)
+    replaced = "" if folder is None else check_folder(folder, model.name, command)
     keep_log, log_to = (False, None) if log is None else (log_filter, log.add)
     simulation = Simulation(model, seed=options.seed, keep_log=keep_log, log_to=log_to)
+    if replaced:  # and nothing is wrong with what was asked for
+        complain(replaced)
     pace = Pace(options.realtime) if options.realtime is not None else None
     if until is None and model.endless:
         complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
