@@ -27,7 +27,7 @@ DRAWS: dict[str, list[tuple[Any, ...]]] = {
     "chisquare": [(1.0,), (9.0,)],
     "standard_t": [(1.0,), (30.0,)],
     "f": [(3.0, 5.0)],
-    "vonmises": [(0.0, 0.0), (1.0, 1e-9), (1.0, 2.0), (3.0, 50.0), (0.5, 1e7)],
+    "vonmises": [(0.0, 0.0), (1.0, 1e-9), (1.0, 2.0), (3.0, 50.0), (0.5, 1e7), (3.0, 1e7)],
     "triangular": [(-1.0, 0.0, 3.0), (0.0, 0.0, 1.0), (0.0, 1.0, 1.0)],
     "logistic": [(), (2.0, 3.0)],
     "laplace": [(), (2.0, 3.0)],
@@ -55,7 +55,7 @@ DIGESTS = {
     "chisquare": "85dbce25543b7dbb",
     "standard_t": "f37b7219383f9430",
     "f": "93132ab11ba94794",
-    "vonmises": "71896cc640d66f06",
+    "vonmises": "4a60df9820e0c2c6",
     "triangular": "3fe487a2aa660191",
     "logistic": "6802bf5dbd55c9a2",
     "laplace": "b30d9ab8662df5f3",
@@ -88,6 +88,14 @@ def digest(name: str) -> str:
 @pytest.mark.parametrize("name", DRAWS)
 def test_numbers_of_a_law(name: str) -> None:
     assert digest(name) == DIGESTS[name]
+
+
+@pytest.mark.parametrize("bound", [2**64 - 1, 2**64, 2**64 + 1, 2**65, 2**66 + 3, 2**127, 2**128 + 1])
+def test_bounds_about_the_size_of_a_word(bound: int) -> None:
+    stream = random_stream(5, "bounds", str(bound))
+    drawn = [stream.below(bound) for _ in range(400)]
+    assert 0 <= min(drawn) < bound // 50
+    assert bound - bound // 50 < max(drawn) < bound
 
 
 @pytest.mark.parametrize("k", [1, 2, 5, 9, 14, 15, 16, 17, 20, 50, 1000, 10**6])

@@ -4,7 +4,7 @@ cosmic-ray makes the mutants: it turns + into -, < into <=, 2 into 1, leaves out
 lives in a copy of the project, never in the working tree; the tests that run its line are run, those first that run
 little else, until one fails.  Kernels are mutated with numba switched off: to compile one anew takes half a minute.
 
-``survivors.yaml`` holds those of earlier runs that were looked at, each with the reason why no test has to notice it.
+``survivors.yaml`` holds those of earlier runs that were looked at, each with the reason why no test notices it.
 The session lies in ``.mutants/session.sqlite``, as cosmic-ray's own tools read it (``cr-report``, ``cr-html``).
 """
 
