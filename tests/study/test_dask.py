@@ -186,7 +186,6 @@ UNPACKED = """
 import json, sys
 from pathlib import Path
 from epicycle.runner.study.one_run import Runner
-from epicycle.runner.study.one_run import Runner
 from epicycle.runner.study.parcel import unpack
 from epicycle.runner.study.schedule import Schedule
 
@@ -215,12 +214,12 @@ def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     rows = [runner.row(task) | {"wall_time": 0} for task in iter(schedule.next, None)]
     shutil.rmtree(home)
     done = subprocess.run(
-        [sys.executable, "-c", UNPACKED, str(parcel), str(root)],
+        [sys.executable, "-X", "faulthandler", "-c", UNPACKED, str(parcel), str(root)],
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        check=True,
     )
+    assert not done.returncode, done.stderr
     found = json.loads(done.stdout)
     assert [each["error"] for each in found] == [None] * 8
     assert len({each["digest"] for each in found}) == 8
