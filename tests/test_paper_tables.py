@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from operator import attrgetter
 from pathlib import Path
@@ -89,7 +89,7 @@ INFORM = {"range": 30.0, "penalty": GAMMA, "variance": ETA, "joint": True}
 OBSTACLE = {"start": OBSTACLE_START, "speed": OBSTACLE_SPEED, "turn_rate": OBSTACLE_TURN_RATE, "heading": math.pi}
 
 
-def held(thing: object, names: Mapping[str, Any]) -> dict[str, Any]:
+def held(thing: object, names: Iterable[str]) -> dict[str, Any]:
     """What a thing holds under these names, as plain numbers."""
     found = {name: attrgetter(name)(thing) for name in names}
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
@@ -126,6 +126,51 @@ def test_by_default_three_observers_and_no_disturbance() -> None:
         0.0,
         0.0,
     ]
+
+
+READINGS: dict[str, tuple[Any, str, Any]] = {
+    # parameter of the scenario: its value, and what holds what then
+    "prior_mean": ([1.0, 2.0, 3.0, 4.0], "estimator.prior_mean", [1.0, 2.0, 3.0, 4.0]),
+    "prior_variance": ([1.0, 2.0, 3.0, 4.0], "estimator.prior_variance", [1.0, 2.0, 3.0, 4.0]),
+    "kappa": (1.5, "estimator.kappa", 1.5),
+    "noise_direction": ("predicted", "estimator.noise_direction", "predicted"),
+    "covariance_noise": (True, "controller.covariance_noise", True),
+    "horizon_from": ("decision", "controller.horizon_from", "decision"),
+    "tube_time": ("seconds", "controller.tube_time", "seconds"),
+    "free_controls": (4, "controller.solver.free_controls", 4),
+    "infeasible": ("brake", "controller.solver.infeasible", "brake"),
+    "main_gap": (0.25, "controller.solver.gap", {MAIN: 0.25}),
+    "observer_gap": (0.25, "controller.solver.gap", dict.fromkeys(OBSERVERS, 0.25)),
+    "main_last_parameter": (0.25, "controller.solver.last_parameter", {MAIN: 0.25}),
+    "observer_last_parameter": (0.25, "controller.solver.last_parameter", dict.fromkeys(OBSERVERS, 0.25)),
+    "information_unit": ("bit", "controller.objective.unit", dict.fromkeys(OBSERVERS, "bit")),
+    "joint_information": (False, "controller.objective.joint", dict.fromkeys(OBSERVERS, False)),
+    "starts_known": (
+        True,
+        "controller.peers_at_start",
+        {
+            MAIN: OBSERVER_STARTS,
+            **{own: [START, *OBSERVER_STARTS[:i], *OBSERVER_STARTS[i + 1 :]] for i, own in enumerate(OBSERVERS)},
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("name", READINGS)
+def test_a_reading_reaches_whom_it_is_about_and_nobody_else(name: str) -> None:
+    value, place, expected = READINGS[name]
+    changed = load_model("collision_avoidance", set={"observers": 4, name: value})
+    part, _, attribute = place.partition(".")
+    found, before = (
+        {
+            robot: held(each.graph.actors[f"{robot}.{part}"], [attribute])[attribute]
+            for robot in (MAIN, *OBSERVERS)
+            if robot != MAIN or not attribute.startswith("objective.")  # the main robot seeks no information
+        }
+        for each in (changed, model())
+    )
+    assert found == {**before, **(expected if isinstance(expected, dict) else dict.fromkeys(before, expected))}
+    assert found != before
 
 
 @pytest.mark.parametrize("level", LEVELS)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..core import Actor, InputPort, OutputPort, Parameter
+from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from ..core.elementary import hypot
 from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing, read_only
 from .objectives import Objective, ReachGoal
@@ -32,23 +32,43 @@ class _Standing(NamedTuple):
 
 
 class _Peers:
-    """The latest plans of the other robots, as the kernels take them."""
+    """The latest plans of the other robots, as the kernels take them.
 
-    def __init__(self) -> None:
+    Where others stand at time 0 may be known before.  It is a plan of nobody to stay there, until a first plan takes
+    the place of the nearest one.
+    """
+
+    def __init__(self, places: Array) -> None:
         self._rows: dict[str, int] = {}
+        self._nobody: dict[str, tuple[float, float]] = {}
         self._controls = 0  # room for so many of each robot
         self.plans = np.empty((0, _CONTROLS))  # a row for each robot, sorted by name
+        for number, (x, y) in enumerate(places.tolist()):
+            name = f"[{number}]"  # which is no path
+            self._nobody[name] = x, y
+            self._make_room(name, 0)
+            self.plans[self._rows[name], :_CONTROLS] = x, y, 0.0, 0.0, 0.0, 0
 
     def hear(self, plan: Plan) -> None:
         """Remember a plan, unless a later one of that robot is known."""
         count = len(plan.controls)
         if plan.robot not in self._rows or count > self._controls:
+            if self._nobody and plan.robot not in self._rows:
+                self._meet(*plan.state.position.tolist())
             self._make_room(plan.robot, count)
         row = self.plans[self._rows[plan.robot]]
         if plan.time >= row[_MADE_AT]:
             (x, y), (vx, vy) = plan.state.position.tolist(), plan.state.velocity.tolist()
             row[:_CONTROLS] = x, y, vx, vy, plan.time, count
             row[_CONTROLS : _CONTROLS + 2 * count] = plan.controls.ravel()
+
+    def _meet(self, x: float, y: float) -> None:
+        """Forget who was thought to stand nearest to a place."""
+        away = {name: hypot(x - there[0], y - there[1]) for name, there in self._nobody.items()}
+        nearest = min(away, key=away.__getitem__)
+        del self._nobody[nearest]
+        self.plans = np.delete(self.plans, self._rows.pop(nearest), axis=0)
+        self._rows = {name: row for row, name in enumerate(self._rows)}
 
     def _make_room(self, robot: str, controls: int) -> None:
         known, names = self.plans, sorted({*self._rows, robot})
@@ -77,8 +97,9 @@ class RobustController(TargetModel, Actor):
     estimate counts, too: an old one is predicted to the time of the own state as its filter would predict it, with the
     process noise, so that its covariance grows.
 
-    Before a first plan or estimate comes, there is nobody to avoid.  Plans and estimates that are not finite are
-    ignored, the last good ones stay.  Without a finite own state the control is zero, and nothing else is sent.
+    Before a first plan or estimate comes, there is nobody to avoid but who is known to stand at ``peers_at_start``.
+    Plans and estimates that are not finite are ignored, the last good ones stay.  Without a finite own state the
+    control is zero, and nothing else is sent.
     """
 
     trigger = InputPort(object, doc="plan now")
@@ -113,6 +134,9 @@ class RobustController(TargetModel, Actor):
     covariance_noise = Parameter(
         bool, False, doc="let process noise widen the target's predicted covariance, in f4 and in eq. (5)"
     )
+    peers_at_start = array_parameter(
+        (None, 2), (), unit="m", doc="where other robots stand at time 0, for as long as no plan of theirs has come"
+    )
     robot_name = Parameter(str, "", doc="name in the plan; empty: the path of what the controller stands in")
 
     def initialize(self) -> None:
@@ -135,7 +159,7 @@ class RobustController(TargetModel, Actor):
         self._process_noise = self.process_noise
         self._applied = np.zeros(2)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(2), np.zeros(2), np.zeros((self._steps, 2)))
-        self._peers = _Peers()
+        self._peers = _Peers(self.peers_at_start)
         self._target: Estimate | None = None
         self._infeasible = 0
 

@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem
 
 
+NAT, BIT = "nat", "bit"
+LN2 = 0.6931471805599453
+
+
 class Objective(Configurable):
     """Base of the objectives: fills in the objective's fields of a horizon problem."""
 
@@ -38,8 +42,11 @@ class Inform(Objective):
     range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: farther from the target than this is penalised")
     penalty = Parameter(float, 0.001, min=0, doc="gamma: the penalty for each metre too far, at each step")
     variance = Parameter(float, 2.0, unit="m^2", min=1e-9, doc="eta: variance of the predicted ranges")
+    unit = Parameter(str, NAT, choices=(NAT, BIT), doc="of the information, against which the penalty counts")
     joint = Parameter(bool, True, doc="count what all robots measure together; false: what this one measures")
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
         others = problem.peer_mean if self.joint else problem.peer_mean[:0]
-        return problem.to_inform(points, weights, others, self.variance, self.penalty, self.range)
+        # In bits the information is more by 1 / log 2; the penalty by its inverse less has the same optimum.
+        penalty = self.penalty * (LN2 if self.unit == BIT else 1.0)
+        return problem.to_inform(points, weights, others, self.variance, penalty, self.range)

@@ -119,6 +119,23 @@ def test_plans_of_any_length_are_heard_and_the_latest_of_each_counts() -> None:
     assert problem.obstacle_covariance.shape == (0, 10, 3)
 
 
+def test_who_stands_where_at_the_start_may_be_known_before_a_plan_comes() -> None:
+    harness, recorder = make(peers_at_start=[[20.0, 2.0], [20.0, -2.0]])
+
+    def peers(now: float, *heard: Plan) -> tuple[list[list[float]], list[float]]:
+        """Places at step 1, and the distances to keep then beyond those of a fresh plan."""
+        harness.fire(now, trigger=0, state=state(time=now), peer_plans=list(heard))
+        problem = recorder.records[-1][0]
+        return problem.peer_mean[:, 0].tolist(), (problem.peer_distance[:, 0] - 3.2).round(9).tolist()
+
+    assert peers(0.0) == ([[20.0, 2.0], [20.0, -2.0]], [0.0, 0.0])
+    # It is as old as a plan of then would be, and a first plan takes the place of the nearest.
+    assert peers(0.2) == ([[20.0, 2.0], [20.0, -2.0]], [0.8, 0.8])
+    assert peers(0.3, plan("b", 0.3, y=-2.5)) == ([[20.0, 2.0], [20.0, -2.5]], [1.6, 0.0])
+    assert peers(0.4, plan("a", 0.4, y=-1.0), plan("b", 0.4, y=-3.0)) == ([[20.0, -1.0], [20.0, -3.0]], [0.0, 0.0])
+    assert peers(0.5, plan("c", 0.5, y=9.0))[0] == [[20.0, -1.0], [20.0, -3.0], [20.0, 9.0]]
+
+
 def test_a_plan_from_before_the_start_counts_until_there_is_another() -> None:
     harness, recorder = make()
     harness.fire(0.0, trigger=0, state=state(), peer_plans=[plan("b", -0.2, y=7.0)])

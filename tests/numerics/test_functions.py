@@ -383,16 +383,22 @@ def test_propagate_is_repeated_prediction(random: np.random.Generator, noise: fl
 
 
 @numba.njit
-def riccati(position: np.ndarray, velocity: np.ndarray, control: np.ndarray, period: float) -> tuple[float, np.ndarray]:
+def riccati(
+    position: np.ndarray, velocity: np.ndarray, control: np.ndarray, period: float, free: int
+) -> tuple[float, np.ndarray]:
     stages = new_stages(len(control))
     stages[:, POSITION : POSITION + 5] = position
     stages[:, VELOCITY : VELOCITY + 5] = velocity
     stages[:, CONTROL : CONTROL + 5] = control
-    return newton_step(stages, period), stages[:, STEP : STEP + 2].copy()
+    return newton_step(stages, period, free), stages[:, STEP : STEP + 2].copy()
 
 
-@pytest.mark.parametrize("steps", [3, 10, 40])
-def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, steps: int) -> None:
+@pytest.mark.parametrize(("steps", "free"), [(3, 3), (10, 10), (40, 40), (10, 9), (10, 4), (10, 1), (40, 7)])
+def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, steps: int, free: int) -> None:
+    """Where the last free control is held, it is the dense system of the free ones."""
+    held = np.zeros((2 * free, 2 * steps))
+    for column in range(2 * steps):
+        held[min(column, 2 * (free - 1) + column % 2), column] = 1.0
     for _ in range(20):
         blocks = []
         for scale in 10.0 ** random.uniform(-1.0, 1.0, size=3):
@@ -413,8 +419,8 @@ def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, st
                 )[kind]
                 gradient += reached @ [gx, gy]
                 hessian += reached @ np.array([[xx, xy], [xy, yy]]) @ reached.T
-        descent, step = riccati(*np.array(blocks), 0.1)
-        expected = np.linalg.solve(hessian, -gradient)
+        descent, step = riccati(*np.array(blocks), 0.1, free)
+        expected = held.T @ np.linalg.solve(held @ hessian @ held.T, -held @ gradient)
         assert step.ravel() == pytest.approx(expected, rel=1e-8, abs=1e-10)
         assert descent == pytest.approx(gradient @ expected)
 

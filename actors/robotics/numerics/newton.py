@@ -76,27 +76,58 @@ def _repair(stages: Array, s: int) -> None:
 
 
 @borrower
-def newton_step(stages: Array, period: float) -> float:
+def newton_step(stages: Array, period: float, free: int) -> float:
     """Write the step in the controls; returns gradient . step (negative), or 0 if there is no descent.
+
+    Only the first ``free`` controls are variables; the last of them is held from there on.
 
     Backwards, the cost to go from step s is kept as a quadratic function of (dP, dV): gradient (a, c), Hessian
     [[A, B], [B', C]].  The control of step s enters dV of the next one, so it is minimised out there; then
     dP of the next step is written as dP + period * dV.  Only positions are repaired: f1, f2 and their barriers are
     convex.
+
+    A control dU that is held from step f on moves step f + k by k h dU in velocity and by k (k - 1) / 2 h^2 dU in
+    position, beside what dV of step f and dP of the next one do, so that all that follows is summed in these three.
     """
     h = period
     descent = 0.0
     ax = ay = cx = cy = 0.0
     axx = axy = ayy = bxx = bxy = byx = byy = cxx = cxy = cyy = 0.0
-    for s in range(stages.shape[0] - 1, -1, -1):
-        # What U_s costs: its own block, and the velocity of the next step.
-        qx, qy = stages[s, CONTROL] + h * cx, stages[s, CONTROL + 1] + h * cy
-        hcxx, hcxy, hcyy = h * cxx, h * cxy, h * cyy
-        qxx, qxy, qyy = (
-            stages[s, CONTROL + 2] + h * hcxx,
-            stages[s, CONTROL + 3] + h * hcxy,
-            stages[s, CONTROL + 4] + h * hcyy,
+    # What a control costs later on: gradient, Hessian, and mixed derivatives with dP of the next step and dV.
+    lx = ly = lxx = lxy = lyy = hbxx = hbxy = hbyx = hbyy = hcxx = hcxy = hcyy = 0.0
+    for s in range(free, stages.shape[0]):
+        held = s - free + 1.0
+        w, by_v = held * h, (held - 1.0) * h
+        by_u = 0.5 * w * by_v
+        _repair(stages, s)
+        gx, gy = stages[s, POSITION], stages[s, POSITION + 1]
+        xx, xy, yy = stages[s, POSITION + 2], stages[s, POSITION + 3], stages[s, POSITION + 4]
+        vx, vy = stages[s, VELOCITY], stages[s, VELOCITY + 1]
+        vxx, vxy, vyy = stages[s, VELOCITY + 2], stages[s, VELOCITY + 3], stages[s, VELOCITY + 4]
+        ax, ay, axx, axy, ayy = ax + gx, ay + gy, axx + xx, axy + xy, ayy + yy
+        bxx, bxy, byy = bxx + by_v * xx, bxy + by_v * xy, byy + by_v * yy
+        cx, cy = cx + by_v * gx + vx, cy + by_v * gy + vy
+        cxx, cxy, cyy = cxx + by_v * by_v * xx + vxx, cxy + by_v * by_v * xy + vxy, cyy + by_v * by_v * yy + vyy
+        hbxx, hbxy, hbyy = hbxx + by_u * xx, hbxy + by_u * xy, hbyy + by_u * yy
+        hcxx, hcxy, hcyy = (
+            hcxx + by_v * by_u * xx + w * vxx,
+            hcxy + by_v * by_u * xy + w * vxy,
+            hcyy + by_v * by_u * yy + w * vyy,
         )
+        lx += by_u * gx + w * vx + stages[s, CONTROL]
+        ly += by_u * gy + w * vy + stages[s, CONTROL + 1]
+        lxx += by_u * by_u * xx + w * w * vxx + stages[s, CONTROL + 2]
+        lxy += by_u * by_u * xy + w * w * vxy + stages[s, CONTROL + 3]
+        lyy += by_u * by_u * yy + w * w * vyy + stages[s, CONTROL + 4]
+    byx, hbyx = bxy, hbxy
+    for s in range(free - 1, -1, -1):
+        if s < free - 1:  # it is the velocity of the next step
+            lx, ly = h * cx, h * cy
+            hbxx, hbxy, hbyx, hbyy = h * bxx, h * bxy, h * byx, h * byy
+            hcxx, hcxy, hcyy = h * cxx, h * cxy, h * cyy
+            lxx, lxy, lyy = h * hcxx, h * hcxy, h * hcyy
+        qx, qy = stages[s, CONTROL] + lx, stages[s, CONTROL + 1] + ly
+        qxx, qxy, qyy = stages[s, CONTROL + 2] + lxx, stages[s, CONTROL + 3] + lxy, stages[s, CONTROL + 4] + lyy
         determinant = qxx * qyy - qxy * qxy
         if not (determinant > 0.0 and qxx > 0.0):
             return 0.0
@@ -104,8 +135,7 @@ def newton_step(stages: Array, period: float) -> float:
         ixx, ixy, iyy = scale * qyy, -scale * qxy, scale * qxx
         ux, uy = ixx * qx + ixy * qy, ixy * qx + iyy * qy
         descent -= qx * ux + qy * uy
-        # Rows of inverse(Q) times h B' and h C: how U_s answers to dP of the next step and to dV of this one.
-        hbxx, hbxy, hbyx, hbyy = h * bxx, h * bxy, h * byx, h * byy
+        # Rows of inverse(Q) times the mixed derivatives: how U_s answers to dP of the next step and to dV of this one.
         pxx, pxy = ixx * hbxx + ixy * hbxy, ixx * hbyx + ixy * hbyy
         pyx, pyy = ixy * hbxx + iyy * hbxy, ixy * hbyx + iyy * hbyy
         vxx, vxy = ixx * hcxx + ixy * hcxy, ixx * hcxy + ixy * hcyy
@@ -146,22 +176,23 @@ def newton_step(stages: Array, period: float) -> float:
         axx += stages[s, POSITION + 2]
         axy += stages[s, POSITION + 3]
         ayy += stages[s, POSITION + 4]
-    px = py = vx = vy = 0.0
+    px = py = vx = vy = ux = uy = 0.0
     for s in range(stages.shape[0]):
-        ux = -(
-            stages[s, _OWN]
-            + stages[s, _BY_POSITION] * px
-            + stages[s, _BY_POSITION + 1] * py
-            + stages[s, _BY_VELOCITY] * vx
-            + stages[s, _BY_VELOCITY + 1] * vy
-        )
-        uy = -(
-            stages[s, _OWN + 1]
-            + stages[s, _BY_POSITION + 2] * px
-            + stages[s, _BY_POSITION + 3] * py
-            + stages[s, _BY_VELOCITY + 2] * vx
-            + stages[s, _BY_VELOCITY + 3] * vy
-        )
+        if s < free:
+            ux = -(
+                stages[s, _OWN]
+                + stages[s, _BY_POSITION] * px
+                + stages[s, _BY_POSITION + 1] * py
+                + stages[s, _BY_VELOCITY] * vx
+                + stages[s, _BY_VELOCITY + 1] * vy
+            )
+            uy = -(
+                stages[s, _OWN + 1]
+                + stages[s, _BY_POSITION + 2] * px
+                + stages[s, _BY_POSITION + 3] * py
+                + stages[s, _BY_VELOCITY + 2] * vx
+                + stages[s, _BY_VELOCITY + 3] * vy
+            )
         stages[s, STEP], stages[s, STEP + 1] = ux, uy
         px += h * vx
         py += h * vy
