@@ -26,6 +26,7 @@ from epicycle.runner.study.claims import (
     UNDECIDED,
     Finding,
     Judgement,
+    ranked,
 )
 from epicycle.runner.study.guideline import Recommendation
 from epicycle.runner.study.questions import ALWAYS
@@ -92,18 +93,16 @@ def claims(found: list[Judgement]) -> Iterator[str]:
 
 
 def by_level(found: list[Judgement]) -> Iterator[str]:
-    """One line for each level of what the claims are judged for."""
-    places = list(dict.fromkeys(levels(each.where) for each in found))
-    names = list(dict.fromkeys(each.name for each in found))
-    verdicts = {(levels(each.where), each.name): each for each in found}
-    yield from head(["", *names])
-    for place in places:
+    """One line for each level of what the claims are judged for, the best first."""
+    standings = ranked(found)
+    yield from head(["", "in means", "yes", "no", *(each.name for each in standings[0].judgements)])
+    for standing in standings:
         cells = []
-        for name in names:
-            each = verdicts[place, name]
+        for each in standing.judgements:
             counts = "/".join(str(each.counts(outcome)) for outcome in (CONFIRMED, UNDECIDED, REVERSED))
             cells.append(f"{SHORT[each.verdict]} {counts}, {each.agreeing}")
-        yield row([place, *cells])
+        numbers = [standing.in_means, standing.counts(REPRODUCED), standing.counts(NOT_REPRODUCED)]
+        yield row([levels(standing.where), *map(str, numbers), *cells])
 
 
 def guideline(found: list[Recommendation]) -> Iterator[str]:

@@ -93,6 +93,11 @@ class Judgement:
         return sum(_support(self.claim, finding) > 0 for finding in self.findings)
 
     @property
+    def holds_in_means(self) -> bool:
+        """Whether so many means agree as the claim asks for, by chance or not."""
+        return bool(self.findings) and self.agreeing >= self.claim.share * len(self.findings) - 1e-9
+
+    @property
     def missing(self) -> int:
         """How many runs or pairs have no number, over all comparisons."""
         return sum(finding.missing for finding in self.findings)
@@ -120,6 +125,50 @@ class Judgement:
             "weakest": None if weakest is None else _finite(asdict(weakest)),
             "findings": [_finite(asdict(finding)) for finding in self.findings],
         }
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How much speaks for one level each of the factors that claims are judged apart for: what came of all of them."""
+
+    where: Levels
+    judgements: tuple[Judgement, ...]
+
+    @property
+    def in_means(self) -> int:
+        """How many claims hold in the means, by chance or not."""
+        return sum(each.holds_in_means for each in self.judgements)
+
+    def counts(self, verdict: str) -> int:
+        """How many claims have that verdict."""
+        return sum(each.verdict == verdict for each in self.judgements)
+
+    @property
+    def agreeing(self) -> float:
+        """Of the comparisons of a claim, the share that agrees, in the mean over the claims."""
+        shares = [each.agreeing / len(each.findings) if each.findings else 0.0 for each in self.judgements]
+        return math.fsum(shares) / len(shares)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a JSON file."""
+        verdicts = {each.replace(" ", "_"): self.counts(each) for each in (REPRODUCED, UNDECIDED, NOT_REPRODUCED)}
+        return {"where": self.where, "in_means": self.in_means, **verdicts, "agreeing": self.agreeing}
+
+
+def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
+    """The levels that claims are judged apart for, the one that most speaks for first.
+
+    First counts how many claims hold in the means, then how many are reproduced, how few are not, and how much agrees.
+    """
+    apart: dict[tuple[Factor, ...], list[Judgement]] = {}
+    for each in judgements:
+        apart.setdefault(tuple(each.where.values()), []).append(each)
+    standings = [Standing(found[0].where, tuple(found)) for found in apart.values()]
+    return sorted(
+        standings,
+        key=lambda each: (each.in_means, each.counts(REPRODUCED), -each.counts(NOT_REPRODUCED), each.agreeing),
+        reverse=True,
+    )
 
 
 def judge(results: StudyResults, level: float = LEVEL) -> list[Judgement]:

@@ -19,12 +19,23 @@ from scipy import stats
 
 from epicycle.runner import open_study
 from epicycle.runner.model.packaged import packaged_models
+from epicycle.runner.model.problems import Position
 from epicycle.runner.show.report import answers
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.study import Plan, Study, read_study, run_study
-from epicycle.runner.study.claims import Finding, Judgement, judge, verdict
+from epicycle.runner.study.claims import (
+    NOT_REPRODUCED,
+    REPRODUCED,
+    UNDECIDED,
+    Finding,
+    Judgement,
+    judge,
+    ranked,
+    verdict,
+)
 from epicycle.runner.study.declaration import study_of_text
 from epicycle.runner.study.guideline import Recommendation, recommend
+from epicycle.runner.study.questions import Claim
 
 HEAD = """
 study: s
@@ -424,7 +435,49 @@ def test_claims_of_another_study_are_judged_at_each_level_of_what_it_has_not(que
         re.findall("<(?:th|td)[^>]*>(.*?)</(?:th|td)>", row) for row in re.findall("<tr>(.*?)</tr>", html, re.DOTALL)
     ]
     assert [[re.sub("<.*?>", "", cell) for cell in row] for row in rows] == [
-        ["variant", "true_by_theory", "false_by_theory"],
-        ["usual", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
-        ["slow", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
+        ["variant", "claims in means", "reproduced", "not reproduced", "true_by_theory", "false_by_theory"],
+        ["usual", "1", "1", "1", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
+        ["slow", "1", "1", "1", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
     ]
+
+
+def judged(where: str, *claims: tuple[str, float, int, int]) -> list[Judgement]:
+    """Claims of ten comparisons each: verdict, share that the claim asks for, how many agree, how many more do not."""
+    found = []
+    for outcome, share, agreeing, against in claims:
+        claim = Claim("c", "less", (), Position("", 1, 1, 1, ""), share=share)
+        findings = tuple(
+            Finding("m", {}, {}, {}, value, 0.1, 0.0, 0.0, 20, 0) for value in [-1.0] * agreeing + [1.0] * against
+        )
+        found.append(Judgement(claim, {"variant": where}, outcome, findings))
+    return found
+
+
+def test_the_level_that_most_speaks_for_comes_first() -> None:
+    """Claims in means count first, then those reproduced, then those not, then what agrees."""
+    every = [
+        *judged(
+            "two hold, little agrees", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 0.2, 2, 8), (NOT_REPRODUCED, 1.0, 0, 10)
+        ),
+        *judged("less agrees", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 1.0, 5, 5), (UNDECIDED, 1.0, 9, 1)),
+        *judged("best", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 1.0, 10, 0), (NOT_REPRODUCED, 1.0, 9, 1)),
+        *judged("one is refuted", (REPRODUCED, 1.0, 10, 0), (NOT_REPRODUCED, 1.0, 9, 1), (UNDECIDED, 1.0, 9, 1)),
+        *judged("more agrees", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 1.0, 9, 1), (UNDECIDED, 1.0, 9, 1)),
+        *judged("nothing decided", (UNDECIDED, 1.0, 10, 0), (UNDECIDED, 1.0, 10, 0), (UNDECIDED, 1.0, 9, 1)),
+    ]
+    assert [(each.where["variant"], each.in_means, each.counts(REPRODUCED)) for each in ranked(every)] == [
+        ("best", 2, 1),
+        ("two hold, little agrees", 2, 1),
+        ("nothing decided", 2, 0),
+        ("more agrees", 1, 1),
+        ("less agrees", 1, 1),
+        ("one is refuted", 1, 1),
+    ]
+    assert ranked(every)[0].as_dict() == {
+        "where": {"variant": "best"},
+        "in_means": 2,
+        "reproduced": 1,
+        "undecided": 1,
+        "not_reproduced": 1,
+        "agreeing": pytest.approx((1.0 + 1.0 + 0.9) / 3),
+    }

@@ -7,7 +7,16 @@ from collections.abc import Iterable, Sequence
 
 from epicycle.actors import counted
 
-from ...study.claims import CONFIRMED, REVERSED, UNDECIDED, Finding, Judgement
+from ...study.claims import (
+    CONFIRMED,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    REVERSED,
+    UNDECIDED,
+    Finding,
+    Judgement,
+    ranked,
+)
 from ...study.guideline import Recommendation
 from ...study.questions import ALWAYS
 from .data import Data, Names, shown
@@ -23,6 +32,12 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
     apart = list(judgements[0].where)
     if apart:
         yield tag("div", _by_level(data.names, judgements), class_="scroll")
+        yield tag(
+            "p",
+            "The best comes first: the most claims that hold in the means, by chance or not; then the most reproduced, "
+            "the fewest not reproduced, and the largest share of agreeing comparisons.",
+            class_="note",
+        )
     head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
     head += ["agreeing", "what speaks most against it, or least for it"]
     yield with_class(
@@ -63,14 +78,20 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
 
 
 def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
-    """Which claims survive which level of what they are judged for."""
-    found = {(tuple(each.where.values()), each.name): each for each in judgements}
-    claims = list(dict.fromkeys(each.name for each in judgements))
+    """Which claims survive which level of what they are judged for, the best first."""
+    standings = ranked(judgements)
+    claims = [each.name for each in standings[0].judgements]
     return table(
-        [*map(names.axis, judgements[0].where), *claims],
+        [*map(names.axis, judgements[0].where), "claims in means", REPRODUCED, NOT_REPRODUCED, *claims],
         [
-            [*map(shown, levels), *(_by_chance_or_not(found[levels, claim]) for claim in claims)]
-            for levels in dict.fromkeys(levels for levels, _ in found)
+            [
+                *map(shown, each.where.values()),
+                str(each.in_means),
+                str(each.counts(REPRODUCED)),
+                str(each.counts(NOT_REPRODUCED)),
+                *map(_by_chance_or_not, each.judgements),
+            ]
+            for each in standings
         ],
         names=len(judgements[0].where),
     )

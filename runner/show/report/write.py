@@ -14,6 +14,7 @@ from epicycle.actors import EpicycleError
 
 from ...model import ModelError, Problems, describe, raised_at
 from ...study import StudyResults, plan_of_folder
+from ...study.claims import ranked
 from ...study.replays import Replay, repeat
 from ...study.store import replace_file
 from ..drawing import FigureError
@@ -65,6 +66,7 @@ def write_report(
             "study": data.plan.study.name,
             "table": results.digest(),
             "claims": [each.as_dict() for each in judgements],
+            "standings": [each.as_dict() for each in ranked(judgements)],
             "guideline": [each.as_dict() for each in recommendations],
         }
         texts["claims.json"] = json.dumps(found, indent=1) + "\n"
