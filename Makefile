@@ -49,6 +49,7 @@ mutants: $(DEV)
 
 robust: $(DEV)
 	$(BIN)/python -m tests.numerics.robustness
+	$(BIN)/python -m tests.numerics.robustness --gap 0.03
 
 portable: $(DEV)
 	$(BIN)/python -m tests.portable.portable
