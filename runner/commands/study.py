@@ -31,6 +31,9 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--replications", type=count, metavar="N", help="runs of each condition (default: the study's); more are added"
     )
+    command.add_argument(
+        "--seed", type=first_seed, metavar="N", help="seed of the first replication (default: the study's)"
+    )
     command.add_argument("--out", metavar="DIR", type=Path, help="results folder (default: results/STUDY)")
     command.add_argument("--yes", action="store_true", help="do not ask back whether so many runs are meant")
     add_types(command)
@@ -70,6 +73,15 @@ def count(text: str) -> int:
     return int(text)
 
 
+def first_seed(text: str) -> int:
+    """A seed after which those of all replications are seeds, too."""
+    from ..study.declaration import MAX_STUDY_SEED
+
+    if not text.isdecimal() or len(text) > 20 or int(text) > MAX_STUDY_SEED:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {MAX_STUDY_SEED}")
+    return int(text)
+
+
 def address(text: str) -> str:
     """Where a scheduler listens."""
     found = re.fullmatch(r"((?:tcp|tls|ws|wss)://)?([^\s:/]+|\[[0-9a-fA-F:]+\]):([0-9]{1,5})", text)
@@ -96,7 +108,9 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
 
     check_session(options)
     types = [Path(file) for file in options.types]
-    study = read_study(options.study, set=options.set, types=types, replications=options.replications)
+    study = read_study(
+        options.study, set=options.set, types=types, replications=options.replications, seed=options.seed
+    )
     if options.replications is not None and study.until is not None:
         complain(f"{study.name} decides itself how many replications it needs: --replications counts for nothing")
     plan = Plan.made(study)

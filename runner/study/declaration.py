@@ -22,6 +22,7 @@ from .variation import DimensionReader
 
 LARGE = 10_000_000  # bytes of a file
 MAX_REPLICATIONS = 10**9
+MAX_STUDY_SEED = MAX_SEED - MAX_REPLICATIONS
 RESERVED = ("run", "condition", "replication", "seed", "status", "events", "digest", "error", "wall_time", "replay")
 
 
@@ -79,7 +80,12 @@ def is_study(path: Path) -> bool:
 
 
 def read_study(
-    name: str | Path, *, set: Iterable[str] = (), types: Iterable[Path] = (), replications: int | None = None
+    name: str | Path,
+    *,
+    set: Iterable[str] = (),
+    types: Iterable[Path] = (),
+    replications: int | None = None,
+    seed: int | None = None,
 ) -> Study:
     """The study of a file; raises ``ModelError`` with all that is wrong with what it says."""
     problems = Problems()
@@ -89,7 +95,7 @@ def read_study(
     assert path is not None
     assert node is not None
     text = path.read_text(encoding="utf-8")
-    return _made(node, _StudyReader(problems, path), text, tuple(set), tuple(types), replications)
+    return _made(node, _StudyReader(problems, path), text, tuple(set), tuple(types), replications, seed)
 
 
 def study_of_text(
@@ -98,6 +104,7 @@ def study_of_text(
     set: Iterable[str] = (),
     types: Iterable[Path] = (),
     replications: int | None = None,
+    seed: int | None = None,
     lender: tuple[str, str] | None = None,
 ) -> Study:
     """The study that a text says, which once was read from ``path``; the files that it names may be gone.
@@ -110,7 +117,7 @@ def study_of_text(
         problems.raise_if_any()
         raise AssertionError("a text that cannot be read is a problem")
     reader = _StudyReader(problems, path, lender, asks_for_files=False)
-    return _made(node, reader, text, tuple(set), tuple(types), replications)
+    return _made(node, reader, text, tuple(set), tuple(types), replications, seed)
 
 
 def _made(
@@ -120,6 +127,7 @@ def _made(
     changes: tuple[str, ...],
     types: tuple[Path, ...],
     replications: int | None,
+    seed: int | None,
 ) -> Study:
     problems = reader.problems
     study = reader.study(node, text)
@@ -127,6 +135,8 @@ def _made(
     assert study is not None, "what is no study is a problem"
     if replications is not None:
         study.replications = replications
+    if seed is not None:
+        study.seed = seed
     study.changes, study.types = changes, types
     for change in changes:
         setting = parse_setting(change, problems)
@@ -192,7 +202,7 @@ class _StudyReader(NodeReader):
                 "write lines like 'observer[*].sensor.range: 5 m'",
             )
         study.replications = self.number(entries, "replications", int, 1, 1, MAX_REPLICATIONS)
-        study.seed = self.number(entries, "seed", int, 0, 0, MAX_SEED - MAX_REPLICATIONS)
+        study.seed = self.number(entries, "seed", int, 0, 0, MAX_STUDY_SEED)
         study.paired = self.flag(entries, "paired", True)
         if "vary" in entries:
             study.dimensions = DimensionReader(self.problems).vary(entries["vary"].value)

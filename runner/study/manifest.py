@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, read_regular
 
-from .declaration import MAX_REPLICATIONS
+from .declaration import MAX_REPLICATIONS, MAX_STUDY_SEED
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FORMAT = 3
+FORMAT = 4
 
 
 class StoreError(EpicycleError):
@@ -37,6 +37,7 @@ _SHAPE: dict[str, Any] = {
     "set": [str],
     "types": [str],
     "replications": range(1, MAX_REPLICATIONS + 1),
+    "seed": range(MAX_STUDY_SEED + 1),
     "lender": (None, [str, str]),
     "factors": {str: _KINDS},
     "metrics": {str: str},

@@ -142,6 +142,7 @@ class Plan:
             manifest["set"],
             map(Path, manifest["types"]),
             manifest["replications"],
+            manifest["seed"],
             None if (lender := manifest.get("lender")) is None else (lender[0], lender[1]),
         )
         try:
@@ -176,6 +177,7 @@ class Plan:
             "set": list(study.changes),
             "types": [str(path.resolve()) for path in study.types],
             "replications": study.replications,
+            "seed": study.seed,
             "lender": study.questions.lender,
             "factors": study.factors,
             "metrics": {metric.name: metric.source for metric in self.metrics},

@@ -325,6 +325,24 @@ def test_runs_of_another_seed_are_told_and_not_mixed_in(
     assert tables[0] == tables[1]
 
 
+def test_another_first_seed_is_that_of_a_study_that_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path)
+    assert study(tmp_path, "--replications", 2, "--seed", 120, out="asked") == 0
+    with pytest.raises(SystemExit):
+        study(tmp_path, "--seed", 2**63)
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"epicycle study: error: argument --seed: '{2**63}' is not a whole number from 0 to {2**63 - 1 - 10**9}"
+    )
+    # The folder knows it, whatever the file says.
+    assert main(["resume", str(tmp_path / "asked")]) == 0
+    assert "0 new runs, 4 there before" in capsys.readouterr().out
+    write(tmp_path, STUDY.replace("seed: 20", "seed: 120"))
+    assert study(tmp_path, "--replications", 2, out="said") == 0
+    tables = [(tmp_path / out / "table.parquet").read_bytes() for out in ("asked", "said")]
+    assert tables[0] == tables[1]
+    assert set(pq.read_table(tmp_path / "asked" / "table.parquet")["seed"].to_pylist()) == {120, 121}
+
+
 def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(copied, STUDY.replace("study: walks", "study: strolls"))
     assert study(copied) == 2
@@ -351,7 +369,7 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
     assert message(capsys, copied) == "error: mine holds other results, not those of a study\n"
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
     for spoiled, said in (
-        (manifest | {"format": 2}, f"mine has format 2, this Epicycle reads format 3{OTHER_FORMAT}"),
+        (manifest | {"format": 2}, f"mine has format 2, this Epicycle reads format 4{OTHER_FORMAT}"),
         (
             {key: manifest[key] for key in manifest if key != "text"},
             f"mine/manifest.json is damaged: it has no 'text'{MADE_ANEW}",
