@@ -132,7 +132,7 @@ class RobustController(TargetModel, Actor):
     tube_growth = Parameter(float, 0.4, unit="m", min=0, doc="beta: what it grows by, per unit of tau")
     tube_time = Parameter(str, STEPS, choices=(STEPS, SECONDS), doc="unit of tau in eq. (3)")
     covariance_noise = Parameter(
-        bool, False, doc="let process noise widen the target's predicted covariance, in f4 and in eq. (5)"
+        bool, True, doc="let process noise widen the target's predicted covariance, in f4 and in eq. (5)"
     )
     peers_at_start = array_parameter(
         (None, 2), (), unit="m", doc="where other robots stand at time 0, for as long as no plan of theirs has come"

@@ -115,7 +115,7 @@ def propagate(
 ) -> tuple[Array, Array]:
     """Predicted positions (N, 2) and their covariances (N, 3) as (xx, xy, yy) of a target at steps 1..N.
 
-    C <- A C A^T + Q; with Q = 0 (the default reading) only the present uncertainty is carried forward.
+    C <- A C A^T + Q; with Q = 0 only the present uncertainty is carried forward.
     """
     size = mean.shape[0]
     means, covariances = np.empty((steps, 2)), np.empty((steps, 3))
