@@ -19,7 +19,7 @@ help:
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
-	@echo "make mutants 200 small changes of our sources: do the quick tests notice at least 90 % of them?"
+	@echo "make mutants 200 small changes of our sources: do the quick tests notice 90 % of them or more?"
 	@echo "make robust 100,000 problems that no scenario poses: does the solver answer each within its limits?"
 	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
 	@echo "make wheel  build dist/epicycle-*.whl"

@@ -58,7 +58,8 @@ def about(results: StudyResults) -> str:
     when = results.manifest["date"].partition("T")[0]
     failed = counts.total() - counts["ok"]
     version, revision = results.manifest["versions"]["epicycle"], results.manifest["git"]
-    made_with = f"version {version}" if version else f"revision {revision[:10]}" if revision else "no version"
+    parts = [f"version {version}" if version else "", f"revision {revision[:10]}" if revision else ""]
+    made_with = ", ".join(filter(None, parts)) or "no version"
     return (
         f"Measured on {when} with {made_with}: "
         f"`epicycle study {results.plan.study.name}`, {counts.total():,} runs ({failed or 'none'} failed), "

@@ -25,7 +25,7 @@ from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
-from .visible import readable, shortened, visible, visible_character, visible_lines
+from .visible import abridged, readable, shortened, visible, visible_character, visible_lines
 from .words import counted
 
 __all__ = [
@@ -50,6 +50,7 @@ __all__ = [
     "Tag",
     "UnitError",
     "Wake",
+    "abridged",
     "accepts",
     "array_parameter",
     "convert",

@@ -5,6 +5,8 @@ What models, data and the code of others say comes through here before it stands
 
 from __future__ import annotations
 
+import hashlib
+
 LONGEST = 2_000  # characters of a line of a message
 _TAIL = 300
 
@@ -30,6 +32,14 @@ def shortened(text: str, longest: int = LONGEST) -> str:
         return text
     tail = min(_TAIL, longest // 4)
     return f"{text[: longest - tail]} ... ({len(text) - longest:,} characters left out) ... {text[-tail:]}"
+
+
+def abridged(name: str, longest: int) -> str:
+    """A name as it is if it is short, or else its beginning and a mark: two that begin alike stay two."""
+    if len(name) <= longest:
+        return name
+    mark = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:6]
+    return f"{name[: longest - 9]}...{mark}"
 
 
 def readable(text: str) -> str:

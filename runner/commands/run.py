@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
+import threading
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -132,37 +132,56 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     return complain_of(failed, options)
 
 
-def outlook(end: float, clock: Callable[[], float] = time.monotonic) -> Callable[[float], None]:
-    """Says once, when a run has gone on for a while, that it will take long: a clock of 1 ns is easily written."""
-    started, is_told = clock(), False
-
-    def look(now: float) -> None:
-        nonlocal is_told
-        elapsed = clock() - started
-        if is_told or elapsed < PATIENCE:
-            return
-        is_told = True
-        if (left := elapsed * (end - now) / max(now, 1e-9)) > LONG:
-            complain(
-                f"after {elapsed:.0f} s the run is at {now:.3g} s of {end:g} s: at this pace it takes "
-                f"{left / 3_600:,.1f} h more; Ctrl-C ends it, and what was recorded is kept"
-            )
-
-    return look
+def outlook(elapsed: float, now: float, end: float) -> str:
+    """What to say of a run that has gone on for a while and will take long: a clock of 1 ns is easily written."""
+    if now <= 0.0:  # for all we know, one step does not end
+        state = f"still at 0 s of {end:g} s"
+    elif (left := elapsed * (end - now) / now) > LONG:
+        state = f"at {now:.3g} s of {end:g} s: at this pace it takes {left / 3_600:,.1f} h more"
+    else:
+        return ""
+    return f"after {elapsed:.0f} s the run is {state}; Ctrl-C ends it, and what was recorded is kept"
 
 
 @contextmanager
-def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None] | None]:
+def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None]]:
     """A bar on a terminal's standard error, and notices of what takes long."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeElapsedColumn
+    from rich.text import Text
 
+    class ModelTime(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            now = f"{task.completed:.1f}" if task.completed >= 1.0 else f"{task.completed:.3g}"
+            return Text(f"{task.description} {now} s of model time")
+
+    latest = 0.0
+
+    def look(now: float) -> None:
+        nonlocal latest
+        latest = now
+
+    def judge() -> None:
+        if end is not None and (text := outlook(PATIENCE, latest, end)):
+            complain(text)
+
+    end = until if until is not None else model.stop
     terminal = console(stderr=True)
-    with notices(terminal):
-        end = until if until is not None else model.stop
-        if not terminal.is_terminal:
-            yield None if end is None else outlook(end)
-            return
-        text = TextColumn("{task.description} {task.completed:.1f} s of model time", markup=False)
-        with Progress(text, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
-            task = bar.add_task(model.name, total=end)
-            yield lambda now: bar.update(task, completed=now)
+    # One step of the run may take for ever, so it is looked at from outside.
+    watch = threading.Timer(PATIENCE, judge)
+    watch.daemon = True
+    watch.start()
+    try:
+        with notices(terminal):
+            if not terminal.is_terminal:
+                yield look
+                return
+            with Progress(ModelTime(), BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
+                task = bar.add_task(model.name, total=end)
+
+                def show(now: float) -> None:
+                    look(now)
+                    bar.update(task, completed=now)
+
+                yield show
+    finally:
+        watch.cancel()

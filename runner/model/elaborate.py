@@ -22,7 +22,7 @@ from .catalogue import Catalogue, CatalogueError
 from .checks import check
 from .composite_aspect import as_actor
 from .declarations import CompositeText, ModelText, PartText, PortText
-from .document import Entry
+from .document import Entry, Mapping
 from .elaborate_aspects import AspectElaborator
 from .graph import ModelGraph
 from .limits import NORMAL, RAISE_IT, Limits
@@ -94,7 +94,7 @@ class Elaborator(AspectElaborator):
             }
             if not any(value is self.values.missing for value in values.values()):
                 in_si = {key: counted_in_si(value) for key, value in values.items()}
-                model.figures[name] = (part.type.text, in_si, part.type.position)
+                model.figures[name] = (part.type.text, in_si, Mapping(part.values, part.type.position))
         return model
 
     def woven(self, graph: ModelGraph) -> list[WovenAspect]:

@@ -12,11 +12,12 @@ from ..tables import Table, as_html, as_text, short
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .decorated import arranged
+from .document import Mapping as MappingNode
 from .ends import Port, raising
 from .graph import ModelGraph
 from .measure import take_problem
 from .observation import Metric, Observation, checked_seed, nanoseconds
-from .problems import Position, Problem, Problems
+from .problems import Problem, Problems
 from .reading import NAME, Text, within
 from .schedule import firing_order
 from .scope import Composite, Scope
@@ -65,7 +66,7 @@ class Model(Scope):
         self.seed = checked_seed(seed)
         self.recorded: list[str] = []
         self.metrics: list[Metric] = []
-        self.figures: dict[str, tuple[str, dict[str, object], Position]] = {}
+        self.figures: dict[str, tuple[str, dict[str, object], MappingNode]] = {}  # type, values, as written
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
         self.is_running = False

@@ -9,8 +9,10 @@ from inspect import isabstract
 from pathlib import Path
 from types import ModuleType
 
-from epicycle.actors import Actor, EpicycleError, irregular
+from epicycle.actors import Actor, EpicycleError
 from epicycle.aspects import Aspect
+
+from .packaged import unreadable
 
 
 class TypesError(EpicycleError):
@@ -40,9 +42,10 @@ def types_of_file(path: Path) -> list[type]:
 def _imported(path: Path) -> ModuleType:
     if path.suffix != ".py" or not path.stem.isidentifier():
         raise TypesError(f"--types {path}: expected a Python file such as my_actors.py")
-    if not path.is_file():
-        what = f"this is {irregular(path)}" if path.exists() else "there is no such file"
-        raise TypesError(f"--types {path}: {what}")
+    if reason := unreadable(path):
+        raise TypesError(f"--types {path}: this {reason}")
+    if reason is None:
+        raise TypesError(f"--types {path}: there is no such file")
     file, name = path.resolve(), path.stem
     known = sys.modules.get(name)
     if known is not None:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
+from epicycle.actors import irregular
+
 from .problems import Problems, did_you_mean
 
 
@@ -40,6 +42,19 @@ def _yaml_files(folders: list[Path]) -> dict[str, Path]:
 def is_path(name: str) -> bool:
     """Whether the name of a model, disturbance or study is a path, and not that of a packaged one."""
     return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
+
+
+def unreadable(path: Path | None) -> str | None:
+    """Why a file cannot be read, such as ``is a folder, not a file``; empty if it can be, None if there is none."""
+    if path is None:
+        return None
+    try:
+        kind = irregular(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError) as error:  # endless links, too long a name, a NUL in it
+        return f"cannot be read: {getattr(error, 'strerror', None) or error}"
+    return f"is {kind}" if kind else ""
 
 
 def find(name: str, kind: str, packaged_ones: Callable[[], dict[str, Path]], problems: Problems) -> Path | None:

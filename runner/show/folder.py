@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from epicycle.actors import EpicycleError, read_regular
+from epicycle.actors import EpicycleError, abridged, read_regular
 
 from ..columns import categories, numbers, texts
 from ..engine import Results
@@ -18,6 +18,8 @@ from ..provenance import versions
 from .drawing import FigureError, draw
 from .figures import Figure
 from .summary import summary_object
+
+MAX_NAME = 60  # letters of a file's name, which file systems bound
 
 
 def check_folder(folder: Path, model: str, command: list[str]) -> str:
@@ -62,14 +64,15 @@ def draw_figures(folder: Path, results: Results, figures: dict[str, Figure]) -> 
     """Draw a PNG for each figure, when all else is safe; the files that were written, and what could not be drawn."""
     written, failed = [], []
     for name, figure in figures.items():
-        aside = folder / f".{name}.png"
+        file = f"{abridged(name, MAX_NAME)}.png"
+        aside = folder / f".{file}"
         try:
             draw(name, figure, results, aside)
         except FigureError as error:
             failed.append(error)
             aside.unlink(missing_ok=True)
         else:
-            written.append(folder / f"{name}.png")
+            written.append(folder / file)
             os.replace(aside, written[-1])
     return written, failed
 

@@ -12,7 +12,7 @@ from ..model.declarations import STUDY_KEYS, STUDY_METRIC_KEYS, UNTIL_KEYS, Decl
 from ..model.disturbance import find_disturbance
 from ..model.document import Entry, Mapping, Node, Scalar, parse, read
 from ..model.observation import MAX_SEED
-from ..model.packaged import find, is_path, packaged_disturbances, packaged_models, packaged_studies
+from ..model.packaged import find, is_path, packaged_disturbances, packaged_models, packaged_studies, unreadable
 from ..model.reading import NodeReader, is_empty
 from ..model.settings import Setting, parse_setting, settings_in
 from .dimensions import Dimension, Level, Listed
@@ -245,9 +245,12 @@ class _StudyReader(NodeReader):
         name = self.text(node, "the model") or ""
         if is_path(name):
             file = self.path.parent / name
-            if self.asks_for_files and not file.is_file():
+            reason = unreadable(file) if self.asks_for_files else ""
+            if reason is None:
                 beside = [each.name for each in file.parent.glob("*.yaml")] if file.parent.is_dir() else []
                 self.problems.add(f"there is no file {name!r}{did_you_mean(file.name, beside)}", node.position)
+            elif reason:
+                self.problems.add(f"the model {name!r} {reason}", node.position)
             return str(file)
         if self.asks_for_files and name not in packaged_models():
             known = list(packaged_models())
@@ -273,7 +276,10 @@ class _StudyReader(NodeReader):
                 name = str(self.path.parent / text.text) if is_path(text.text) else text.text
                 found = Problems()
                 file = find_disturbance(name, found)
-                if self.asks_for_files and (file is None or not file.is_file()):
+                reason = unreadable(file) if self.asks_for_files else ""
+                if reason:
+                    self.problems.add(f"the disturbance {text.text!r} {reason}", text.position)
+                elif reason is None:
                     known = list(packaged_disturbances())
                     self.problems.add(
                         f"there is no disturbance {text.text!r}{did_you_mean(text.text, known)}",

@@ -33,7 +33,7 @@ class Pulse:
         seconds = time.monotonic() - self.started
         if made and seconds > 0:
             rate = made / seconds
-            parts += [f"{rate:.3g} runs/s", f"{duration((schedule.total - schedule.over) / rate)} left"]
+            parts += [f"{rate:.3g} runs/s", f"{duration(schedule.left / rate)} left"]
         return ", ".join(parts)
 
 

@@ -16,7 +16,7 @@ from ..model import Position, Problems, did_you_mean
 from ..model.declarations import CLAIM_KEYS, GUIDELINE_KEYS
 from ..model.document import Entry, Node, Scalar, Sequence, parse
 from ..model.document import Mapping as MappingNode
-from ..model.packaged import find, is_path, packaged_studies
+from ..model.packaged import find, is_path, packaged_studies, unreadable
 from ..model.reading import NodeReader, Text, inside
 from .dimensions import Dimension, Factor, as_factor
 
@@ -178,8 +178,12 @@ class QuestionReader(NodeReader):
         path = find(
             str(self.study.path.parent / name) if is_path(name) else name, "study", packaged_studies, Problems()
         )
-        if path is not None and path.is_file():
+        reason = unreadable(path)
+        if path is not None and reason == "":
             return str(path), path.read_text(encoding="utf-8", errors="replace")
+        if reason:
+            self.problems.add(f"claims: the study {name!r} {reason}", node.position)
+            return None
         known = list(packaged_studies())
         self.problems.add(
             f"claims: there is no study {name!r}{did_you_mean(name, known)}",

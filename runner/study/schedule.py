@@ -6,6 +6,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from .plan import Condition, Plan
 from .statistics import half_width
@@ -72,6 +73,21 @@ class Schedule:
     def over(self) -> int:
         """The runs that are over."""
         return self.there.total() + self.made.total()
+
+    @property
+    def left(self) -> int:
+        """The runs that are still to be made: of those that were there, some may not have come up yet."""
+        return max(0, self.total - self.over - (self._asked_for - self.there.total()))
+
+    @cached_property
+    def _asked_for(self) -> int:
+        """How many of the runs that are known the plan asks for; in a folder there may be others, too."""
+        if not self.known:
+            return 0
+        conditions = map(self.plan.condition, range(self.plan.conditions))
+        return sum(
+            self.plan.key(each, one) in self.known for each in conditions for one in range(self.plan.replications)
+        )
 
     def next(self) -> Task | None:
         """The next run; None if there is none now, or ever."""

@@ -6,6 +6,7 @@ import math
 import sys
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -385,17 +386,41 @@ def test_same_run_same_bits() -> None:
     assert play(2, 10.0, 0.25, seed=5, steps=30)[1].tobytes() != first[1].tobytes()
 
 
+class _Lost(_Recorder):
+    """Finds nothing from the second time on."""
+
+    def solve(self, problem: object, starts: np.ndarray) -> Any:
+        found = super().solve(problem, starts)
+        if len(self.records) == 1:
+            return found
+        return found._replace(controls=np.full_like(found.controls, np.nan), violation=np.nan)
+
+
+def test_if_the_solver_finds_nothing_it_brakes() -> None:
+    recorder = _Lost()
+    harness = Harness(RobustController("main.controller", solver=recorder, horizon_from="now"))
+    harness.fire(0.0, trigger=0, state=state())
+    assert harness.last("control")[0] < -7.0
+    harness.fire(0.1, trigger=1, state=state(vx=-0.8, vy=0.6, time=0.1))
+    going_on, braking = recorder.records[1][1]
+    assert going_on[0, 0] < -7.0
+    assert harness.last("control").tolist() == braking[0].tolist()
+    assert braking[0, 0] > 0.0 > braking[0, 1]
+    assert harness.last("violation") == np.inf
+
+
 def test_missing_casadi_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "casadi", None)
     with pytest.raises(EpicycleError, match=r"pip install 'epicycle\[casadi\]'"):
         Harness(RobustController("main.controller", solver=Casadi()))
 
 
-def test_casadi_in_the_place_of_the_barrier_method() -> None:
+def test_casadi_in_the_place_of_the_barrier_method(capfd: pytest.CaptureFixture[str]) -> None:
     _, ours = play(1, 30.0, 0.0, seed=2, steps=8)
     records, theirs = play(1, 30.0, 0.0, seed=2, steps=8, solver=Casadi())
     assert len(records) == 16
     assert theirs[:, 0] == pytest.approx(ours[:, 0], abs=0.05)  # the main robot has one way to go
+    assert capfd.readouterr() == ("", "")  # IPOPT would say a page of each problem
 
 
 def test_parts_can_be_given_as_mappings() -> None:

@@ -39,6 +39,7 @@ def test_a_token_is_what_it_was_when_it_was_sent(make: Any) -> None:
     assert not hasattr(token, "__dict__")
     assert token != make()  # arrays are not compared: it is itself, and no other
     assert token == token  # noqa: PLR0124
+    assert len({token, token, make()}) == 2
     assert token.finite
 
 

@@ -595,3 +595,23 @@ def test_drawings_mark_actors() -> None:
         boxes = {box.path: box.aspects for box in outline(model, depth).root.walk()}
         assert marked.items() <= boxes.items()
         assert not any(aspects for path, aspects in boxes.items() if path not in marked)
+
+
+class Named(ExecutionAspect):
+    """Notes whose firings it puts off."""
+
+    def schedule(self, job: Job, point: ActorPoint) -> None:
+        point.act("seen", (point.owner, point.unit.owner))
+        point.forward(job)
+
+
+def test_a_point_says_whose_firing_it_is() -> None:
+    text = CHAIN.format("type: Named, at: t").replace("period: 1 s", "limit: 1")
+    composite = (
+        "composites: {C: {outputs: [out], actors: {t: {type: Ticker, limit: 1}}, connections: [t.output -> out]}}"
+    )
+    _, results = simulate(text, types=[*TYPES, Named])
+    assert [value for *_, value in acts(results)] == [("t", "t")]
+    text = f"{composite}\nactors: {{c: {{type: C}}, p: {{type: Probe}}}}\nconnections: [c.out -> p.input]\n"
+    _, results = simulate(text + "aspects: {it: {type: Named, at: c}}", types=[*TYPES, Named])
+    assert [value for *_, value in acts(results)] == [("c.t", "c")]

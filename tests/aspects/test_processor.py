@@ -328,3 +328,17 @@ def test_figures_of_a_processor_to_the_nanosecond() -> None:
     assert figures["mean_response"] == 0.003  # 2 ms and 4 ms; those of 20 ms are not over
     assert figures["max_response"] == 0.004
     assert figures["utilisation"] == 0.4
+
+
+def test_what_is_put_back_before_it_has_begun_is_not_preempted() -> None:
+    """Both are released at once: the first one in the order of the model begins, and makes way within the tag."""
+    _, results = simulate(
+        "actors: {t: {type: Ticker, period: 10 ms}, a: {type: Scale}, b: {type: Scale}}\n"
+        "connections: ['t.output -> a.input, b.input']\n"
+        "aspects: {cpu: {type: Processor, policy: priority, preemptive: true, time: 2 ms, at: [a, b],"
+        " priorities: {a: 2, b: 1}}}",
+        until=0.008,
+    )
+    assert responses(results, "b") == [2]
+    assert responses(results, "a") == [4]
+    assert results.aspects["cpu"]["preempted"] == 0

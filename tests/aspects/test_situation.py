@@ -284,6 +284,10 @@ def test_in_a_model(aspect: str, expected: tuple[int, ...]) -> None:
             "aspect view: target: 'robot[*].place' selects robot[0].place and robot[1].place, but must select one",
         ),
         (
+            "view: {type: Occlusion, positions: 'robot[*].place', target: 'robot[*].place', radius: 1, at: '*.said'}",
+            "aspect view: target: 'robot[*].place' selects robot[0].place and robot[1].place, but must select one",
+        ),
+        (
             "view: {type: Occlusion, positions: 'robot[*].place', target: t.output, radius: -1, at: '*.said'}",
             "aspect view.radius: -1 is out of bounds, expected a number in m >= 0",
         ),

@@ -254,14 +254,14 @@ m.yaml:6:17: error: figure whole: there is no figure type 'TimeSeriez', did you 
       |                 ^^^^^^^^^^
    help: valid types: Histogram, TimeSeries, Trajectories
 
-m.yaml:7:17: error: figure other: Histogram has no parameter 'bin', did you mean 'bins'?
+m.yaml:7:53: error: figure other: Histogram has no parameter 'bin', did you mean 'bins'?
     7 |   other: {type: Histogram, signals: [clock.output], bin: 3}
-      |                 ^^^^^^^^^
+      |                                                     ^^^
    help: valid parameters: signals, bins, label
 
-m.yaml:8:16: error: figure last: 'clock.out' is not recorded, did you mean 'clock.output'?
+m.yaml:8:38: error: figure last: 'clock.out' is not recorded, did you mean 'clock.output'?
     8 |   last: {type: Histogram, signals: [clock.out]}
-      |                ^^^^^^^^^
+      |                                      ^^^^^^^^^
    help: add it to 'record' in the run section
 3 errors in m.yaml"""
     with pytest.raises(ModelError) as caught:

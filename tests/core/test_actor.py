@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.actors import Actor, InputPort, OutputPort, PortError, PortParameter
+from epicycle.actors import Actor, Clock, InputPort, OutputPort, PortError, PortParameter
 from tests.actors.harness import Harness
 
 
@@ -47,6 +47,11 @@ def test_who_says_nothing_of_firing_cannot_fire() -> None:
     with pytest.raises(NotImplementedError) as caught:
         Odd("a").fire()
     assert str(caught.value) == "Odd has no fire()"
+
+
+def test_nobody_is_taken_to_go_on_for_ever_who_does_not_say_so() -> None:
+    assert not Odd("a").is_endless
+    assert Clock("clock", period=1).is_endless
 
 
 @pytest.mark.parametrize("begin_anew", ["restart", "enter"])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import Any
 
 import mpmath
@@ -16,6 +17,7 @@ import pytest
 
 from epicycle.actors import random_stream
 from epicycle.actors.core import laws
+from epicycle.actors.core.random import RandomStream
 
 DRAWS: dict[str, list[tuple[Any, ...]]] = {
     "binomial": [(10, 0.3), (10, 0.7), (500, 0.02), (500, 0.2), (10**6, 0.9), (10**15, 0.5), (21, 0.5)],
@@ -96,6 +98,25 @@ def test_bounds_about_the_size_of_a_word(bound: int) -> None:
     drawn = [stream.below(bound) for _ in range(400)]
     assert 0 <= min(drawn) < bound // 50
     assert bound - bound // 50 < max(drawn) < bound
+
+
+def test_a_bound_uses_every_bit_of_a_word() -> None:
+    """The product of 3 and this word ends in the least 64 bits that are not refused."""
+    words = [0xAAAA_AAAA_AAAA_AAAB, 0x5555_5555_5555_5556, 0, 0xAAAA_AAAA_AAAA_AAAB]
+    stream: Any = SimpleNamespace(word=lambda: words.pop(0))
+    assert [RandomStream.below(stream, 3) for _ in range(3)] == [2, 1, 2]
+    assert not words  # the third one is refused
+
+
+def test_a_wait_for_what_hardly_ever_comes_is_as_long_as_an_integer_can_be() -> None:
+    assert random_stream(5, "geometric", "rare").geometric(1e-300) == 2**63 - 1
+
+
+def test_binomial_numbers_are_weighed_against_the_likeliest_one() -> None:
+    """It is 27 of 56 for this probability, one more than the mean rounded down: two draws hang on that."""
+    stream = random_stream(1, "a", "b")
+    drawn = [stream.binomial(56, 0.47609624449125754) for _ in range(126)]
+    assert drawn[114:] == [30, 28, 23, 30, 28, 23, 24, 28, 27, 31, 23, 26]
 
 
 @pytest.mark.parametrize("k", [1, 2, 5, 9, 14, 15, 16, 17, 20, 50, 1000, 10**6])

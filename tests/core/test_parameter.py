@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -213,3 +214,18 @@ def test_the_nearest_of_many_names_is_found_by_its_ends() -> None:
     assert nearest("abcd", [*[f"n{number}" for number in range(2000)], "abce"]) is None
     assert nearest("abcd", [*[f"n{number}" for number in range(1999)], "abce"]) == "abce"
     assert (did_you_mean("ab", ["abc"]), did_you_mean("ab", ["xyz"])) == (", did you mean 'abc'?", "")
+
+
+def test_the_name_that_was_meant_is_found_in_good_time_among_many() -> None:
+    """Names of the same letters in another order are the dearest to compare."""
+    random = np.random.default_rng(3)
+    letters = np.array(list("abcdefghijklmnopqrstuvwxyz" * 7))
+    asked, *names = ["".join(random.permutation(letters)) for _ in range(1_501)]
+
+    def seconds(some: list[str]) -> float:
+        start = time.process_time()
+        assert nearest(asked, some) is None
+        return time.process_time() - start
+
+    assert seconds(names) < 5 * seconds(names[:100]) + 0.05
+    assert nearest(asked, [*names, f"{asked[:-3]}123"]) == f"{asked[:-3]}123"

@@ -13,7 +13,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.actors import Exponential, Parameter, ParameterError, Quantity, Server, UnitError, counted_in_si, plain
+from epicycle.actors import (
+    Exponential,
+    Parameter,
+    ParameterError,
+    Quantity,
+    Server,
+    UnitError,
+    counted_in_si,
+    parse_unit,
+    plain,
+)
 from epicycle.actors.distributions import Distribution
 from epicycle.actors.expression import ExpressionError, evaluate, interpolate
 
@@ -156,6 +166,7 @@ def test_a_unit_may_not_grow_without_end() -> None:
     value: float = Quantity(1.0, "kg")
     for _ in range(40):
         value = value * Quantity(1.0, "kg")
+        assert parse_unit(getattr(value, "unit", "1"))  # what stands in a message can be written into a model
     assert value == 1.0
 
 

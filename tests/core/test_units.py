@@ -99,6 +99,13 @@ def test_convert_explains_what_does_not_fit(value: str | int | float, unit: str,
     assert str(pickle.loads(pickle.dumps(caught.value))) == message
 
 
+def test_a_unit_may_be_too_long_to_be_read() -> None:
+    with pytest.raises(UnitError) as caught:
+        parse_unit("m*s/" * 25 + "m")
+    assert str(caught.value) == "unreadable unit 'm*s/m*s/m*s/m*s/m*s/...': it is longer than 100 characters"
+    assert parse_unit("m*m/" * 24 + "m") == parse_unit("m")
+
+
 def test_parse_unit() -> None:
     assert parse_unit("m/s^2") == Unit(Fraction(1), 0, (1, 0, -2, 0, 0, 0))
     assert parse_unit("km/h").factor == 1 / 3.6

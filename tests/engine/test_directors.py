@@ -78,6 +78,14 @@ class FixedWait(Aspect):
         point.forward(token, self.seconds)
 
 
+class Twofold(Aspect):
+    """Lets every token through twice at once."""
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        point.forward(token)
+        point.forward(token)
+
+
 TYPES = [FixedWait, Repeat, Time, Sampler, Nap]
 REPEATS = """
 composites:
@@ -108,6 +116,29 @@ def test_one_token_of_each_channel_passes_a_border_at_a_tag() -> None:
         *[(1, "twice.twice.output")] * 2,
         *[(2, "twice.twice.output")] * 2,
     ]
+
+
+def test_aspects_at_a_port_of_a_composite_stand_outside_of_its_border() -> None:
+    """What one doubles at an input passes the border one by one; at an output, it has passed it already."""
+    model, _ = simulate(
+        """
+composites:
+  C:
+    inputs: [in]
+    outputs: [out]
+    director: {}
+    actors: {inner: {type: Probe}, later: {type: Scale}}
+    connections: [in -> inner.input, in -> later.input, later.output -> out]
+actors: {t: {type: Ticker, limit: 1}, u: {type: Ticker, limit: 1}, c: {type: C}, d: {type: C}, probe: {type: Probe},
+         other: {type: Probe}}
+connections: [t.output -> c.in, c.out -> probe.input, u.output -> d.in, d.out -> other.input]
+aspects: {first: {type: Twofold, at: c.in}, second: {type: Twofold, at: d.out}}
+""",
+        types=[*TYPES, Twofold],
+    )
+    assert seen(model, "c.inner") == [(0.0, 1, (0,)), (0.0, 2, (0,))]
+    assert seen(model, "d.inner") == [(0.0, 1, (0,))]
+    assert seen(model, "other") == [(0.0, 1, (0.0, 0.0))]
 
 
 def test_channels_pass_a_border_side_by_side() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Generator
+from fractions import Fraction
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,8 @@ import numpy as np
 import pytest
 
 from epicycle.actors import Actor, Clock, InputPort, OutputPort, Parameter, Process, Scale
-from epicycle.aspects import Aspect, JoinPoint
+from epicycle.aspects import Aspect, ClockAspect, ExecutionAspect, Job, JoinPoint
+from epicycle.aspects.execution import ActorPoint, Unit
 from epicycle.runner import Model
 from epicycle.runner.engine import ActorError, Simulation
 from tests.engine.engine_parts import load
@@ -222,6 +224,64 @@ def json_of(value):
     import json
     json.dumps(value)
 """
+
+
+class Faulty(ExecutionAspect):
+    """Fails where it is told to."""
+
+    events = ("seen",)
+    where = Parameter(str)
+
+    def _fail(self, here: str) -> None:
+        if self.where == here:
+            raise RuntimeError(f"no {here}")
+
+    def begin(self, unit: Unit) -> None:
+        self._fail("begin")
+
+    def is_due(self, time: int) -> bool:
+        self._fail("is_due")
+        return super().is_due(time)
+
+    def pass_by(self, job: Any, point: Any) -> None:
+        self._fail("pass_by")
+        point.forward(job)
+
+    def schedule(self, job: Job, point: ActorPoint) -> None:
+        point.later(0.25, lambda _: self._fail("later"), None)
+        point.forward(job)
+
+    def forget(self, point: JoinPoint) -> None:
+        self._fail("forget")
+
+
+class FaultyClock(ClockAspect):
+    """Does not know how wrong it is."""
+
+    def error(self, random: Any) -> tuple[int, Fraction]:
+        raise RuntimeError("no error")
+
+
+@pytest.mark.parametrize(
+    ("aspect", "message"),
+    [
+        ("type: Faulty, where: begin", "begin() at s at (0 s, 1): RuntimeError: no begin"),
+        ("type: Faulty, where: is_due, until: 9 s", "is_due() at s at (0 s, 1): RuntimeError: no is_due"),
+        ("type: Faulty, where: pass_by, until: 2.5 s", "pass_by() at s at (3 s, 1): RuntimeError: no pass_by"),
+        ("type: Faulty, where: later", "later() at s at (0.25 s, 1): RuntimeError: no later"),
+        ("type: Faulty, where: forget", "forget() at s at (1.5 s, 1): RuntimeError: no forget"),
+        ("type: FaultyClock", "error() at s at (0 s, 1): RuntimeError: no error"),
+    ],
+)
+def test_an_aspect_that_fails_is_named_with_what_it_was_asked(aspect: str, message: str) -> None:
+    model = load(
+        "actors: {t: {type: Clock, period: 1 s}, s: {type: Scale, factor: 2}}\nconnections: [t.output -> s.input]\n"
+        f"aspects: {{trap: {{{aspect}, at: s}}, crash: {{type: CrashRestart, at: s, times: [1.5 s]}}}}\n",
+        types=[Faulty, FaultyClock],
+    )
+    with pytest.raises(ActorError) as caught:
+        Simulation(model).run(until=5)
+    assert str(caught.value).splitlines()[0] == f"aspect trap failed in {message}"
 
 
 def test_an_actor_of_an_installed_package(tmp_path: Path) -> None:

@@ -364,3 +364,11 @@ def test_paths_of_logs(tmp_path: Path) -> None:
         check_log_path(tmp_path / "log.txt")
     with pytest.raises(LogError, match="there is no folder"):
         check_log_path(tmp_path / "no" / "log.csv")
+
+
+def test_a_parquet_log_is_written_in_large_pieces(tmp_path: Path) -> None:
+    """Small ones take a hundred times the place and the time."""
+    records = (Record(Tag(time, 1), "send", "a", "output", None, "", time) for time in range(25_000))
+    write_log(records, tmp_path / "l.parquet")
+    found = pq.ParquetFile(tmp_path / "l.parquet").metadata
+    assert [found.row_group(group).num_rows for group in range(found.num_row_groups)] == [10_000, 10_000, 5_000]

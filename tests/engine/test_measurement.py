@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.engine.batches import MOST, TimeBatches, TokenBatches, mser
+from epicycle.runner.engine.batches import MOST, TimeBatches, TokenBatches, batch_interval, mser
 from epicycle.runner.engine.measurement import Measurement, Outcome
 from epicycle.runner.engine.statistic import Total
 from epicycle.runner.model import Metric
@@ -308,6 +308,14 @@ def test_too_few_tokens_have_no_interval_and_too_short_a_run_is_told() -> None:
     same = measured([("a.out", place, 3.0) for place in range(40)], 40, take="mean", interval=0.9)
     assert same.interval is not None
     assert (same.interval.low, same.interval.high, same.interval.autocorrelation) == (3.0, 3.0, 0.0)
+
+
+def test_a_batch_in_which_nothing_counts_has_no_mean() -> None:
+    weights = [1.0] * 40
+    weights[12:14] = [0.0, 0.0]
+    assert batch_interval([2.0] * 40, weights, 2.0, 0.95) is None
+    weights[12] = 1.0
+    assert batch_interval([2.0] * 40, weights, 2.0, 0.95) is not None
 
 
 def is_covered(outcome: Outcome, truth: float) -> bool:

@@ -6,7 +6,6 @@ import time
 
 import pytest
 
-from epicycle.runner.commands.run import outlook
 from epicycle.runner.engine import SLOWEST, Pace, Simulation
 from tests.engine.engine_parts import Plan, load
 
@@ -89,16 +88,3 @@ def test_a_wait_of_years_is_slept_in_pieces() -> None:
     pace.wait_for(0)
     pace.wait_for(100_000)  # ns, of which one takes a second
     assert slept == [3_600.0] * 27 + [2_800.0]
-
-
-def test_a_run_that_will_take_long_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
-    now = 0.0
-    look = outlook(1.0, lambda: now)
-    look(0.0)
-    now = 6.0
-    look(0.001)
-    look(0.002)
-    assert capsys.readouterr().err == (
-        "after 6 s the run is at 0.001 s of 1 s: at this pace it takes 1.7 h more; Ctrl-C ends it, "
-        "and what was recorded is kept\n"
-    )

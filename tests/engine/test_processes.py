@@ -248,3 +248,35 @@ def test_an_exception_in_a_process_of_simpys_alone(monkeypatch: pytest.MonkeyPat
     assert message == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
     assert at.startswith("   raised at ")
     assert line[carets.index("^") :] == 'raise KeyError("lost")'
+
+
+def test_an_exception_in_a_callback_of_simpys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SimPy hands it on as it is, where that of a generator is a copy with a cause."""
+
+    def begin(actor: Plan) -> None:
+        actor.context.environment.timeout(5).callbacks.append(lambda event: {}["lost"])
+
+    monkeypatch.setattr(Plan, "begin", begin)
+    with pytest.raises(ActorError) as caught:
+        simulate("actors: {a: {type: Plan}}")
+    told = str(caught.value).splitlines()[0]
+    assert told == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
+
+
+def test_a_process_is_halted_in_the_step_in_which_what_it_waits_for_happens(behave: Callable[..., Results]) -> None:
+    """Two wait for the same event; the first one that goes on ends the other."""
+    both: list[Script] = []
+
+    def behaviour(actor: Script) -> Generator[Any, Any, None]:
+        if not both:
+            shared.append(actor.environment.timeout(5))
+        both.append(actor)
+        yield shared[0]
+        [other] = [each for each in both if each is not actor]
+        other.halt()
+        other.halt()  # it is over
+        actor.output.send(actor.path)
+
+    shared: list[Any] = []
+    results = behave(behaviour, "actors: {a: {type: Script}, b: {type: Script}}")
+    assert [token for *_, token in sends(results)] == ["a"]

@@ -4,13 +4,15 @@ cosmic-ray makes the mutants: it turns + into -, < into <=, 2 into 1, leaves out
 lives in a copy of the project, never in the working tree; the tests that run its line are run, those first that run
 little else, until one fails.  Kernels are mutated with numba switched off: to compile one anew takes half a minute.
 
-``survivors.yaml`` holds those of earlier runs that were looked at, each with the reason why no test notices it.
+``survivors.yaml`` holds those of earlier runs that were looked at, each with the reason why no test notices it.  Those
+of them that are equivalent to what was there cannot be killed: the score without them is told beside the plain one.
 The session lies in ``.mutants/session.sqlite``, as cosmic-ray's own tools read it (``cr-report``, ``cr-html``).
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import multiprocessing
 import os
 import shutil
@@ -233,8 +235,16 @@ def note(database: Path, results: Iterable[Result]) -> None:
             db.set_result(str(number), WorkResult(WorkerOutcome.NORMAL, by, outcome, diff))
 
 
-def report(results: Sequence[Result]) -> float:
-    """Print survivors and scores; the share that was killed."""
+def is_below(threshold: float, killed: int, number: int) -> bool:
+    """Whether so few were killed that one is 95 % sure of a smaller share than the threshold: samples differ."""
+    chances = (
+        math.comb(number, each) * threshold**each * (1.0 - threshold) ** (number - each) for each in range(killed + 1)
+    )
+    return math.fsum(chances) < 0.05
+
+
+def report(results: Sequence[Result]) -> tuple[int, int]:
+    """Print survivors and scores; how many were killed, of how many that are not known to be equivalent."""
     known = argued()
     by_folder: dict[str, Counter[bool]] = defaultdict(Counter)
     kinds: Counter[str] = Counter()
@@ -254,9 +264,10 @@ def report(results: Sequence[Result]) -> float:
     print(f"{'all':16} {killed:5} of {len(results):5} killed, {killed / len(results):6.1%}")
     told = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
     print(f"survivors: {told or 'none'}")
-    if equivalent := kinds["equivalent"]:
-        print(f"without the equivalent ones: {killed / (len(results) - equivalent):.1%}")
-    return killed / len(results)
+    number = len(results) - kinds["equivalent"]
+    if number < len(results):
+        print(f"without those that are equivalent: {killed:,} of {number:,}, {killed / number:.1%}")
+    return killed, number
 
 
 def main() -> int:
@@ -264,7 +275,7 @@ def main() -> int:
     options.add_argument("--count", type=int, default=200, help="mutants to try")
     options.add_argument("--seed", type=int, default=0, help="of the sample")
     options.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    options.add_argument("--threshold", type=float, default=0.9, help="exit code 1 if a smaller share is killed")
+    options.add_argument("--threshold", type=float, default=0.9, help="exit code 1 if surely less are killed")
     options.add_argument("--map", type=Path, help="keep which tests run what in this file, or take it from there")
     options.add_argument("--only", default="", help="mutants of files that begin so")
     given = options.parse_args()
@@ -304,9 +315,9 @@ def main() -> int:
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     note(CACHE / "session.sqlite", results.values())
-    share = report(list(results.values()))
+    killed, number = report(list(results.values()))
     print(f"{time.monotonic() - began:.0f} s")
-    return int(share < given.threshold)
+    return int(is_below(given.threshold, killed, number))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("cosmic_ray")
 
 from tests.mutation import mutants, recorder, trial
-from tests.mutation.__main__ import attempt, stages
+from tests.mutation.__main__ import Result, argued, attempt, is_below, report, stages
 from tests.mutation.mutants import Mutant
 
 SOURCE = '''"""A file."""
@@ -105,3 +105,30 @@ def test_what_dies_or_hangs_has_failed(project: Path) -> None:
     assert trial.run_tests(project, ["tests/test_ends.py::test_dies"], True, 5.0)[:2] == (False, "died")
     hung = trial.run_tests(project, ["tests/test_ends.py::test_hangs"], True, 0.5)
     assert hung[:2] == (False, "ended by signal 24")
+
+
+def test_what_cannot_be_killed_does_not_count(capsys: pytest.CaptureFixture[str]) -> None:
+    known, *_ = [entry for entry in argued().values() if entry["kind"] == "equivalent"]
+    place = Mutant(known["file"], 3, 1, "some", 0, "")
+    results = [
+        Result(place, True, "a test", 1, 0.1, "a", "b"),
+        Result(place, False, "", 2, 0.1, "a", "c"),
+        Result(place, False, "", 2, 0.1, known["from"], known["to"]),
+    ]
+    assert report(results) == (1, 2)
+    *told, folder, every, survivors, without = capsys.readouterr().out.splitlines()
+    assert sorted(told) == sorted(
+        [
+            *[f"{known['file']}:3: survived 2 tests"] * 2, "    - a", "    + c", "    not looked at yet",
+            f"    - {known['from']}", f"    + {known['to']}", f"    equivalent: {known['why']}", "",
+        ]
+    )  # fmt: skip
+    assert folder == f"{'actors/core':16}     1 of     3 killed,  33.3%"
+    assert every == f"{'all':16}     1 of     3 killed,  33.3%"
+    assert survivors == "survivors: 1 equivalent, 1 new"
+    assert without == "without those that are equivalent: 1 of 2, 50.0%"
+
+
+def test_a_sample_may_be_a_little_worse_than_the_whole() -> None:
+    assert [is_below(0.9, killed, 200) for killed in (200, 180, 173, 172, 150)] == [False, False, False, True, True]
+    assert not is_below(0.9, 0, 1)

@@ -157,6 +157,14 @@ def test_noise_is_an_ellipse_along_the_line_of_sight() -> None:
     assert both[1].tolist() == [a, 0.0, 0.0]
 
 
+def test_sigma_points_of_what_rounding_has_spoilt_are_finite() -> None:
+    """A correlation just above 1: its smaller eigenvalue counts as none."""
+    covariance = np.array([[1.0, 1.0 + 1e-9], [1.0 + 1e-9, 1.0]])
+    points, _ = ukf.sigma_points(np.zeros(2), covariance, 0.0)
+    assert points[1:3] == pytest.approx(np.array([[np.sqrt(2.0), np.sqrt(2.0)], [0.0, 0.0]]), abs=1e-8)
+    assert (points[3:] == -points[1:3]).all()
+
+
 def test_no_measurement_changes_nothing() -> None:
     mean, covariance = ukf.update(*PRIOR, 0.0, np.empty((0, 7)), np.empty((0, 3)))
     assert (mean == PRIOR[0]).all()

@@ -366,6 +366,14 @@ def test_trajectory_starts_at_step_one(random: np.random.Generator) -> None:
     assert places[2] == pytest.approx(places[1] + 0.5 * (np.array([3.0, 4.0]) + 0.5 * controls[0]))
 
 
+def test_velocities_add_up_the_controls(random: np.random.Generator) -> None:
+    controls, velocity = random.normal(size=(6, 2)), np.array([3.0, -4.0])
+    places, velocities = np.empty((6, 2)), np.empty((6, 2))
+    horizon.roll_out(np.zeros(2), velocity, controls, 0.5, places, velocities)
+    assert velocities == pytest.approx(velocity + 0.5 * np.cumsum(np.vstack([np.zeros((1, 2)), controls[:-1]]), axis=0))
+    assert places[1:] == pytest.approx(0.5 * np.cumsum(velocities[:-1], axis=0))
+
+
 def test_tube_radius_in_steps_and_seconds() -> None:
     assert reachability.tube_radius(0.2, 0.4, 1.0, 10)[[0, 9]] == pytest.approx([0.6, 4.2])
     assert reachability.tube_radius(0.2, 0.4, 0.1, 10)[[0, 9]] == pytest.approx([0.24, 0.6])
@@ -423,6 +431,24 @@ def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, st
         expected = held.T @ np.linalg.solve(held @ hessian @ held.T, -held @ gradient)
         assert step.ravel() == pytest.approx(expected, rel=1e-8, abs=1e-10)
         assert descent == pytest.approx(gradient @ expected)
+
+
+@pytest.mark.parametrize("curvature", [(-1.0, 0.0, -2.0), (1.0, 2.0, 1.0), (np.nan, 0.0, 1.0)])
+def test_where_the_cost_of_controls_is_no_bowl_there_is_no_descent(curvature: tuple[float, float, float]) -> None:
+    flat, controls = np.zeros((3, 5)), np.array([[1.0, 1.0, 1.0, 0.0, 1.0]] * 3)
+    assert riccati(flat, flat, controls, 0.1)[0] < 0.0
+    controls[1, 2:] = curvature
+    assert riccati(flat, flat, controls, 0.1)[0] == 0.0
+
+
+def test_a_start_that_is_too_fast_on_the_way_is_left_out(random: np.random.Generator) -> None:
+    """It is slow enough at the end, and the plan is to be so all the way."""
+    problem = crowded_problem(random)._replace(velocity=np.array([6.0, 0.0]))
+    fast = np.zeros((10, 2))
+    fast[:4, 0], fast[4:, 0] = 7.0, -7.0  # 8.8 m/s after the fourth, and 4.6 at the end
+    found = solve(problem, fast)
+    assert found.controls[:, 0].max() < 0.0
+    assert (found.objective, found.iterations) == (np.inf, 0)
 
 
 @numba.njit

@@ -165,17 +165,23 @@ def test_damaged_table(copied: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+@pytest.mark.parametrize("kind", ["named pipe", "device"])
 @pytest.mark.parametrize("name", ["parts/x.parquet", "journals/x.jsonl", "manifest.json", "lock", "table.parquet"])
-def test_pipes_hold_nobody_up(name: str, copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_pipes_and_devices_hold_nobody_up(
+    name: str, kind: str, copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = Path("out") / name
     path.unlink(missing_ok=True)
-    os.mkfifo(path)
-    said = f"error: out/{name} cannot be read: it is a named pipe, not a regular file\n"
+    if kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        os.mkfifo(path)
+    said = f"error: out/{name} cannot be read: it is a {kind}, not a regular file\n"
     said = {"lock": "", "table.parquet": "", "manifest.json": f"{said}{ANEW}\n"}.get(name, f"{said}{HELP}\n")
     assert main(["status", "out"]) == (2 if said else 0)
     assert capsys.readouterr().err == said
     if name == "lock":
-        with pytest.raises(StoreError, match=r"^out/lock is a named pipe, not a regular file: delete it$"):
+        with pytest.raises(StoreError, match=rf"^out/lock is a {kind}, not a regular file: delete it$"):
             run_study(plan_of(copied / "walks.yaml"), Path("out"), jobs=1)
         return
     outcome = run_study(plan_of(copied / "walks.yaml"), Path("out"), jobs=1)

@@ -12,7 +12,7 @@ from epicycle.runner.cli import main
 from epicycle.runner.study import run_study
 from epicycle.runner.study.plan import Plan
 from epicycle.runner.study.store import read_manifest
-from tests.study.study_parts import MODEL, STUDY, THIS, plan_of, write
+from tests.study.study_parts import MODEL, STUDY, plan_of, write
 
 UNITS = MODEL.replace("{of: walk.output, take: last}", "{of: walk.output, take: last, unit: m, doc: where it ends}")
 METRICS = """
@@ -68,8 +68,7 @@ def test_parquet_says_what_the_columns_are(folder: Path) -> None:
 
 
 def test_report_shows_the_units(folder: Path) -> None:
-    arguments = ["study", str(folder / "walks.yaml"), "--types", str(THIS), "--out", str(folder / "out"), "--jobs", "1"]
-    assert main(arguments) == 0
+    run_study(plan_of(folder / "walks.yaml"), folder / "out", jobs=1)
     assert main(["report", str(folder / "out")]) == 0
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     for heading in ("in km (km)", "highest (cm)", "speed (km/h)", "place (m)"):
@@ -80,10 +79,17 @@ def test_report_shows_the_units(folder: Path) -> None:
 def test_another_unit_makes_other_runs(folder: Path) -> None:
     before = plan_of(folder / "walks.yaml").condition(0).key
     path = folder / "walks.yaml"
-    path.write_text(path.read_text().replace("to: cm", "to: mm"))
-    assert plan_of(path).condition(0).key != before
-    path.write_text(path.read_text().replace("unit: m, to: mm, ", ""))
-    assert plan_of(path).condition(0).key != before
+    for old, new in (("to: cm", "to: mm"), ("unit: m, to: mm, ", "")):
+        path.write_text(path.read_text().replace(old, new))
+        assert plan_of(path).condition(0).key != before
+
+
+def problems_of(path: Path, study: str) -> str:
+    """What is said about a study."""
+    path.write_text(study)
+    with pytest.raises(ModelError) as caught:
+        plan_of(path)
+    return str(caught.value).replace(f"{path.parent}/", "")
 
 
 def test_what_is_wrong_is_told(folder: Path) -> None:
@@ -98,10 +104,7 @@ metrics:
   f: {value: [place], docs: x}
 """
     study = STUDY[: STUDY.index("metrics:")] + metrics.lstrip()
-    path.write_text(study)
-    with pytest.raises(ModelError) as caught:
-        plan_of(path)
-    assert str(caught.value).replace(str(folder) + "/", "") == (
+    assert problems_of(path, study) == (
         "walks.yaml:13:3: error: metric 'e' has no value\n"
         "   13 |   e: {unit: m}\n"
         "      |   ^\n"
@@ -117,10 +120,7 @@ metrics:
         "   help: valid keys: value, unit, to, doc\n"
         "3 errors in walks.yaml"
     )
-    path.write_text("\n".join(line for line in study.splitlines() if not line.startswith(("  e:", "  f:"))))
-    with pytest.raises(ModelError) as caught:
-        plan_of(path)
-    assert str(caught.value).replace(str(folder) + "/", "") == (
+    assert problems_of(path, "\n".join(line for line in study.splitlines() if line[:4] not in ("  e:", "  f:"))) == (
         "walks.yaml:9:27: error: metric a: place counts in m, not in s\n"
         "    9 |   a: {value: place, unit: s}\n"
         "      |                           ^\n"

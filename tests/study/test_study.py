@@ -269,6 +269,28 @@ def test_progress_is_a_line_a_minute_without_a_terminal(
     ]
 
 
+def test_what_is_left_is_only_what_has_to_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study goes on with more replications: half of its runs are there, and not only in the beginning."""
+    plan = plan_of(write(tmp_path))
+    keys = [plan.key(plan.condition(each), one) for each in range(2) for one in range(5)]
+    there = {key: Done(OK) for key in (*keys[:2], *keys[5:8], "a run of another model")}
+    now = 1000.0
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: now)
+    schedule, pulse = Schedule(plan, there), progress_module.Pulse()
+    lines = []
+    while (task := schedule.next()) is not None:
+        now += 12.0
+        schedule.finished(task, Done(OK))
+        lines.append(pulse.line(schedule))
+    assert lines == [
+        "3 of 10 runs, 0.0833 runs/s, 48 s left",
+        "4 of 10 runs, 0.0833 runs/s, 36 s left",
+        "5 of 10 runs, 0.0833 runs/s, 24 s left",
+        "9 of 10 runs, 0.0833 runs/s, 12 s left",
+        "10 of 10 runs, 0.0833 runs/s, 0 s left",
+    ]
+
+
 # -- the folder -------------------------------------------------------------------------------------------------------
 
 

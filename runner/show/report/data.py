@@ -6,11 +6,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from epicycle.actors import abridged, visible
+
 from ...study import Plan, StudyResults
 from ...study.dimensions import Factor
 from ...study.schedule import OK
 
 MAX_LISTED = 12  # levels in a message
+MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level
 
 
 @dataclass
@@ -89,7 +92,7 @@ class Names:
 
     def words(self, column: str) -> str:
         """A column's name, to be read."""
-        return self._labels.get(column) or column.replace("_", " ")
+        return abridged(self._labels.get(column) or column.replace("_", " "), MAX_LABEL)
 
     def axis(self, column: str) -> str:
         """What stands at an axis: the name with its unit."""
@@ -113,7 +116,9 @@ def shown(value: Factor) -> str:
         return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, (int, float)):
+        return f"{value:g}" if isinstance(value, float) else str(value)
+    return abridged(visible(value), MAX_LEVEL)
 
 
 def _is_number(value: object) -> bool:

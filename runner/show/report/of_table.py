@@ -205,7 +205,9 @@ class Distributions(TableFigure):
             if found.lines:
                 handles[names.level(found.lines, line)] = Patch(facecolor=colour, alpha=0.5, edgecolor=colour)
         axes.set_xlim(-0.6, len(levels) - 0.4)
-        _texts_along(axes, [names.level("", level) if found.over else "" for level in levels])
+        every = -(-len(levels) // 16)
+        texts = [names.level("", level) if found.over else "" for level in levels[::every]]
+        _texts_along(axes, range(0, len(levels), every), texts)
         axes.set_xlabel(names.axis(found.over) if found.over else "")
         axes.set_ylabel(fill(names.axis(metric), 30))
         axes.grid(axis="x", visible=False)
@@ -297,14 +299,11 @@ class _Axis:
         """Ticks where levels are, if they are few."""
         places = self.given()
         if len(places) <= 12:
-            axes.set_xticks(places, self._texts)
+            _texts_along(axes, places, self._texts)
         if not self.is_numeric:
             axes.set_xlim(-0.5, len(places) - 0.5)
 
 
-def _texts_along(axes: Any, texts: Sequence[str]) -> None:
-    every = -(-len(texts) // 16)
+def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str]) -> None:
     turned = max(map(len, texts), default=0) * len(texts) > 60
-    axes.set_xticks(
-        range(0, len(texts), every), texts[::every], rotation=30 if turned else 0, ha="right" if turned else "center"
-    )
+    axes.set_xticks(places, texts, rotation=30 if turned else 0, ha="right" if turned else "center")

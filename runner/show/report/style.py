@@ -82,9 +82,7 @@ class Sheet:
         for index, (axes, title) in enumerate(zip(self.axes, panels, strict=True)):
             letter = f"({chr(ord('a') + index)}) " if 1 < count <= 26 else ""
             if letter or title:
-                axes.set_title(
-                    fill(f"{letter}{title}", _LONGEST.get(self.columns, 22), break_long_words=False), loc="left"
-                )
+                axes.set_title(fill(f"{letter}{title}", _LONGEST.get(self.columns, 22)), loc="left")
 
     def call_axes(self, x: str, y: str) -> None:
         """Say what the axes are: below the panels that have nothing below them, and where rows begin."""

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, abridged
 
 from ...model import ModelError, Problems, describe, raised_at
 from ...study import StudyResults, plan_of_folder
@@ -18,6 +18,7 @@ from ...study.claims import ranked
 from ...study.replays import Replay, repeat
 from ...study.store import replace_file
 from ..drawing import FigureError
+from ..folder import MAX_NAME
 from .data import Data
 from .declared import figures_of_study
 from .figure import RunKey, SignalFigure, StudyFigure
@@ -93,7 +94,7 @@ def _picture(
     report: Report,
 ) -> Picture:
     """Draw one figure, or find out why it cannot be drawn."""
-    paths = [folder / f"{name}.{ending}" for ending in FORMATS]
+    paths = [folder / f"{abridged(name, MAX_NAME)}.{ending}" for ending in FORMATS]
     for path in paths:
         path.unlink(missing_ok=True)  # of an earlier report
     if isinstance(figure, SignalFigure) and failure:
