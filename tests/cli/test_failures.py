@@ -259,9 +259,9 @@ m.yaml:7:53: error: figure other: Histogram has no parameter 'bin', did you mean
       |                                                     ^^^
    help: valid parameters: signals, bins, label
 
-m.yaml:8:38: error: figure last: 'clock.out' is not recorded, did you mean 'clock.output'?
+m.yaml:8:37: error: figure last: 'clock.out' is not recorded, did you mean 'clock.output'?
     8 |   last: {type: Histogram, signals: [clock.out]}
-      |                                      ^^^^^^^^^
+      |                                     ^^^^^^^^^
    help: add it to 'record' in the run section
 3 errors in m.yaml"""
     with pytest.raises(ModelError) as caught:
