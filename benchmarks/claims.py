@@ -1,10 +1,10 @@
 """What a study says about its claims, as Markdown, for docs/paper.md.
 
-    python benchmarks/claims.py results/table_1 [--into docs/paper.md]
+    python benchmarks/claims.py results/table_1 [--into docs/paper.md [--place NAME]]
 
 Prints a table of the claims with their verdicts, and the guideline; or, where claims are judged for each level of
 something as in ``readings``, a table of verdicts by level.  ``--into`` puts it in the place of what stands between
-``<!-- STUDY: begin -->`` and ``<!-- STUDY: end -->`` in a file.
+``<!-- NAME: begin -->`` and ``<!-- NAME: end -->`` in a file, where NAME is that of the study if no other is given.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def about(results: StudyResults) -> str:
 
 
 def weakest(judgement: Judgement, finding: Finding | None) -> str:
-    """The comparison that speaks least for a claim."""
+    """The weakest comparison of a claim."""
     if finding is None or not finding.count:
         return "-"
     missing = f", {finding.missing} missing" if finding.missing else ""
@@ -86,7 +86,7 @@ def weakest(judgement: Judgement, finding: Finding | None) -> str:
 def claims(found: list[Judgement]) -> Iterator[str]:
     """One line for each claim."""
     counted = ["confirmed", "undecided", "reversed", "agreeing"]
-    yield from head(["claim", "", "verdict", *counted, "what speaks least for it"])
+    yield from head(["claim", "", "verdict", *counted, "weakest comparison"])
     for each in found:
         counts = (str(each.counts(outcome)) for outcome in (CONFIRMED, UNDECIDED, REVERSED))
         about_it = [each.name, each.claim.doc, f"**{each.verdict}**", *counts, str(each.agreeing)]
@@ -141,9 +141,9 @@ def text(results: StudyResults) -> str:
     return "\n\n".join(parts)
 
 
-def put(file: Path, study: str, block: str) -> bool:
+def put(file: Path, place: str, block: str) -> bool:
     """Write the block into its place in a file."""
-    begin, end = f"<!-- {study}: begin -->", f"<!-- {study}: end -->"
+    begin, end = f"<!-- {place}: begin -->", f"<!-- {place}: end -->"
     whole = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
     before = file.read_text(encoding="utf-8")
     after, count = whole.subn(lambda _: f"{begin}\n{block}\n{end}", before)
@@ -156,13 +156,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--into", type=Path, metavar="FILE")
+    parser.add_argument("--place", metavar="NAME")
     options = parser.parse_args()
     results = open_study(options.folder)
     block = text(results)
+    place = options.place or results.plan.study.name
     if options.into is None:
         print(block)
-    elif not put(options.into, results.plan.study.name, block):
-        print(f"{options.into} has no place for {results.plan.study.name}", file=sys.stderr)
+    elif not put(options.into, place, block):
+        print(f"{options.into} has no place for {place}", file=sys.stderr)
         return 1
     return 0
 

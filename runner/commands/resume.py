@@ -1,4 +1,4 @@
-"""go on with a study"""
+"""resume a study"""
 
 from __future__ import annotations
 

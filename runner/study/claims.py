@@ -104,7 +104,7 @@ class Judgement:
 
     @property
     def weakest(self) -> Finding | None:
-        """The comparison that speaks most against the claim, or least for it; None if there is none."""
+        """The weakest comparison, counted in standard errors for the claim; None if there is none."""
         return min(self.findings, key=lambda each: _support(self.claim, each), default=None)
 
     def as_dict(self) -> dict[str, Any]:

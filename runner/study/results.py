@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import xarray
 
-    from .claims import Judgement
+    from .claims import Judgement, Standing
     from .guideline import Recommendation
 
 TIMES = ("wall_time",)  # what is not the same each time
@@ -220,6 +220,12 @@ class StudyResults:
         from .claims import judge
 
         return judge(self, level)
+
+    def standings(self, level: float = LEVEL) -> list[Standing]:
+        """How much speaks for each level that claims are judged apart for, the best first."""
+        from .claims import ranked
+
+        return ranked(self.claims(level))
 
     def guideline(self, level: float = LEVEL) -> list[Recommendation]:
         """What the study's guideline recommends, at every combination of the factors that are not to be chosen."""

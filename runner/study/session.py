@@ -105,7 +105,7 @@ def manifest_of(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_folder(folder: Path) -> Plan:
-    """The plan of a results folder, to go on with.
+    """The plan of a results folder that is to be resumed.
 
     Raises ``StoreError`` if its model, or Epicycle, is not the same any more.
     """

@@ -66,7 +66,7 @@ def are_among(found: Iterable[dict[str, Any]], whole: dict[str, dict[str, Any]])
 
 
 def test_flipped_bits_are_told_or_repaired(done: Path, tmp_path: Path) -> None:
-    """300 bits, each in a folder of its own; some of the folders are gone on with."""
+    """300 bits, each in a folder of its own; some of the folders are resumed."""
     plan = plan_of(done / "walks.yaml")
     whole = {row["run"]: row for row in open_study(done / "out").table(times=True).to_pylist()}
     kept = {row["run"]: row for batch in Store(done / "out").rows() for row in batch.to_pylist()}

@@ -105,7 +105,7 @@ def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_a_cluster_of_its_own(tmp_path: Path) -> None:
-    """Interrupted in the middle, and gone on with."""
+    """Interrupted in the middle, and resumed."""
     write(tmp_path)
     out = tmp_path / "out"
     arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--set", "pause=0.5", "--out", out, "--jobs", 2)

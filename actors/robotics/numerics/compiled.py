@@ -57,7 +57,7 @@ def inlined(function: Function) -> Function:
 def _cache_of_these_sources() -> Iterator[None]:
     """Compiled code lies in a folder named after all sources of this package and of the elementary functions.
 
-    By itself numba looks only at the file of a kernel, and would go on with old code of what that calls from others.
+    By itself numba looks only at the file of a kernel, and would keep using old code that it calls from others.
     """
     config: Any = numba.config
     before = config.CACHE_DIR

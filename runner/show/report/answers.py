@@ -39,7 +39,7 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
             class_="note",
         )
     head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
-    head += ["agreeing", "what speaks most against it, or least for it"]
+    head += ["agreeing", "weakest comparison"]
     yield with_class(
         table(
             head,
