@@ -96,13 +96,13 @@ def claims(found: list[Judgement]) -> Iterator[str]:
 def by_level(found: list[Judgement]) -> Iterator[str]:
     """One line for each level of what the claims are judged for, the best first."""
     standings = ranked(found)
-    yield from head(["", "in means", "yes", "no", *(each.name for each in standings[0].judgements)])
+    yield from head(["", "no", "in means", "yes", *(each.name for each in standings[0].judgements)])
     for standing in standings:
         cells = []
         for each in standing.judgements:
             counts = "/".join(str(each.counts(outcome)) for outcome in (CONFIRMED, UNDECIDED, REVERSED))
             cells.append(f"{SHORT[each.verdict]} {counts}, {each.agreeing}")
-        numbers = [standing.in_means, standing.counts(REPRODUCED), standing.counts(NOT_REPRODUCED)]
+        numbers = [standing.counts(NOT_REPRODUCED), standing.in_means, standing.counts(REPRODUCED)]
         yield row([levels(standing.where), *map(str, numbers), *cells])
 
 

@@ -158,7 +158,7 @@ class Standing:
 def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
     """The levels that claims are judged apart for, the one that most speaks for first.
 
-    First counts how many claims hold in the means, then how many are reproduced, how few are not, and how much agrees.
+    First counts how few claims are refuted, then how many hold in the means, how many are reproduced, and what agrees.
     """
     apart: dict[tuple[Factor, ...], list[Judgement]] = {}
     for each in judgements:
@@ -166,7 +166,7 @@ def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
     standings = [Standing(found[0].where, tuple(found)) for found in apart.values()]
     return sorted(
         standings,
-        key=lambda each: (each.in_means, each.counts(REPRODUCED), -each.counts(NOT_REPRODUCED), each.agreeing),
+        key=lambda each: (-each.counts(NOT_REPRODUCED), each.in_means, each.counts(REPRODUCED), each.agreeing),
         reverse=True,
     )
 

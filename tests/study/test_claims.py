@@ -435,7 +435,7 @@ def test_claims_of_another_study_are_judged_at_each_level_of_what_it_has_not(que
         re.findall("<(?:th|td)[^>]*>(.*?)</(?:th|td)>", row) for row in re.findall("<tr>(.*?)</tr>", html, re.DOTALL)
     ]
     assert [[re.sub("<.*?>", "", cell) for cell in row] for row in rows] == [
-        ["variant", "claims in means", "reproduced", "not reproduced", "true_by_theory", "false_by_theory"],
+        ["variant", "not reproduced", "hold in the means", "reproduced", "true_by_theory", "false_by_theory"],
         ["usual", "1", "1", "1", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
         ["slow", "1", "1", "1", "reproduced1 of 1 agree", "not reproduced0 of 1 agree"],
     ]
@@ -454,30 +454,26 @@ def judged(where: str, *claims: tuple[str, float, int, int]) -> list[Judgement]:
 
 
 def test_the_level_that_most_speaks_for_comes_first() -> None:
-    """Claims in means count first, then those reproduced, then those not, then what agrees."""
+    """Refuted claims count first, then those that hold in the means, those reproduced, and what agrees."""
     every = [
-        *judged(
-            "two hold, little agrees", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 0.2, 2, 8), (NOT_REPRODUCED, 1.0, 0, 10)
-        ),
+        *judged("one is refuted", (REPRODUCED, 1.0, 10, 0), (REPRODUCED, 0.2, 2, 8), (NOT_REPRODUCED, 1.0, 9, 1)),
         *judged("less agrees", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 1.0, 5, 5), (UNDECIDED, 1.0, 9, 1)),
-        *judged("best", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 1.0, 10, 0), (NOT_REPRODUCED, 1.0, 9, 1)),
-        *judged("one is refuted", (REPRODUCED, 1.0, 10, 0), (NOT_REPRODUCED, 1.0, 9, 1), (UNDECIDED, 1.0, 9, 1)),
+        *judged("two hold", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 0.2, 2, 8), (UNDECIDED, 1.0, 0, 10)),
         *judged("more agrees", (REPRODUCED, 1.0, 10, 0), (UNDECIDED, 1.0, 9, 1), (UNDECIDED, 1.0, 9, 1)),
-        *judged("nothing decided", (UNDECIDED, 1.0, 10, 0), (UNDECIDED, 1.0, 10, 0), (UNDECIDED, 1.0, 9, 1)),
+        *judged("nothing decided", (UNDECIDED, 1.0, 10, 0), (UNDECIDED, 1.0, 9, 1), (UNDECIDED, 1.0, 9, 1)),
     ]
     assert [(each.where["variant"], each.in_means, each.counts(REPRODUCED)) for each in ranked(every)] == [
-        ("best", 2, 1),
-        ("two hold, little agrees", 2, 1),
-        ("nothing decided", 2, 0),
+        ("two hold", 2, 1),
         ("more agrees", 1, 1),
         ("less agrees", 1, 1),
-        ("one is refuted", 1, 1),
+        ("nothing decided", 1, 0),
+        ("one is refuted", 2, 2),
     ]
     assert ranked(every)[0].as_dict() == {
         "where": {"variant": "best"},
         "in_means": 2,
         "reproduced": 1,
-        "undecided": 1,
-        "not_reproduced": 1,
-        "agreeing": pytest.approx((1.0 + 1.0 + 0.9) / 3),
+        "undecided": 2,
+        "not_reproduced": 0,
+        "agreeing": pytest.approx((1.0 + 0.2 + 0.0) / 3),
     }

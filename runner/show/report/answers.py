@@ -34,8 +34,8 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
         yield tag("div", _by_level(data.names, judgements), class_="scroll")
         yield tag(
             "p",
-            "The best comes first: the most claims that hold in the means, by chance or not; then the most reproduced, "
-            "the fewest not reproduced, and the largest share of agreeing comparisons.",
+            "The best comes first: the fewest claims that are not reproduced; then the most that hold in the means, by "
+            "chance or not, the most that are reproduced, and the largest share of agreeing comparisons.",
             class_="note",
         )
     head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
@@ -82,13 +82,13 @@ def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
     standings = ranked(judgements)
     claims = [each.name for each in standings[0].judgements]
     return table(
-        [*map(names.axis, judgements[0].where), "claims in means", REPRODUCED, NOT_REPRODUCED, *claims],
+        [*map(names.axis, judgements[0].where), NOT_REPRODUCED, "hold in the means", REPRODUCED, *claims],
         [
             [
                 *map(shown, each.where.values()),
+                str(each.counts(NOT_REPRODUCED)),
                 str(each.in_means),
                 str(each.counts(REPRODUCED)),
-                str(each.counts(NOT_REPRODUCED)),
                 *map(_by_chance_or_not, each.judgements),
             ]
             for each in standings
