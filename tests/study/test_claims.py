@@ -470,7 +470,7 @@ def test_the_level_that_most_speaks_for_comes_first() -> None:
         ("one is refuted", 2, 2),
     ]
     assert ranked(every)[0].as_dict() == {
-        "where": {"variant": "best"},
+        "where": {"variant": "two hold"},
         "in_means": 2,
         "reproduced": 1,
         "undecided": 2,
