@@ -154,10 +154,12 @@ def progress(model: Model, until: float | None) -> Iterator[Callable[[float], No
             now = f"{task.completed:.1f}" if task.completed >= 1.0 else f"{task.completed:.3g}"
             return Text(f"{task.description} {now} s of model time")
 
-    latest = 0.0
+    latest = -math.inf
 
     def look(now: float) -> None:
         nonlocal latest
+        if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing of the run
+            watch.start()
         latest = now
 
     def judge() -> None:
@@ -169,7 +171,6 @@ def progress(model: Model, until: float | None) -> Iterator[Callable[[float], No
     # One step of the run may take for ever, so it is looked at from outside.
     watch = threading.Timer(PATIENCE, judge)
     watch.daemon = True
-    watch.start()
     try:
         with notices(terminal):
             if not terminal.is_terminal:

@@ -375,6 +375,8 @@ class Director:
         now: float = _START
         if pace is not None:
             pace.wait_for(now)
+        if progress is not None:
+            progress(now / 1e9)
         while True:
             upcoming: float = times[0] if times else math.inf
             is_of_simpy = environment.comes_by(upcoming)
