@@ -436,9 +436,9 @@ def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, st
 @pytest.mark.parametrize("curvature", [(-1.0, 0.0, -2.0), (1.0, 2.0, 1.0), (np.nan, 0.0, 1.0)])
 def test_where_the_cost_of_controls_is_no_bowl_there_is_no_descent(curvature: tuple[float, float, float]) -> None:
     flat, controls = np.zeros((3, 5)), np.array([[1.0, 1.0, 1.0, 0.0, 1.0]] * 3)
-    assert riccati(flat, flat, controls, 0.1)[0] < 0.0
+    assert riccati(flat, flat, controls, 0.1, 3)[0] < 0.0
     controls[1, 2:] = curvature
-    assert riccati(flat, flat, controls, 0.1)[0] == 0.0
+    assert riccati(flat, flat, controls, 0.1, 3)[0] == 0.0
 
 
 def test_a_start_that_is_too_fast_on_the_way_is_left_out(random: np.random.Generator) -> None:

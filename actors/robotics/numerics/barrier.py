@@ -48,6 +48,7 @@ from .typing import Array
 
 TOLERANCE = 1e-6  # m; violations below this count as none
 _SLACK = 1e-4  # m that an infeasible problem's bounds get, and that restoration goes beyond keeping a constraint
+_NEARLY = 1e-3  # m; a violation that may be all due to the barriers of f1 and f2
 _CENTRING = 0.1  # how far a start is moved towards braking before anything else
 _RESTORE_FROM, _RESTORE_TO = 0.1, 1e-7  # barrier parameters of restoration
 _RESTORE_ON = 1e-10  # where it goes on to if so little is left that the barriers of f1 and f2 may be all in the way
@@ -176,7 +177,7 @@ def _restore(task: Task) -> tuple[int, float]:
         for i in range(constraints.shape[0]):
             violation = max(0.0, constraints[i, VALUE])
             left += violation * violation
-        if last and excess <= _SLACK:
+        if last and excess <= _NEARLY:
             last, least = least == _RESTORE_ON, _RESTORE_ON
         if _is_hopeless(task, left):
             least = _ROUGH_TO * left
