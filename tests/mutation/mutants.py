@@ -25,6 +25,7 @@ KERNELS = ("actors/robotics/numerics/", "actors/core/elementary/")
 TOLERANCES = {
     "actors/robotics/numerics/warm_up.py": re.compile("[0-9]"),
     "actors/robotics/numerics/barrier.py": re.compile(r"^_?[A-Z][A-Z_]+ = "),
+    "actors/robotics/numerics/task.py": re.compile(r"^_?[A-Z][A-Z_]+ = "),
     "actors/robotics/numerics/newton.py": re.compile(r"^_?[A-Z][A-Z_]+ = "),
     "actors/robotics/casadi_solver.py": re.compile(r"^_?[A-Z][A-Z_]+ = |\"ipopt\.|\"max_iter|\"tol"),
 }
