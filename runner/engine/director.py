@@ -129,6 +129,7 @@ class Director:
         self.environment = Environment(initial_time=_START)
         self.seed = seed
         self.crowd = Crowd(limits.tokens)
+        self._on_their_way = 0  # tokens, to times and microsteps to come
         self._most_times = limits.times
         self.firings = 0
         self.present: Tag | None = None  # the tag that is being handled; None between, while SimPy does things
@@ -217,8 +218,11 @@ class Director:
         tag = Tag(now.time + delay, 1) if delay > 0 else Tag(now.time, now.microstep + 1)
         deliveries = self._to_come(tag).deliveries
         deliveries.append(self.hold(deliver, token))
+        self._on_their_way += 1
         if len(deliveries) > self.crowd.most:
             raise CrowdError(tag, self.crowd.most, "tokens that are on their way", self._who())
+        if self._on_their_way > self._most_times:
+            raise CrowdError(now, self._most_times, "tokens that are on their way, to all times", self._who())
 
     def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
         """``deliver(token)``, to be called later."""
@@ -315,6 +319,7 @@ class Director:
             self._begin(tag)
             for deliver in instant.deliveries:
                 deliver()
+            self._on_their_way -= len(instant.deliveries)
         while ready:
             turn = turns[heappop(ready)]
             turn.is_wanted = False

@@ -52,6 +52,19 @@ def test_duplicates_one_upon_the_other() -> None:
     assert told == f"too much at (0 s, 3): {most}; {RAISE_IT}"
 
 
+def test_duplicates_that_come_apart_in_time() -> None:
+    """No tag holds much then, and no time is far away."""
+    stack = "".join(
+        f"  d{n}: {{type: Duplicate, probability: 1, copies: 1000, spacing: 1 ns, at: r.input}}\n" for n in range(6)
+    )
+    told = failure(
+        "actors:\n  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\n"
+        f"aspects:\n{stack}"
+    )
+    most = "more than 50,000 tokens that are on their way, to all times, most of them at aspect d4"
+    assert told == f"too much at (2e-09 s, 1): {most}; {RAISE_IT}"
+
+
 class Leaver(Actor):
     """Wants to end the program."""
 
