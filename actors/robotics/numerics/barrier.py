@@ -281,6 +281,7 @@ def _solve(*fields: Any) -> tuple[Array, float, float, int]:
     for s in range(plan.shape[0]):
         plan[s, TAKEN], plan[s, TAKEN + 1] = best[s, 0], best[s, 1]
     if least > 0.0 and rules.infeasible == LEAST_VIOLATION:
+        excess_of(task)  # drives it: what was tried last may be another start
         taken, objective = 0, objective_of(task, 0.0)
     else:
         taken, objective = _optimise(task, rules.gap, rules.last_parameter)
