@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from heapq import heappop, heappush
-from typing import Any
+from typing import Any, NoReturn
 
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake, readable
 from epicycle.aspects import Job
@@ -363,6 +363,14 @@ class Director:
                 port.clear()
             for port in turn.later:
                 port.release()
+
+    def interrupt(self) -> None:
+        """Raise ``KeyboardInterrupt`` in the place of the next firing, or of the next instant."""
+
+        def raise_it(_: Any) -> NoReturn:
+            raise KeyboardInterrupt
+
+        vars(self)["fire"] = vars(self.environment)["comes_by"] = raise_it
 
     def run(
         self,

@@ -6,16 +6,14 @@ import csv
 import io
 import json
 import logging
-import signal
-import threading
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from ..columns import numbers, texts
+from .interrupt import held
 from .log import COLUMNS, LogError, Record
 
 FORMATS = (".parquet", ".csv", ".jsonl")
@@ -52,11 +50,11 @@ class LogFile:
         """Append a record."""
         self._rows.append(record.row())
         if len(self._rows) >= _ROWS:
-            with _undisturbed():
+            with held():
                 self._flush()
 
     def __exit__(self, *raised: object) -> None:
-        with _undisturbed():
+        with held():
             self._flush()
             try:
                 self._close()
@@ -92,22 +90,6 @@ def write_log(records: Iterable[Record], path: Path) -> None:
     with LogFile(path) as file:
         for record in records:
             file.add(record)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let Ctrl-C wait, which would leave half a line or a broken file."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    arrived: list[object] = []
-    before = signal.signal(signal.SIGINT, lambda *_: arrived.append(_))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if arrived:
-        raise KeyboardInterrupt
 
 
 # -- formats: what writes many rows, and what ends the file -----------------------------------------------------------

@@ -36,7 +36,8 @@ class Signal:
     def __init__(self, name: str, tags: Iterable[Tag] = (), tokens: Iterable[Any] = ()) -> None:
         self.name = name
         # Tags, and tokens that are all floats or all ints, are kept as the numbers that they are: about 20 bytes for
-        # both together, where a tag and a float as objects take 130.
+        # both together, where a tag and a float as objects take 130.  Ctrl-C may come between any two of these lines:
+        # a token is there when its microstep is, which is added last.
         self._times = array("q")
         self._microsteps = array("i")
         self._tokens: Any = array("d")
@@ -72,15 +73,14 @@ class Signal:
     @property
     def tokens(self) -> list[Any]:
         """What was sent."""
-        found: list[Any] = self._tokens if self._kind is None else self._tokens.tolist()
-        return found
+        return list(self._tokens[: len(self)])
 
     def __iter__(self) -> Iterator[tuple[Tag, Any]]:
         """Each token with its tag, of which there may be more than fit into memory all at once."""
-        return zip(map(Tag, self._times, self._microsteps), self._tokens, strict=True)
+        return zip(map(Tag, self._times, self._microsteps), self._tokens, strict=False)
 
     def __len__(self) -> int:
-        return len(self._times)
+        return len(self._microsteps)
 
     @property
     def times(self) -> NDArray[np.float64]:

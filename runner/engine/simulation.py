@@ -12,6 +12,7 @@ from epicycle.actors import Actor, EpicycleError, to_nanoseconds, to_seconds
 from ..collection import without_collection
 from ..model import Model, WovenAspect, describe, raised_at
 from .director import ActorError, Director
+from .interrupt import between_steps
 from .local import Deliver
 from .log import EventLog, Record
 from .log_filter import LogFilter
@@ -135,7 +136,8 @@ class Simulation:
             self._wiring.begin()
             # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
             self._wiring.open()
-            stopped = director.run(stop, actors, progress, pace)
+            with between_steps(director.interrupt):
+                stopped = director.run(stop, actors, progress, pace)
         except ActorError as error:
             raise self._placed(error) from _cause(error)
         finally:

@@ -1,0 +1,67 @@
+"""Ctrl-C, held back until nothing is half done."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Any
+
+_PATIENCE = 0.2  # s
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """Let Ctrl-C wait, which would leave half a line or a broken file."""
+    before = _handler()
+    if before is None:
+        yield
+        return
+    arrived: list[tuple[Any, Any]] = []
+    signal.signal(signal.SIGINT, lambda *given: arrived.append(given))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if arrived:
+        before(*arrived[0])
+
+
+@contextmanager
+def between_steps(interrupt: Callable[[], None]) -> Iterator[None]:
+    """Make Ctrl-C end a run between two of its steps, so that what was recorded and counted is whole.
+
+    ``interrupt`` sees to it that the next step raises ``KeyboardInterrupt`` instead.  A step that takes longer than
+    0.2 s is broken off where it is.
+    """
+    before = _handler()
+    if before is not signal.default_int_handler:  # somebody has taken Ctrl-C for something else
+        yield
+        return
+    again = partial(signal.pthread_kill, threading.get_ident(), signal.SIGINT)
+    late = threading.Timer(_PATIENCE, again)
+    late.daemon = True
+
+    def handle(number: int, frame: Any) -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        interrupt()
+        late.start()
+
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    finally:
+        late.cancel()
+        with suppress(KeyboardInterrupt, RuntimeError):  # that is coming just now; it was not started
+            late.join()
+        signal.signal(signal.SIGINT, before)
+
+
+def _handler() -> Callable[[int, Any], Any] | None:
+    """What handles Ctrl-C, if that may be changed here."""
+    if threading.current_thread() is not threading.main_thread():
+        return None
+    handler = signal.getsignal(signal.SIGINT)
+    return handler if callable(handler) else None
