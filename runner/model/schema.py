@@ -22,10 +22,10 @@ from . import declarations as language
 from .catalogue import Catalogue
 from .limits import NORMAL
 from .measure import TAKES, Measure
-from .observation import MAX_SEED
 from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
 from .schema_parts import QUANTITY, TEXT, Schema, mapping, one_or_more, ref, text
 from .study_schema import STUDY_RULES, claim, dimension, study
+from .watch import MAX_SEED
 
 NAME = "[A-Za-z_][A-Za-z0-9_]*"
 EXPRESSION = r"\$\{"

@@ -25,6 +25,7 @@ from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
 from epicycle.runner.model import Problems, packaged_models
 from epicycle.runner.model import declarations as language
 from epicycle.runner.model.catalogue import Catalogue, built_in
+from epicycle.runner.model.connect import _ENDPOINT as ENDPOINT
 from epicycle.runner.model.document import parse, plain
 from epicycle.runner.model.indices import BadIndexError, resolve
 from epicycle.runner.model.load import model_folders
@@ -32,7 +33,6 @@ from epicycle.runner.model.patterns import PatternError, compile_pattern
 from epicycle.runner.model.schema import _BESIDE as BESIDE
 from epicycle.runner.model.schema import CONNECTION, PATTERN, QUANTITY, RULES, json_schema
 from epicycle.runner.model.schema import _value as value_schema
-from epicycle.runner.model.wiring import _ENDPOINT as ENDPOINT
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import study_figure_types
 from tests.bad_models.test_bad_models import CASES
