@@ -15,14 +15,13 @@ from epicycle.aspects import (
     class_decorations,
 )
 
+from ..text import RAISE_IT, Position, Problems, did_you_mean
 from .catalogue import Catalogue, CatalogueError
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .configuration import Configurator, place_of
 from .declarations import CompositeText, PartText, PointcutText
 from .decorated import arranged, weave_decorations
-from .limits import RAISE_IT
 from .patterns import TooManyError
-from .problems import Position, Problems, did_you_mean
 from .settings import Settings
 from .weave import Paths, Weaving
 from .woven import WovenAspect

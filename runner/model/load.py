@@ -9,19 +9,16 @@ from pathlib import Path
 from epicycle.actors import irregular
 
 from ..collection import without_collection
+from ..text import NORMAL, Limits, Problems, call_site, did_you_mean, node_of, read
+from ..text import Mapping as MappingNode
 from .catalogue import installed
 from .declarations import CompositeText, DeclarationReader, ModelText
 from .disturbance import add_disturbances, load_disturbances
-from .document import Mapping as MappingNode
-from .document import read
 from .elaborate import Elaborator
 from .inheritance import inherit
-from .limits import NORMAL, Limits
 from .model import Model
 from .packaged import find, model_folders, packaged_models
-from .problems import Problems, did_you_mean
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
-from .site import call_site, node_of
 from .trial import try_classes
 from .usage import check_usage
 

@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, to_nanoseconds, type_name
 
+from ..text import RAISE_IT, Node, Position, Problems, Scalar, Text, did_you_mean, plain
 from .declarations import DeclarationReader, MetricText, ModelText
-from .document import Node, Scalar, plain
-from .limits import RAISE_IT
 from .measure import Measure
 from .patterns import PathIndex, PatternError, TooManyError
-from .problems import Position, Problems, did_you_mean
-from .reading import Text
 from .values import Values
 
 if TYPE_CHECKING:

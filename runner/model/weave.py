@@ -22,12 +22,11 @@ from epicycle.aspects import (
     SelectionParameter,
 )
 
+from ..text import Position, Problems, Text, did_you_mean, nearest
 from .declarations import PointcutText
 from .firing_times import unknown_inputs
 from .graph import ModelGraph
 from .patterns import PathIndex, PatternError
-from .problems import Position, Problems, did_you_mean, nearest
-from .reading import Text
 from .woven import WovenAspect
 
 

@@ -24,10 +24,11 @@ from epicycle.actors import (
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
 from ...engine import Results
-from ...model import Model, Problems
+from ...model import Model
 from ...model.patterns import select
 from ...study import Plan
 from ...study.statistics import half_width
+from ...text import Problems
 from ..drawing import draw, figures_of
 from ..figures import Figure, positions
 from .data import Condition, Data
