@@ -123,7 +123,8 @@ def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) ->
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     """The model that the options describe; warnings are printed, or with ``strict`` raised."""
-    from ..model import ModelError, load_model
+    from ..model import load_model
+    from ..text import ModelError
 
     model = load_model(
         options.model,

@@ -15,12 +15,12 @@ import networkx as nx
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
+from ..text import Position, Problems, did_you_mean
 from .declarations import PartText, PointcutText
 from .draft import Draft
 from .firing_times import without_port
 from .graph import Detour, ModelGraph
 from .patterns import PathIndex
-from .problems import Position, Problems, did_you_mean
 from .settle import place_of
 from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect

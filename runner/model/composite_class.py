@@ -6,17 +6,14 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from ..text import Mapping, Position, Problems, Text, call_site, did_you_mean, entries_of, read
 from .catalogue import Catalogue, installed
 from .declarations import CompositeText, DeclarationReader, PartText
-from .document import Mapping, read
 from .draft import Draft
 from .inheritance import inherit
 from .load import find_library, included_composites
-from .problems import Position, Problems, did_you_mean
-from .reading import Text
 from .settings import Settings
 from .settle import Settler
-from .site import call_site, entries_of
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .weave_all import weave_all
 from .woven import WovenAspect

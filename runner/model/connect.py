@@ -9,14 +9,11 @@ from itertools import product
 
 from epicycle.actors import Actor, counted, declared_ports, has_own_ports
 
+from ..text import RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, within
 from .declarations import CompositeText, ConnectionText
-from .document import Scalar
 from .draft import Draft
 from .graph import ModelGraph
 from .indices import BadIndexError, resolve
-from .limits import RAISE_IT
-from .problems import Position, Problems, did_you_mean
-from .reading import Text, within
 from .settle import converted, nanoseconds
 from .values import Values
 

@@ -8,11 +8,10 @@ from dataclasses import replace
 from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import Aspect, Decoration, decorations
 
+from ..text import Position, Problems, Text
 from .declarations import PointcutText
 from .draft import Draft
 from .graph import ModelGraph
-from .problems import Position, Problems
-from .reading import Text
 from .weave import Paths, Weaving
 from .woven import WovenAspect
 

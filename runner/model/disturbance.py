@@ -8,16 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..text import Mapping, Node, Position, Problems, Scalar, node_of, read
 from .catalogue import installed
 from .declarations import DISTURBANCE_KEYS, CompositeText, DeclarationReader, ModelText, ParameterText
-from .document import Mapping, Node, Scalar, read
 from .draft import Draft
 from .inheritance import inherit
 from .packaged import find, packaged_disturbances
-from .problems import Position, Problems
 from .settings import Setting, Settings, put_aspect, settings_in
 from .settle import Settler
-from .site import node_of
 from .unfold import Known, Unfolded, Unfolding
 from .usage import check_own_usage
 from .weave_all import weave_all

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
+from ..text import ModelError, Position, Problem, Problems
 from .draft import Draft
-from .problems import ModelError, Position, Problem, Problems
 from .settle import drift, local_nanoseconds
 from .woven import WovenAspect
 

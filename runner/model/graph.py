@@ -16,9 +16,8 @@ import networkx as nx
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
 
+from ..text import NORMAL, Limits, Position
 from .clock import Clock
-from .limits import NORMAL, Limits
-from .problems import Position
 
 
 @dataclass(frozen=True, eq=False)

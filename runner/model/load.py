@@ -9,22 +9,19 @@ from pathlib import Path
 from epicycle.actors import counted_in_si, irregular, plain
 
 from ..collection import without_collection
+from ..text import NORMAL, Limits, Problems, call_site, did_you_mean, node_of, read
+from ..text import Mapping as MappingNode
 from .catalogue import installed
 from .checks import check
 from .declarations import CompositeText, DeclarationReader, ModelText
 from .disturbance import add_disturbances, load_disturbances
-from .document import Mapping as MappingNode
-from .document import read
 from .draft import Draft
 from .graph import ModelGraph
 from .inheritance import inherit
-from .limits import NORMAL, Limits
 from .model import Figure, Model
 from .packaged import find, model_folders, packaged_models
-from .problems import Problems, did_you_mean
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
 from .settle import Settler
-from .site import call_site, node_of
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .untried import try_classes
 from .usage import check_usage

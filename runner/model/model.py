@@ -9,20 +9,18 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..collection import without_collection
 from ..tables import Table, as_html, as_text, short
+from ..text import NAME, Position, Problem, Problems, Text, call_site, within
+from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .decorated import arranged
-from .document import Mapping as MappingNode
 from .draft import Draft
 from .ends import Port, mistake, raising
 from .graph import ModelGraph, is_within
 from .measure import take_problem
-from .problems import Position, Problem, Problems
-from .reading import NAME, Text, within
 from .schedule import firing_order
 from .scope import Composite, Scope
 from .settle import nanoseconds
-from .site import call_site
 from .values import Values
 from .watch import Metric, Watched, Watching, checked_seed
 from .woven import WovenAspect, check_processors

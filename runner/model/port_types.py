@@ -15,9 +15,8 @@ import numpy as np
 from epicycle.actors import declared_ports, shaped
 from epicycle.aspects import Request
 
+from ..text import did_you_mean, split
 from .catalogue import Catalogue
-from .problems import did_you_mean
-from .reading import split
 
 BUILT_IN: dict[str, Any] = {
     "any": Any,

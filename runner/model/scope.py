@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
+from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
 from .composite_aspect import ModelWeaving, check_nesting
 from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
 from .declarations import ConnectionText, DeclarationReader, PointcutText
 from .decorated import weave_decorations
-from .document import Scalar
 from .draft import Draft
 from .ends import (
     CompositePort,
@@ -33,9 +33,6 @@ from .ends import (
     raising,
 )
 from .graph import ModelGraph
-from .problems import Position, Problems, did_you_mean
-from .reading import NAME, Text, within
-from .site import call_site, node_of
 from .values import Values
 from .weave import Paths, Weaving
 from .woven import WovenAspect

@@ -17,14 +17,11 @@ from epicycle.actors import (
     unknown_parameter,
 )
 
+from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, data_file, did_you_mean, nearest
 from .culprit import describe, raised_at
 from .declarations import CompositeText, PartText
-from .document import Entry, Mapping, Node
 from .draft import Draft
-from .files import data_file
-from .limits import RAISE_IT
 from .patterns import TooManyError
-from .problems import Position, Problems, did_you_mean, nearest
 from .settings import Setting, Settings
 from .values import Values
 

@@ -12,14 +12,13 @@ from typing import Any
 
 from epicycle.actors import Actor, Parameter
 
+from ..text import RAISE_IT, Position, did_you_mean
 from .catalogue import Catalogue, CatalogueError
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors
 from .declarations import CompositeText, PartText, PortText
 from .draft import Draft
-from .limits import RAISE_IT
 from .port_types import PortTypeError, read_type, token_types
-from .problems import Position, did_you_mean
 from .settle import Settler, converted, drift, local_nanoseconds
 
 MAX_DEPTH = 50

@@ -6,12 +6,11 @@ from collections.abc import Collection
 
 from epicycle.actors import counted
 
+from ..text import RAISE_IT, Limits, Problems
 from .checks import check
 from .declarations import CompositeText
 from .draft import Draft
 from .graph import ModelGraph
-from .limits import RAISE_IT, Limits
-from .problems import Problems
 from .settings import Settings
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding

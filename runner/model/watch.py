@@ -8,15 +8,12 @@ from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, type_name
 
+from ..text import RAISE_IT, Node, Position, Problems, Scalar, Text, did_you_mean, plain
 from .declarations import DeclarationReader, MetricText, ModelText
-from .document import Node, Scalar, plain
 from .draft import Draft
 from .graph import is_within
-from .limits import RAISE_IT
 from .measure import Measure
 from .patterns import PathIndex, PatternError, TooManyError
-from .problems import Position, Problems, did_you_mean
-from .reading import Text
 from .settle import converted, nanoseconds
 from .values import Values
 

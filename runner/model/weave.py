@@ -23,12 +23,11 @@ from epicycle.aspects import (
     SelectionParameter,
 )
 
+from ..text import Position, Problems, Text, did_you_mean, nearest
 from .declarations import PointcutText
 from .draft import Draft
 from .firing_times import unknown_inputs
 from .patterns import PathIndex, PatternError
-from .problems import Position, Problems, did_you_mean, nearest
-from .reading import Text
 from .woven import WovenAspect
 
 

@@ -13,13 +13,12 @@ from epicycle.aspects import (
     class_decorations,
 )
 
+from ..text import RAISE_IT, Position, did_you_mean
 from .catalogue import CatalogueError
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .declarations import PartText, PointcutText
 from .decorated import arranged, weave_decorations
-from .limits import RAISE_IT
 from .patterns import TooManyError
-from .problems import Position, did_you_mean
 from .settle import Settler, converted, place_of
 from .unfold import AspectToWeave, Known, Unfolded
 from .weave import Paths, Weaving

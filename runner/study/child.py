@@ -14,8 +14,7 @@ import threading
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..model import ModelError
-from ..model.files import noting
+from ..text import ModelError, noting
 from .executor import SENT, WorkerError
 from .one_run import Runner
 from .parcel import unpack

@@ -7,14 +7,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..model import Position, Problems, did_you_mean
 from ..model.declarations import STUDY_KEYS, STUDY_METRIC_KEYS, UNTIL_KEYS, DeclarationReader, PartText
 from ..model.disturbance import find_disturbance
-from ..model.document import Entry, Mapping, Node, Scalar, parse, read
 from ..model.packaged import find, is_path, packaged_disturbances, packaged_models, packaged_studies, unreadable
-from ..model.reading import NodeReader, is_empty
 from ..model.settings import Setting, parse_setting, settings_in
 from ..model.watch import MAX_SEED
+from ..text import Entry, Mapping, Node, NodeReader, Position, Problems, Scalar, did_you_mean, is_empty, parse, read
 from .dimensions import Dimension, Level, Listed
 from .metrics import StudyMetric, checked_metric
 from .questions import QuestionReader, Questions, without

@@ -12,10 +12,9 @@ from epicycle.actors import EpicycleError, Quantity, did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula, operand
 
 from ..engine import Results, Signal
-from ..model import Model, Position, Problems
-from ..model.document import Scalar
+from ..model import Model
 from ..model.measure import conversion_problem
-from ..model.reading import inside
+from ..text import Position, Problems, Scalar, inside
 
 ASPECTS, SIGNALS = "aspects", "signals"
 NUMBERS = ("end", "events", "firings")  # what else of the results an expression knows

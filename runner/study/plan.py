@@ -15,11 +15,10 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
-from ..model import Model, ModelError, Problems, did_you_mean, load_model
-from ..model.document import plain
-from ..model.files import Noted, noting
+from ..model import Model, load_model
 from ..model.own_types import types_of_file
 from ..model.settings import Setting
+from ..text import ModelError, Noted, Problems, did_you_mean, noting, plain
 from .columns import Column, columns_of
 from .declaration import RESERVED, Study, study_of_text
 from .dimensions import Factor, Level

@@ -6,12 +6,10 @@ from decimal import Decimal
 
 from epicycle.actors import UnitError, parse_unit, random_stream
 
-from ..model import Position
 from ..model.declarations import HYPERCUBE_KEYS, RANGE_KEYS
-from ..model.document import Entry, Mapping, Node, Sequence
-from ..model.reading import NodeReader, is_empty
 from ..model.settings import Setting, is_pattern, settings_in
 from ..model.watch import MAX_SEED
+from ..text import Entry, Mapping, Node, NodeReader, Position, Sequence, is_empty
 from .dimensions import Dimension, Level, Listed, Ranged, as_factor, in_si, kind_of, number_node, split_number
 
 MAX_LEVELS = 10**12  # of a range

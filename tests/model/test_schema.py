@@ -22,11 +22,10 @@ from epicycle.actors import (
 )
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
-from epicycle.runner.model import Problems, packaged_models
 from epicycle.runner.model import declarations as language
+from epicycle.runner.model import packaged_models
 from epicycle.runner.model.catalogue import Catalogue, built_in
 from epicycle.runner.model.connect import _ENDPOINT as ENDPOINT
-from epicycle.runner.model.document import parse, plain
 from epicycle.runner.model.indices import BadIndexError, resolve
 from epicycle.runner.model.load import model_folders
 from epicycle.runner.model.patterns import PatternError, compile_pattern
@@ -35,6 +34,7 @@ from epicycle.runner.model.schema import CONNECTION, PATTERN, QUANTITY, RULES, j
 from epicycle.runner.model.schema import _value as value_schema
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import study_figure_types
+from epicycle.runner.text import Problems, parse, plain
 from tests.bad_models.test_bad_models import CASES
 from tests.cases import Case
 from tests.model.model_parts import TYPES

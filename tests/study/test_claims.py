@@ -19,7 +19,6 @@ from scipy import stats
 
 from epicycle.runner import open_study
 from epicycle.runner.model.packaged import packaged_models
-from epicycle.runner.model.problems import Position
 from epicycle.runner.show.report import answers
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.study import Plan, Study, read_study, run_study
@@ -36,6 +35,7 @@ from epicycle.runner.study.claims import (
 from epicycle.runner.study.declaration import study_of_text
 from epicycle.runner.study.guideline import Recommendation, recommend
 from epicycle.runner.study.questions import Claim
+from epicycle.runner.text import Position
 
 HEAD = """
 study: s
