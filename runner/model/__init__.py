@@ -1,6 +1,19 @@
 """From YAML text to a checked model: document, declarations, elaboration, graph."""
 
-from ..text import NORMAL, RAISE_IT, Limits, ModelError, Position, Problem, Problems, did_you_mean, told_raised
+from ..catalogue import is_path, packaged_disturbances, packaged_models, packaged_studies
+from ..text import (
+    NORMAL,
+    RAISE_IT,
+    Limits,
+    ModelError,
+    PatternError,
+    Position,
+    Problem,
+    Problems,
+    did_you_mean,
+    select,
+    told_raised,
+)
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
 from .culprit import describe, raised_at
@@ -9,8 +22,6 @@ from .graph import Hop, ModelGraph, Wire
 from .load import load_model
 from .model import Model
 from .observation import Metric
-from .packaged import is_path, packaged_disturbances, packaged_models, packaged_studies
-from .patterns import PatternError, select
 from .schedule import firing_order
 from .scope import Composite
 from .woven import WovenAspect, extent

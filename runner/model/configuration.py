@@ -8,13 +8,10 @@ from pathlib import Path
 
 from epicycle.actors import Configurable, EpicycleError, ParameterError, declared_parameters, unknown_parameter
 
-from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, data_file, did_you_mean, nearest
+from ..language import CompositeText, Setting, Settings, Values
+from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, TooManyError, data_file, did_you_mean, nearest
 from .culprit import describe, raised_at
-from .declarations import CompositeText
 from .graph import ModelGraph
-from .patterns import TooManyError
-from .settings import Setting, Settings
-from .values import Values
 
 _INDEX = re.compile(r"\[(\d+|\*)\]")
 # What people may try to set, and how it is done.

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import Aspect, Decoration, decorations
 
+from ..language import PointcutText
 from ..text import Position, Problems, Text
-from .declarations import PointcutText
 from .graph import ModelGraph
 from .weave import Paths, Weaving
 from .woven import WovenAspect

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
+from ..language import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText, Values
 from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
 from .composite_aspect import ModelWeaving, check_nesting
-from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
 from .decorated import weave_decorations
 from .ends import (
     CompositePort,
@@ -32,7 +32,6 @@ from .ends import (
 )
 from .graph import Hop
 from .transaction import all_or_nothing
-from .values import Values
 from .weave import Paths, Weaving
 from .wiring import Child, Wiring
 from .woven import WovenAspect

@@ -22,11 +22,10 @@ from epicycle.aspects import (
     SelectionParameter,
 )
 
-from ..text import Position, Problems, Text, did_you_mean, nearest
-from .declarations import PointcutText
+from ..language import PointcutText
+from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, nearest
 from .firing_times import unknown_inputs
 from .graph import ModelGraph
-from .patterns import PathIndex, PatternError
 from .woven import WovenAspect
 
 

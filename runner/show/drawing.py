@@ -9,8 +9,7 @@ from epicycle.actors import EpicycleError, ParameterError, declared_parameters, 
 from ..engine import Results
 from ..model import Model, describe, raised_at
 from ..model.configuration import place_of
-from ..model.patterns import PatternError, select
-from ..text import Mapping, Position, Problems, Sequence, did_you_mean, plain, told_raised
+from ..text import Mapping, PatternError, Position, Problems, Sequence, did_you_mean, plain, select, told_raised
 from .canvas import plain_text
 from .figures import Figure
 

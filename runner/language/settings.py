@@ -11,22 +11,27 @@ from pathlib import Path
 from ..text import (
     NAME,
     NORMAL,
+    Comparisons,
     Entry,
     Limits,
     Mapping,
     Node,
+    PatternError,
     Position,
     Problems,
     Scalar,
     Sequence,
     Text,
+    check_pattern,
     did_you_mean,
+    matches,
+    names_asked,
+    names_of,
     parse,
     read,
     split,
 )
 from .declarations import ModelText, PartText, PointcutText
-from .patterns import Comparisons, PatternError, check_pattern, matches, names_asked, names_of
 
 
 @dataclass

@@ -9,6 +9,7 @@ from epicycle.actors import Parameter, ParameterError, UnitError, declared_param
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import FiringTime
 
+from ..catalogue import TAKES, Measure, take_problem
 from ..text import (
     NAME,
     SURE,
@@ -24,7 +25,6 @@ from ..text import (
     nearest,
     split,
 )
-from .measure import TAKES, Measure, take_problem
 
 MODEL_KEYS = (
     "model",
