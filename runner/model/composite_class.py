@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from ..catalogue import Catalogue, installed
@@ -50,7 +51,7 @@ class CompositeInstance:
         cls = self.composite
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which stands beside the parameters, as in a model file
-            part.priority = part.values.pop("priority").value
+            part = replace(part, priority=part.values.pop("priority").value)
         root = ModelText(CompositeText(model.name, position))
         for graph in (ModelGraph(), model.graph):  # the first one to see what is wrong
             problems = Problems()

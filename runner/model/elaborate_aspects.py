@@ -85,7 +85,7 @@ class AspectElaborator(Configurator):
         weaving = Weaving(self.graph, paths, name, cls, scope, self.problems)
         if is_model and name in self.graph.composites:
             weaving = ModelWeaving(self.graph, paths, name, name, scope, self.problems, part.position, cls)
-            part = replace(part, at=[self._timed(pointcut, name, scope, names) for pointcut in part.at])
+            part = replace(part, at=tuple(self._timed(pointcut, name, scope, names) for pointcut in part.at))
         is_enabled = name in self.graph.composites if is_model else self._is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)
@@ -93,11 +93,11 @@ class AspectElaborator(Configurator):
             self._blame(f"aspect {name}", error, part.position, scope)
             aspect = None
         if aspect is None:
-            weaving.select(part.at)  # for what is wrong with it
+            weaving.select(list(part.at))  # for what is wrong with it
             if isinstance(weaving, ModelWeaving):
                 self.graph.leave_open(name)
             return
-        woven = weaving.weave(aspect, part.at, partial(_position, part))
+        woven = weaving.weave(aspect, list(part.at), partial(_position, part))
         if isinstance(weaving, ModelWeaving):
             weaving.check(woven)
             weaving.connect(woven)

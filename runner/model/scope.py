@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
@@ -288,9 +289,9 @@ class Scope:
         else:
             sources = self._ends(source, position, problems)
             destinations = self._ends(destination, position, problems)
-            connection = ConnectionText(sources, destinations, position)
+            connection = ConnectionText(tuple(sources), tuple(destinations), position)
         if connection is not None and delay is not None:
-            connection.delay = node_of(delay, position)
+            connection = replace(connection, delay=node_of(delay, position))
         # A list that is empty connects nothing: there may be no robots.
         return connection if connection is not None and connection.sources and connection.destinations else None
 
@@ -404,9 +405,9 @@ class Scope:
         model, kind = self._model, CompositeAspect if firing_time is None else CompositeExecutionAspect
         composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
         with raising() as problems:
-            pointcuts = self._pointcuts(at, kind, position, problems)
-            for pointcut in pointcuts:
-                pointcut.firing_time = firing_time or 0.0
+            pointcuts = [
+                replace(each, firing_time=firing_time or 0.0) for each in self._pointcuts(at, kind, position, problems)
+            ]
             detour = ModelWeaving(model.graph, self._paths, full, composite.path, self.path, problems, position, kind)
             woven = detour.weave(kind(), pointcuts, lambda *_: position)
             detour.check(woven)
@@ -432,8 +433,7 @@ class Scope:
                 if path is not None:
                     here = path if path is end else path.removeprefix(self._full(""))
                     pointcut = PointcutText.of(Text(here, within(Text(here, position), here)))
-                    pointcut.request = None if request is None else Text(request, position)
-                    found.append(pointcut)
+                    found.append(replace(pointcut, request=None if request is None else Text(request, position)))
         return found
 
     def _place(self, place: object, cls: type[Aspect], position: Position, problems: Problems) -> str | None:
