@@ -373,7 +373,7 @@ def test_figures_of_a_study_that_names_none(vary: str, figures: list[str], tmp_p
     problems = Problems()
     found = figures_of_study(plan, problems)
     assert list(found) == figures
-    assert [complaint for figure in found.values() for complaint in figure.check(plan)] == []
+    assert [complaint for figure in found.values() for complaint in figure.complaints(plan)] == []
     assert len(problems) == 0
 
 

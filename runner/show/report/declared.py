@@ -65,7 +65,7 @@ def figures_of_study(plan: Plan, problems: Problems) -> dict[str, StudyFigure]:
             )
         elif (figure := _made(name, cls, part, plan, problems)) is not None:
             found[name] = figure
-            for complaint in figure.check(plan):
+            for complaint in figure.complaints(plan):
                 _add(complaint, name, part, problems)
     return found
 

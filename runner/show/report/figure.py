@@ -52,7 +52,7 @@ class StudyFigure(Configurable):
         Parameter(str), {}, doc="what metrics and factors are called in it, without their units"
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
         """What is wrong with the figure in this study."""
         yield from unknown("where", list(self.where), list(plan.study.factors), "factor")
         for name, wanted in self.where.items():
