@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from epicycle.runner import StudyResults, open_study
+from epicycle.runner.language import ALWAYS
 from epicycle.runner.study.claims import (
     CONFIRMED,
     NOT_REPRODUCED,
@@ -29,7 +30,6 @@ from epicycle.runner.study.claims import (
     ranked,
 )
 from epicycle.runner.study.guideline import Recommendation
-from epicycle.runner.study.questions import ALWAYS
 
 SHORT = {REPRODUCED: "**yes**", NOT_REPRODUCED: "no", UNDECIDED: "open"}
 

@@ -64,8 +64,7 @@ def _actors(patterns: list[str], model: Model) -> dict[str, Actor]:
     """The actors that some patterns select, or that stand in composites that they select."""
     from epicycle.actors import EpicycleError
 
-    from ..model import PatternError, select
-    from ..text import did_you_mean
+    from ..text import PatternError, did_you_mean, select
 
     graph = model.graph
     known = [*graph.actors, *graph.composites]

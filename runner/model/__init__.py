@@ -1,6 +1,19 @@
 """From YAML text to a checked model: document, declarations, elaboration, graph."""
 
-from ..text import NORMAL, RAISE_IT, Limits, ModelError, Position, Problem, Problems, did_you_mean, told_raised
+from ..catalogue import is_path, packaged_disturbances, packaged_models, packaged_studies
+from ..text import (
+    NORMAL,
+    RAISE_IT,
+    Limits,
+    ModelError,
+    PatternError,
+    Position,
+    Problem,
+    Problems,
+    did_you_mean,
+    select,
+    told_raised,
+)
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
 from .culprit import describe, raised_at
@@ -8,8 +21,6 @@ from .ends import CompositePort, Instance
 from .graph import Hop, ModelGraph, Wire
 from .load import load_model
 from .model import Model
-from .packaged import is_path, packaged_disturbances, packaged_models, packaged_studies
-from .patterns import PatternError, select
 from .schedule import firing_order
 from .scope import Composite
 from .watch import Metric

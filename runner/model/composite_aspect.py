@@ -7,7 +7,7 @@ output ``response``, or its only output.  Which of several inputs takes the toke
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import networkx as nx
@@ -15,12 +15,11 @@ import networkx as nx
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
-from ..text import Position, Problems, did_you_mean
-from .declarations import PartText, PointcutText
+from ..language import PartText, PointcutText
+from ..text import PathIndex, Position, Problems, did_you_mean
 from .draft import Draft
 from .firing_times import without_port
 from .graph import Detour, ModelGraph
-from .patterns import PathIndex
 from .settle import place_of
 from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect
@@ -99,7 +98,7 @@ class ModelWeaving(Weaving):
             return woven
         return replace(woven, model=AspectModel(self.path, self.kind, self._response, self._asked, self._times))
 
-    def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         ports, connections, actors = super().select(pointcuts)
         actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
         # What was aimed at may be left out again, and of actors it is the composite around them.

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
+from ..catalogue import Catalogue, installed
+from ..language import (
+    CompositeText,
+    DeclarationReader,
+    PartText,
+    Settings,
+    find_library,
+    included_composites,
+    inherit,
+)
 from ..text import Mapping, Position, Problems, Text, call_site, did_you_mean, entries_of, read
-from .catalogue import Catalogue, installed
-from .declarations import CompositeText, DeclarationReader, PartText
 from .draft import Draft
-from .inheritance import inherit
-from .load import find_library, included_composites
-from .settings import Settings
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .weave_all import weave_all
@@ -47,7 +53,7 @@ class CompositeInstance:
         cls, problems = self.composite, Problems()
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which stands beside the parameters, as in a model file
-            part.priority = part.values.pop("priority").value
+            part = replace(part, priority=part.values.pop("priority").value)
         limits = draft.graph.limits
         made = Unfolded(draft.inside(draft.graph.director_of(path)), limits.actors)
         known, settler = Known(cls.composites, cls.catalogue), Settler(Settings(limits=limits), problems)

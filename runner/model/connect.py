@@ -9,13 +9,12 @@ from itertools import product
 
 from epicycle.actors import Actor, counted, declared_ports, has_own_ports
 
+from ..language import CompositeText, ConnectionText, Values
 from ..text import RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, within
-from .declarations import CompositeText, ConnectionText
 from .draft import Draft
 from .graph import ModelGraph
 from .indices import BadIndexError, resolve
 from .settle import converted, nanoseconds
-from .values import Values
 
 _ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
 

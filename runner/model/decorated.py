@@ -8,8 +8,8 @@ from dataclasses import replace
 from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import Aspect, Decoration, decorations
 
+from ..language import PointcutText
 from ..text import Position, Problems, Text
-from .declarations import PointcutText
 from .draft import Draft
 from .graph import ModelGraph
 from .weave import Paths, Weaving

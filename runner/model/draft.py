@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import Actor, declared_ports, has_own_ports
 
+from ..text import could_be_within
 from .graph import ModelGraph
-from .patterns import could_be_within
 
 
 @dataclass

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from epicycle.actors import Stop, Tag, counted, declared_parameters
 
+from ..catalogue import take_problem
 from ..collection import without_collection
+from ..language import Values
 from ..tables import Table, as_html, as_text, short
 from ..text import NAME, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
@@ -17,11 +19,9 @@ from .decorated import arranged
 from .draft import Draft
 from .ends import Port, mistake, raising
 from .graph import ModelGraph, is_within
-from .measure import take_problem
 from .schedule import firing_order
 from .scope import Composite, Scope
 from .settle import nanoseconds
-from .values import Values
 from .watch import Metric, Watched, Watching, checked_seed
 from .woven import WovenAspect, check_processors
 

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
+from ..language import ConnectionText, DeclarationReader, PointcutText, Values
 from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
 from .composite_aspect import ModelWeaving, check_nesting
 from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
-from .declarations import ConnectionText, DeclarationReader, PointcutText
 from .decorated import weave_decorations
 from .draft import Draft
 from .ends import (
@@ -33,7 +34,6 @@ from .ends import (
     raising,
 )
 from .graph import ModelGraph
-from .values import Values
 from .weave import Paths, Weaving
 from .woven import WovenAspect
 
@@ -302,9 +302,9 @@ class Scope:
         else:
             sources = self._ends(source, position, problems)
             destinations = self._ends(destination, position, problems)
-            connection = ConnectionText(sources, destinations, position)
+            connection = ConnectionText(tuple(sources), tuple(destinations), position)
         if connection is not None and delay is not None:
-            connection.delay = node_of(delay, position)
+            connection = replace(connection, delay=node_of(delay, position))
         # A list that is empty connects nothing: there may be no robots.
         return connection if connection is not None and connection.sources and connection.destinations else None
 
@@ -429,8 +429,7 @@ class Scope:
         kind = CompositeAspect if firing_time is None else CompositeExecutionAspect
         with raising() as problems:
             pointcuts = self._pointcuts(at, kind, draft.graph, position, problems)
-            for pointcut in pointcuts:
-                pointcut.firing_time = firing_time or 0.0
+            pointcuts = [replace(each, firing_time=firing_time or 0.0) for each in pointcuts]
             detour = ModelWeaving(draft, Paths(draft), full, path, self.path, problems, position, kind)
             woven = detour.weave(kind(), pointcuts, lambda *_: position)
             detour.check(woven)
@@ -456,8 +455,7 @@ class Scope:
                 if path is not None:
                     here = path if path is end else path.removeprefix(self._full(""))
                     pointcut = PointcutText.of(Text(here, within(Text(here, position), here)))
-                    pointcut.request = None if request is None else Text(request, position)
-                    found.append(pointcut)
+                    found.append(replace(pointcut, request=None if request is None else Text(request, position)))
         return found
 
     def _place(

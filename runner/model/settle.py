@@ -17,13 +17,10 @@ from epicycle.actors import (
     unknown_parameter,
 )
 
-from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, data_file, did_you_mean, nearest
+from ..language import CompositeText, PartText, Setting, Settings, Values
+from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, TooManyError, data_file, did_you_mean, nearest
 from .culprit import describe, raised_at
-from .declarations import CompositeText, PartText
 from .draft import Draft
-from .patterns import TooManyError
-from .settings import Setting, Settings
-from .values import Values
 
 _INDEX = re.compile(r"\[(\d+|\*)\]")
 # What people may try to set, and how it is done.

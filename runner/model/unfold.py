@@ -12,13 +12,12 @@ from typing import Any
 
 from epicycle.actors import Actor, Parameter
 
+from ..catalogue import Catalogue, CatalogueError, PortTypeError, read_type, token_types
+from ..language import CompositeText, PartText, PortText
 from ..text import RAISE_IT, Position, did_you_mean
-from .catalogue import Catalogue, CatalogueError
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors
-from .declarations import CompositeText, PartText, PortText
 from .draft import Draft
-from .port_types import PortTypeError, read_type, token_types
 from .settle import Settler, converted, drift, local_nanoseconds
 
 MAX_DEPTH = 50

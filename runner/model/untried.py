@@ -6,15 +6,13 @@ from collections.abc import Collection
 
 from epicycle.actors import counted
 
+from ..language import CompositeText, Settings, Values
 from ..text import RAISE_IT, Limits, Problems
 from .checks import check
-from .declarations import CompositeText
 from .draft import Draft
 from .graph import ModelGraph
-from .settings import Settings
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
-from .values import Values
 from .weave_all import weave_all
 
 _OVERHEAD = 3  # what a class takes beside what is in it, as many actors

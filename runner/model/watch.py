@@ -8,17 +8,27 @@ from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, type_name
 
-from ..text import RAISE_IT, Node, Position, Problems, Scalar, Text, did_you_mean, plain
-from .declarations import DeclarationReader, MetricText, ModelText
+from ..catalogue import Measure
+from ..language import DeclarationReader, MetricText, ModelText, Values
+from ..text import (
+    MAX_SEED,
+    RAISE_IT,
+    Node,
+    PathIndex,
+    PatternError,
+    Position,
+    Problems,
+    Scalar,
+    Text,
+    TooManyError,
+    did_you_mean,
+    plain,
+)
 from .draft import Draft
 from .graph import is_within
-from .measure import Measure
-from .patterns import PathIndex, PatternError, TooManyError
 from .settle import converted, nanoseconds
-from .values import Values
 
 # Larger seeds could not be told apart in the int64 columns of result files.
-MAX_SEED = 2**63 - 1
 
 
 @dataclass(frozen=True)

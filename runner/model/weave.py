@@ -9,7 +9,7 @@ at a composite for all the actors in it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -23,11 +23,10 @@ from epicycle.aspects import (
     SelectionParameter,
 )
 
-from ..text import Position, Problems, Text, did_you_mean, nearest
-from .declarations import PointcutText
+from ..language import PointcutText
+from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, nearest
 from .draft import Draft
 from .firing_times import unknown_inputs
-from .patterns import PathIndex, PatternError
 from .woven import WovenAspect
 
 
@@ -86,7 +85,7 @@ class Weaving:
         return self.cls.__name__
 
     def weave(
-        self, aspect: Aspect, pointcuts: list[PointcutText], position_of: Callable[..., Position | None]
+        self, aspect: Aspect, pointcuts: Sequence[PointcutText], position_of: Callable[..., Position | None]
     ) -> WovenAspect:
         """The aspect with its places and all that it looks at; a pointcut that selects nothing is a problem.
 
@@ -127,13 +126,13 @@ class Weaving:
         for message, keys, advice in unknown_inputs(woven, self.graph):
             self._problem(message, position_of(*keys), advice)
 
-    def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         """The ports, connections and actors that the pointcuts select."""
         if "actor" in self.cls.stands_at:
             return [], [], self._select_actors(pointcuts)
         return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
 
-    def _select_ports(self, pointcuts: list[PointcutText]) -> list[str]:
+    def _select_ports(self, pointcuts: Sequence[PointcutText]) -> list[str]:
         """The ports that the pointcuts select."""
         of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
@@ -293,7 +292,7 @@ class Weaving:
             return None
         return owners
 
-    def _select_actors(self, pointcuts: list[PointcutText]) -> dict[str, str]:
+    def _select_actors(self, pointcuts: Sequence[PointcutText]) -> dict[str, str]:
         """The actors that the pointcuts select, as such or with a composite around them, and what was aimed at."""
         index = self.paths.owners
         aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
@@ -354,7 +353,7 @@ class Weaving:
                 )
         return found
 
-    def _select_connections(self, pointcuts: list[PointcutText]) -> list[tuple[str, str]]:
+    def _select_connections(self, pointcuts: Sequence[PointcutText]) -> list[tuple[str, str]]:
         """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
         chosen: dict[tuple[str, str], None] = {}
         for pointcut in sorted(pointcuts, key=lambda each: each.exclude):

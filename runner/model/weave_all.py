@@ -13,12 +13,11 @@ from epicycle.aspects import (
     class_decorations,
 )
 
-from ..text import RAISE_IT, Position, did_you_mean
-from .catalogue import CatalogueError
+from ..catalogue import CatalogueError
+from ..language import PartText, PointcutText
+from ..text import RAISE_IT, Position, TooManyError, did_you_mean
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
-from .declarations import PartText, PointcutText
 from .decorated import arranged, weave_decorations
-from .patterns import TooManyError
 from .settle import Settler, converted, place_of
 from .unfold import AspectToWeave, Known, Unfolded
 from .weave import Paths, Weaving
@@ -79,7 +78,7 @@ class _Weaver:
         weaving = Weaving(self.draft, self.paths, name, cls, scope, self.problems)
         if is_model and name in self.graph.composites:
             weaving = ModelWeaving(self.draft, self.paths, name, name, scope, self.problems, part.position, cls)
-            part = replace(part, at=[self._timed(pointcut, name, scope, names) for pointcut in part.at])
+            part = replace(part, at=tuple(self._timed(pointcut, name, scope, names) for pointcut in part.at))
         is_enabled = name in self.graph.composites if is_model else self.settler.is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)

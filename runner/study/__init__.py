@@ -1,9 +1,9 @@
 """Studies: many runs of a model under many conditions, which survive whatever happens to them."""
 
-from .declaration import Study, find_study, is_study, read_study
+from ..language import Study, StudyMetric, find_study, is_study, read_study
 from .executor import WorkerError
 from .manifest import StoreError
-from .metrics import MetricError, StudyMetric
+from .metrics import MetricError
 from .plan import Condition, Plan
 from .results import StudyResults, open_study
 from .schedule import Schedule

@@ -19,9 +19,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import Formula
 
-from .dimensions import Factor
-from .metrics import asks_for_none
-from .questions import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
+from ..language import ALWAYS, FALLS, GREATER, RISES, Claim, Factor, Selection, asks_for_none
 from .samples import MISSING, Place, Samples
 from .statistics import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from epicycle.actors import declared_parameters, parse_unit
 
+from ..language import Dimension, StudyMetric, split_number
 from ..model import Model
-from ..model.patterns import select
-from .dimensions import Dimension, split_number
-from .metrics import StudyMetric
+from ..text import select
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from .dimensions import Factor
-from .questions import Guideline
+from ..language import Factor, Guideline
 from .samples import MISSING, Place, Samples
 from .statistics import LEVEL, Estimate, mean, paired_difference, resampled_sums
 

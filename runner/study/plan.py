@@ -15,14 +15,12 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
+from ..catalogue import types_of_file
+from ..language import RESERVED, Factor, Level, Setting, Study, StudyMetric, study_of_text
 from ..model import Model, load_model
-from ..model.own_types import types_of_file
-from ..model.settings import Setting
 from ..text import ModelError, Noted, Problems, did_you_mean, noting, plain
 from .columns import Column, columns_of
-from .declaration import RESERVED, Study, study_of_text
-from .dimensions import Factor, Level
-from .metrics import StudyMetric
+from .metrics import check_metric
 
 _LOGGER = logging.getLogger("epicycle")
 
@@ -102,11 +100,11 @@ class Plan:
                 if more := {name: digest for name, digest in found.items() if sources.get(name) != digest}:
                     extra[number][index] = more
         problems.raise_if_any()
-        metrics = study.metrics
-        if metrics is None:
+        metrics = list(study.metrics or ())
+        if study.metrics is None:
             metrics = [StudyMetric(metric.name, metric.name) for metric in read.models[0].metrics]
         for metric in metrics:
-            metric.check(read.models, problems)
+            check_metric(metric, read.models, problems)
             if study.metrics is None and (metric.name in RESERVED or metric.name in study.factors):
                 problems.add(
                     f"metric {metric.name!r} of the model has the name of another column of the table",

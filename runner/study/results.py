@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, counted, did_you_mean, read_regular
 
+from ..language import Factor
 from ..tables import pandas_module
-from .dimensions import Factor
 from .manifest import StoreError
 from .plan import Plan
 from .schedule import OK

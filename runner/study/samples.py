@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
 
-from .dimensions import Factor
-from .questions import Selection
+from ..language import Factor, Selection
 from .schedule import OK
 
 if TYPE_CHECKING:

@@ -14,13 +14,14 @@ import pytest
 
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
+from epicycle.runner.language import read_study
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.show.report.figure import layout, roles
 from epicycle.runner.show.report.numbers import rounded
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
-from epicycle.runner.study import Plan, StudyMetric, read_study
+from epicycle.runner.study import Plan, StudyMetric
 from epicycle.runner.study.columns import Column, si_unit
 from epicycle.runner.study.manifest import manifest_text
 from epicycle.runner.study.replays import Replay, ReplayError, repeat

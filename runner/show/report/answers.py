@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from epicycle.actors import counted
 
+from ...language import ALWAYS
 from ...study.claims import (
     CONFIRMED,
     NOT_REPRODUCED,
@@ -18,7 +19,6 @@ from ...study.claims import (
     ranked,
 )
 from ...study.guideline import Recommendation
-from ...study.questions import ALWAYS
 from .data import Data, Names, shown
 from .html import Content, Html, table, tag, with_class
 from .numbers import estimated, rounded

@@ -8,8 +8,8 @@ from typing import Any
 
 from epicycle.actors import abridged, visible
 
+from ...language import Factor
 from ...study import Plan, StudyResults
-from ...study.dimensions import Factor
 from ...study.schedule import OK
 
 MAX_LISTED = 12  # levels in a message

@@ -9,8 +9,8 @@ from typing import Any
 
 from epicycle.actors import counted
 
+from ...language import Factor
 from ...study.claims import Judgement
-from ...study.dimensions import Factor
 from ...study.guideline import Recommendation
 from ...study.statistics import mean
 from . import answers

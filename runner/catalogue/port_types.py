@@ -16,7 +16,7 @@ from epicycle.actors import declared_ports, shaped
 from epicycle.aspects import Request
 
 from ..text import did_you_mean, split
-from .catalogue import Catalogue
+from .types import Catalogue
 
 BUILT_IN: dict[str, Any] = {
     "any": Any,

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from epicycle.actors import Actor, declared_parameters
 from epicycle.actors.expression import ExpressionError, names_in
 
+from ..catalogue import CatalogueError
 from ..text import Entry, Node, Problems, Scalar, Sequence, nearest
-from .catalogue import CatalogueError
 from .declarations import CompositeText, ModelText, PartText
 
 _WORD = re.compile(r"[A-Za-z_]\w*")

@@ -12,7 +12,7 @@ from functools import cached_property, lru_cache
 
 from epicycle.actors import did_you_mean
 
-from ..text import NORMAL, Limits
+from .limits import NORMAL, Limits
 
 _SEGMENT = re.compile(r"(\*\*(?!\[)|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?\Z")
 
