@@ -1,21 +1,80 @@
-"""Studies: many runs of a model under many conditions, which survive whatever happens to them."""
+"""Studies: many runs of a model under many conditions, which survive whatever happens to them.
 
-from .declaration import Study, find_study, is_study, read_study
-from .executor import WorkerError
-from .manifest import StoreError
-from .metrics import MetricError, StudyMetric
-from .plan import Condition, Plan
-from .results import StudyResults, open_study
-from .schedule import Schedule
+``plan`` says what is to be run, ``run`` makes the runs and keeps what came of them, ``judge`` says what that means.
+"""
+
+from .inference import Estimate, half_width, mean
+from .judge import (
+    CONFIRMED,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    REVERSED,
+    UNDECIDED,
+    Finding,
+    Judgement,
+    Option,
+    Recommendation,
+    Standing,
+    StudyResults,
+    open_study,
+    ranked,
+)
+from .language import (
+    ALWAYS,
+    MAX_STUDY_SEED,
+    Dimension,
+    Factor,
+    MetricError,
+    Study,
+    StudyMetric,
+    find_study,
+    in_si,
+    is_study,
+    read_study,
+    split_number,
+)
+from .plan import Column, Condition, Plan
+from .run import (
+    OK,
+    Backlog,
+    Replay,
+    ReplayError,
+    StoreError,
+    WorkerError,
+    WriteError,
+    again,
+    is_running,
+    progress,
+    repeat,
+    replace_file,
+)
 from .session import Outcome, TooManyRunsError, available_cores, check_size, plan_of_folder, run_study
-from .store import WriteError
 
 __all__ = [
+    "ALWAYS",
+    "CONFIRMED",
+    "MAX_STUDY_SEED",
+    "NOT_REPRODUCED",
+    "OK",
+    "REPRODUCED",
+    "REVERSED",
+    "UNDECIDED",
+    "Backlog",
+    "Column",
     "Condition",
+    "Dimension",
+    "Estimate",
+    "Factor",
+    "Finding",
+    "Judgement",
     "MetricError",
+    "Option",
     "Outcome",
     "Plan",
-    "Schedule",
+    "Recommendation",
+    "Replay",
+    "ReplayError",
+    "Standing",
     "StoreError",
     "Study",
     "StudyMetric",
@@ -23,12 +82,22 @@ __all__ = [
     "TooManyRunsError",
     "WorkerError",
     "WriteError",
+    "again",
     "available_cores",
     "check_size",
     "find_study",
+    "half_width",
+    "in_si",
+    "is_running",
     "is_study",
+    "mean",
     "open_study",
     "plan_of_folder",
+    "progress",
+    "ranked",
     "read_study",
+    "repeat",
+    "replace_file",
     "run_study",
+    "split_number",
 ]

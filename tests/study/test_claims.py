@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,8 @@ from epicycle.runner.model.problems import Position
 from epicycle.runner.show.report import answers
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.study import Plan, Study, read_study, run_study
-from epicycle.runner.study.claims import (
+from epicycle.runner.study.declaration import study_of_text
+from epicycle.runner.study.judge.claims import (
     NOT_REPRODUCED,
     REPRODUCED,
     UNDECIDED,
@@ -33,8 +33,8 @@ from epicycle.runner.study.claims import (
     ranked,
     verdict,
 )
-from epicycle.runner.study.declaration import study_of_text
-from epicycle.runner.study.guideline import Recommendation, recommend
+from epicycle.runner.study.judge.guideline import Recommendation, recommend
+from epicycle.runner.study.judge.samples import Samples
 from epicycle.runner.study.questions import Claim
 
 HEAD = """
@@ -51,7 +51,7 @@ def study_of(text: str) -> Study:
     return study_of_text(text if "study:" in text else HEAD + text, Path("s.yaml"))
 
 
-def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tuple[int, ...] = ()) -> Any:
+def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tuple[int, ...] = ()) -> Samples:
     """Results of a study, with numbers drawn by condition; ``failed`` are replications."""
     study = study_of(text)
     random = np.random.default_rng(seed)
@@ -69,9 +69,7 @@ def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tu
             )
     columns = {"condition": pa.int64(), "replication": pa.int64(), "status": pa.string()}
     found = pa.Table.from_pylist(rows, pa.schema({**columns, "wait": pa.float64(), "way": pa.float64()}))
-    return SimpleNamespace(
-        plan=SimpleNamespace(study=study, replications=runs), metrics=["wait", "way"], table=lambda: found
-    )
+    return Samples(study, found)
 
 
 def one(text: str, numbers: Numbers, **more: Any) -> Judgement:
@@ -97,8 +95,8 @@ def grows(load: float, servers: int, random: np.random.Generator) -> float:
 
 def test_comparisons_are_scipys_paired_tests() -> None:
     found = one("less: wait, at: {servers: 2}, than: {servers: [3, 4]}, where: {load: 0.7}", grows)
-    rows = table("", grows).table().to_pylist()
-    values = {at: [row["wait"] for row in rows if row["condition"] == at] for at in range(12)}
+    samples = table("", grows)
+    values = {at: list(samples.numbers_of(at, "wait").values()) for at in (5, 6, 7)}
     expected = [stats.ttest_rel(values[5], values[at]) for at in (6, 7)]
     for finding, test in zip(found.findings, expected, strict=True):
         low, high = test.confidence_interval(0.95)
@@ -117,10 +115,10 @@ def test_comparisons_are_scipys_paired_tests() -> None:
 
 def test_slopes_are_scipys_regressions() -> None:
     found = one("rises: wait, per: servers, over: load", grows)
-    rows = table("", grows).table().to_pylist()
+    samples = table("", grows)
 
     def slope(replication: int, load: int) -> float:
-        values = [row["wait"] for row in rows if row["replication"] == replication and row["condition"] // 4 == load]
+        values = [samples.numbers_of(4 * load + servers, "wait")[replication] for servers in range(4)]
         return float(stats.linregress([1, 2, 3, 4], values).slope)
 
     for finding, (before, after) in zip(found.findings, ((0, 1), (1, 2)), strict=True):
@@ -166,8 +164,8 @@ def share_of(hits: int, runs: int, probability: float) -> bool:
 
 @pytest.fixture
 def few_resamples(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("epicycle.runner.study.claims.RESAMPLES", 99)
-    monkeypatch.setattr("epicycle.runner.study.guideline.RESAMPLES", 999)
+    monkeypatch.setattr("epicycle.runner.study.judge.claims.RESAMPLES", 99)
+    monkeypatch.setattr("epicycle.runner.study.judge.guideline.RESAMPLES", 999)
 
 
 @pytest.mark.usefixtures("few_resamples")

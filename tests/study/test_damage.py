@@ -16,9 +16,9 @@ import pytest
 from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
 from epicycle.runner.study import StoreError, open_study, run_study
-from epicycle.runner.study.manifest import checksum, manifest_text, read_manifest
+from epicycle.runner.study.run.manifest import checksum, manifest_text, read_manifest
+from epicycle.runner.study.run.store import Store, lock, prepare
 from epicycle.runner.study.session import manifest_of
-from epicycle.runner.study.store import Store, lock, prepare
 from tests.study.study_parts import plan_of, write
 
 HELP = "   help: 'epicycle resume out' puts it aside and makes the runs anew that are lost with it"

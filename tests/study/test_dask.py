@@ -20,14 +20,14 @@ import pytest
 
 from epicycle.runner.cli import main
 from epicycle.runner.study import Plan, open_study, read_study
-from epicycle.runner.study.one_run import Runner
-from epicycle.runner.study.parcel import fitness, pack
-from epicycle.runner.study.schedule import Schedule
+from epicycle.runner.study.run.backlog import Backlog
+from epicycle.runner.study.run.parcel import fitness, pack
+from epicycle.runner.study.run.runner import Runner
 from tests.study.dask_cluster import Cluster, a_cluster, without_epicycle
 from tests.study.study_parts import STUDY, THIS, command, write
 
 pytest.importorskip("distributed")
-from epicycle.runner.study import cluster as cluster_module
+from epicycle.runner.study.run import cluster as cluster_module
 
 
 @pytest.fixture(scope="module")
@@ -185,13 +185,13 @@ class Stroll(Actor):
 UNPACKED = """
 import json, sys
 from pathlib import Path
-from epicycle.runner.study.one_run import Runner
-from epicycle.runner.study.parcel import unpack
-from epicycle.runner.study.schedule import Schedule
+from epicycle.runner.study.run.runner import Runner
+from epicycle.runner.study.run.parcel import unpack
+from epicycle.runner.study.run.backlog import Backlog
 
 plan = unpack(Path(sys.argv[1]).read_bytes(), Path(sys.argv[2]).resolve())
-schedule, runner = Schedule(plan, {}), Runner(plan)
-print(json.dumps([runner.row(task) | {"wall_time": 0} for task in iter(schedule.next, None)]))
+backlog, runner = Backlog(plan, {}), Runner(plan)
+print(json.dumps([runner.make(task) | {"wall_time": 0} for task in iter(backlog.next, None)]))
 """
 
 
@@ -210,8 +210,8 @@ def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     plan = Plan.made(read_study("../../link/study/travels.yaml", set=changes, types=[link / "types" / "strolls.py"]))
     parcel = tmp_path / "parcel"
     parcel.write_bytes(pack(plan))
-    schedule, runner = Schedule(plan, {}), Runner(plan)
-    rows = [runner.row(task) | {"wall_time": 0} for task in iter(schedule.next, None)]
+    backlog, runner = Backlog(plan, {}), Runner(plan)
+    rows = [runner.make(task) | {"wall_time": 0} for task in iter(backlog.next, None)]
     shutil.rmtree(home)
     done = subprocess.run(
         [sys.executable, "-X", "faulthandler", "-c", UNPACKED, str(parcel), str(root)],

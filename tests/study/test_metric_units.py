@@ -9,9 +9,8 @@ import pytest
 
 from epicycle.runner import ModelError, open_study
 from epicycle.runner.cli import main
-from epicycle.runner.study import run_study
-from epicycle.runner.study.plan import Plan
-from epicycle.runner.study.store import read_manifest
+from epicycle.runner.study import Plan, run_study
+from epicycle.runner.study.run.manifest import read_manifest
 from tests.study.study_parts import MODEL, STUDY, plan_of, write
 
 UNITS = MODEL.replace("{of: walk.output, take: last}", "{of: walk.output, take: last, unit: m, doc: where it ends}")

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from epicycle.runner.student import student_quantile, student_tail
-from epicycle.runner.study.statistics import bootstrap_mean, half_width, holm, mean, paired_difference, rate
+from epicycle.runner.study.inference import bootstrap_mean, half_width, holm, mean, paired_difference, rate
 
 RUNS = 3000
 

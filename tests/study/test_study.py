@@ -21,14 +21,14 @@ from epicycle.actors import EpicycleError
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
 from epicycle.runner.study import StoreError, run_study
-from epicycle.runner.study import plan as plan_module
-from epicycle.runner.study import progress as progress_module
 from epicycle.runner.study import session as session_module
-from epicycle.runner.study import store as store_module
-from epicycle.runner.study.manifest import checksum, manifest_text
-from epicycle.runner.study.schedule import OK, Done, Schedule
-from epicycle.runner.study.session import duration, manifest_of
-from epicycle.runner.study.store import Store, Writer, lock, prepare
+from epicycle.runner.study.plan import plan as plan_module
+from epicycle.runner.study.run import pulse as progress_module
+from epicycle.runner.study.run import store as store_module
+from epicycle.runner.study.run.backlog import OK, Backlog, Done
+from epicycle.runner.study.run.manifest import checksum, manifest_text
+from epicycle.runner.study.run.store import Store, Writer, lock, prepare
+from epicycle.runner.study.session import manifest_of
 from tests.study.study_parts import MODEL, STUDY, THIS, plan_of, write
 
 
@@ -252,16 +252,16 @@ def test_failed_runs_are_counted_apart(tmp_path: Path) -> None:
 def test_progress_is_a_line_a_minute_without_a_terminal(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    schedule = Schedule(plan_of(write(tmp_path)), {})
-    tasks = [schedule.next() for _ in range(10)]
+    backlog = Backlog(plan_of(write(tmp_path)), {})
+    tasks = [backlog.next() for _ in range(10)]
     now = 1000.0
     monkeypatch.setattr(progress_module.time, "monotonic", lambda: now)
     with progress_module.progress("walks") as tell:
         for number, task in enumerate(tasks):
             assert task is not None
-            schedule.finished(task, Done("failed" if number == 2 else OK))
+            backlog.finished(task, Done("failed" if number == 2 else OK))
             now += 12.0
-            tell(schedule)
+            tell(backlog)
     lines = [line.partition(" ")[2] for line in capsys.readouterr().err.splitlines()]
     assert lines == [
         "walks: 5 of 10 runs, 1 failed, 0.0833 runs/s, 60 s left",
@@ -276,12 +276,12 @@ def test_what_is_left_is_only_what_has_to_be_made(tmp_path: Path, monkeypatch: p
     there = {key: Done(OK) for key in (*keys[:2], *keys[5:8], "a run of another model")}
     now = 1000.0
     monkeypatch.setattr(progress_module.time, "monotonic", lambda: now)
-    schedule, pulse = Schedule(plan, there), progress_module.Pulse()
+    backlog, pulse = Backlog(plan, there), progress_module.Pulse()
     lines = []
-    while (task := schedule.next()) is not None:
+    while (task := backlog.next()) is not None:
         now += 12.0
-        schedule.finished(task, Done(OK))
-        lines.append(pulse.line(schedule))
+        backlog.finished(task, Done(OK))
+        lines.append(pulse.line(backlog))
     assert lines == [
         "3 of 10 runs, 0.0833 runs/s, 48 s left",
         "4 of 10 runs, 0.0833 runs/s, 36 s left",
@@ -556,9 +556,9 @@ def test_a_thousand_million_runs_are_asked_back(tmp_path: Path, capsys: pytest.C
     assert last.values == {"drift": 1.0}
     assert plan.find(last.key, {"drift": 1.0}) == 1_000_000
     assert [plan.find(last.key, {"drift": each}) for each in (0.5, 0.25e-6, 2.0)] == [None] * 3
-    # A schedule takes no memory for what is still to come.
-    schedule = Schedule(plan, {})
-    tasks = [schedule.next() for _ in range(5)]
+    # A backlog takes no memory for what is still to come.
+    backlog = Backlog(plan, {})
+    tasks = [backlog.next() for _ in range(5)]
     assert [(task.condition, task.replication) for task in tasks if task] == [(0, each) for each in range(5)]
 
 
@@ -566,27 +566,27 @@ def test_a_thousand_million_runs_are_asked_back(tmp_path: Path, capsys: pytest.C
     ("seconds", "shown"), [(3, "3 s"), (600, "10 min"), (7200, "2 h"), (864_000, "10 days"), (1e10, "317 years")]
 )
 def test_duration_is_readable(seconds: float, shown: str) -> None:
-    assert duration(seconds) == shown
+    assert progress_module.duration(seconds) == shown
 
 
 def test_schedule_gives_every_run_once_and_keeps_only_open_conditions(tmp_path: Path) -> None:
     plan = plan_of(write(tmp_path, STUDY.replace("[0 m/s, 100 cm/s]", "{from: 0, to: 40, step: 1}")))
     known = {plan.key(plan.condition(3), 2): Done(OK)}
-    schedule = Schedule(plan, known)
+    backlog = Backlog(plan, known)
     running = []
     given: Counter[tuple[int, int]] = Counter()
     random = np.random.default_rng(1)
-    while (task := schedule.next()) is not None or running:
+    while (task := backlog.next()) is not None or running:
         if task is not None:
             running.append(task)
         if task is None or len(running) > 3:
             over = running.pop(int(random.integers(len(running))))
             if random.random() < 0.1:
-                schedule.again(over)
+                backlog.again(over)
             else:
                 given[over.condition, over.replication] += 1
-                schedule.finished(over, Done(OK))
-        assert len(schedule._open) <= 5
+                backlog.finished(over, Done(OK))
+        assert len(backlog._open) <= 5
     assert set(given.values()) == {1}
     assert set(given) == {(c, r) for c in range(41) for r in range(5)} - {(3, 2)}
-    assert (schedule.there, schedule.made) == (Counter({OK: 1}), Counter({OK: 204}))
+    assert (backlog.there, backlog.made) == (Counter({OK: 1}), Counter({OK: 204}))

@@ -10,8 +10,7 @@ from epicycle.actors import ParameterError, UnitError, declared_parameters, did_
 from ...model import Model, ModelError, Position, Problems
 from ...model.declarations import PartText
 from ...model.document import Mapping, Node, Sequence, plain
-from ...study import Plan
-from ...study.dimensions import in_si, split_number
+from ...study import Plan, in_si, split_number
 from .figure import Complaint, SignalFigure, StudyFigure
 from .of_signals import Series, SingleRun, Tracks
 from .of_table import CURVES, Distributions, Means

@@ -26,8 +26,7 @@ from epicycle.actors.expression import PortFormula, PortFormulaParameter
 from ...engine import Results
 from ...model import Model, Problems
 from ...model.patterns import select
-from ...study import Plan
-from ...study.statistics import half_width
+from ...study import Plan, half_width
 from ..drawing import draw, figures_of
 from ..figures import Figure, positions
 from .data import Condition, Data

@@ -1,4 +1,4 @@
-"""The Dask executor: runs on the machines of a cluster, whose rows come back and are written here."""
+"""Runs on the machines of a Dask cluster, whose rows come back and are written here."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ from uuid import uuid4
 from epicycle.actors import EpicycleError
 
 from . import host
-from .executor import ATTEMPTS, SENT, WorkerError, died, given_up, too_long
-from .parcel import differences, fitness, pack, unfit
-from .plan import Plan
-from .schedule import KILLED, TIMEOUT, Done, Schedule, Task
-from .store import Row, Store, Writer, writing
+from .backlog import Task
+from .making import Keeper
+from .parcel import SENT, differences, fitness, pack, unfit
+from .processes import DONE, Outcome, WorkerError
 
 CONNECT = 10.0  # s in which a scheduler has to answer
 PATIENCE = 60.0  # s without any worker
@@ -30,8 +29,6 @@ _ANSWER = 30.0  # s in which one that is busy has to answer
 _LOOK = 0.5  # s between two looks around
 _BATCH = 0.5  # s that a batch of runs is to take: time enough to bring the next
 _LARGEST = 100  # runs of a batch
-
-_Making = asyncio.Task[list[host.Outcome]]
 
 
 def distributed_module() -> Any:
@@ -47,55 +44,45 @@ def distributed_module() -> Any:
     return distributed
 
 
-class DaskExecutor:
-    """Makes the runs of a schedule on the workers of a scheduler, each of them in at most ``timeout`` seconds.
+class Cluster:
+    """The workers of a scheduler.
 
-    Without the address of a scheduler there is one of its own, with ``jobs`` processes at a time on this machine.
+    Without the address of one there is a scheduler of its own, with ``jobs`` processes at a time on this machine.
     """
 
-    def __init__(
-        self, store: Store, plan: Plan, jobs: int, timeout: float | None = None, scheduler: str | None = None
-    ) -> None:
+    def __init__(self, keeper: Keeper, jobs: int, scheduler: str | None) -> None:
         self._distributed = distributed_module()
-        self._store = store
-        self._plan = plan
+        self._keeper = keeper
+        self._backlog = keeper.backlog
         self._jobs = jobs
-        self._timeout = timeout
         self._scheduler = scheduler
-        self._writer = Writer(store)
-        self._decides = None if plan.study.until is None else plan.study.until.metric
         self._study = f"epicycle-{uuid4().hex}"
         self._parcel = b""
         self._sent: dict[str, Any] = {}  # parcels, by worker
         self._batches = 0
-        self._running: dict[_Making, list[Task]] = {}
+        self._running: dict[asyncio.Task[list[Outcome]], list[Task]] = {}
         self._wanted = 1  # batches at a time
         self._seconds = _BATCH  # that a run takes, as far as known
         self._looked = 0.0
         self._seen = time.monotonic()  # when there were workers
 
-    def run(self, schedule: Schedule, tell: Callable[[], None]) -> None:
+    def run(self, tell: Callable[[], None]) -> None:
         """Make all runs; ``tell`` is called now and then.  Raises ``WriteError`` and ``WorkerError``."""
-        if (first := self._batch(schedule)) is None:
-            return
-        try:
-            asyncio.run(self._run(first, schedule, tell))
-        finally:
-            with writing(self._store.folder):
-                self._writer.flush()
+        if (first := self._batch()) is not None:
+            asyncio.run(self._run(first, tell))
 
-    async def _run(self, first: list[Task], schedule: Schedule, tell: Callable[[], None]) -> None:
+    async def _run(self, first: list[Task], tell: Callable[[], None]) -> None:
         async with self._client() as client:
             try:
-                self._parcel = pack(self._plan)
+                self._parcel = pack(self._keeper.plan)
                 await self._look(client)
                 self._begin(client, first)
-                self._fill(client, schedule)
+                self._fill(client)
                 while self._running:
                     over, _ = await asyncio.wait(self._running, timeout=_LOOK, return_when=asyncio.FIRST_COMPLETED)
                     for each in over:
-                        self._end(each, self._running.pop(each), schedule)
-                    self._fill(client, schedule)
+                        self._end(each, self._running.pop(each))
+                    self._fill(client)
                     await self._look(client)
                     tell()
             finally:
@@ -180,25 +167,25 @@ class DaskExecutor:
     def _lost(self) -> WorkerError:
         return WorkerError(
             f"the scheduler{'' if self._scheduler is None else f' {self._scheduler}'} is gone\n"
-            f"   help: what was finished is kept; 'epicycle resume {self._store.folder}' goes on"
+            f"   help: what was finished is kept; 'epicycle resume {self._keeper.store.folder}' goes on"
         )
 
     # -- runs -----------------------------------------------------------------------------------------------------
 
-    def _batch(self, schedule: Schedule) -> list[Task] | None:
+    def _batch(self) -> list[Task] | None:
         """The next runs; one that may have ended its process comes alone."""
-        share = (schedule.total - schedule.over) // (2 * self._wanted)
+        share = (self._backlog.total - self._backlog.over) // (2 * self._wanted)
         most = max(1, min(_LARGEST, int(_BATCH / self._seconds), share))
         batch: list[Task] = []
-        while len(batch) < most and (task := schedule.next()) is not None:
+        while len(batch) < most and (task := self._backlog.next()) is not None:
             batch.append(task)
             if task.attempt > 1:
                 break
         return batch or None
 
-    def _fill(self, client: Any, schedule: Schedule) -> None:
+    def _fill(self, client: Any) -> None:
         """Give as much as is wanted."""
-        while len(self._running) < self._wanted and (batch := self._batch(schedule)):
+        while len(self._running) < self._wanted and (batch := self._batch()):
             self._begin(client, batch)
 
     def _begin(self, client: Any, batch: list[Task]) -> None:
@@ -206,21 +193,21 @@ class DaskExecutor:
         self._batches += 1
         key = f"{self._study}-{self._batches}"
         make = (resolve_name, _name(host.make))
-        given = {"study": self._study, "timeout": self._timeout, "tasks": [astuple(each) for each in batch]}
+        tasks = [astuple(each) for each in batch]
+        given = {"study": self._study, "timeout": self._keeper.timeout, "tasks": tasks}
         (future,) = client.get({key: (call, make, json.dumps(given))}, [key], sync=False)
         self._running[asyncio.ensure_future(_result_of(future))] = batch
 
-    def _end(self, over: _Making, batch: list[Task], schedule: Schedule) -> None:
+    def _end(self, over: asyncio.Task[list[Outcome]], batch: list[Task]) -> None:
         """A batch is over, or has ended its workers."""
         try:
             outcomes = over.result()
         except self._distributed.KilledWorker:
             for task in batch:
-                if len(batch) > 1 or task.attempt < ATTEMPTS:  # it may have been another one of them
-                    schedule.again(task)
+                if len(batch) > 1:  # it may have been another one of them
+                    self._backlog.again(task)
                 else:
-                    error = "the Dask workers that made it ended, one after the other"
-                    self._keep(task, given_up(self._plan, task, KILLED, error), schedule)
+                    self._keeper.again(task, "the Dask workers that made it ended, one after the other")
             return
         except (CancelledError, asyncio.CancelledError) as error:
             raise self._lost() from error
@@ -231,37 +218,26 @@ class DaskExecutor:
         except Exception as error:
             raise WorkerError(f"the Dask workers cannot make runs: {type(error).__name__}: {error}") from error
         for task, (what, told) in zip(batch, outcomes, strict=True):
-            if what == host.ROW:
-                row, why_not = told
-                self._take(task, row, why_not, schedule)
-            elif what == host.LATE:
-                assert self._timeout is not None
-                self._keep(task, given_up(self._plan, task, TIMEOUT, too_long(self._timeout)), schedule)
-            elif task.attempt < ATTEMPTS:
-                schedule.again(task)
-            else:
-                self._keep(task, given_up(self._plan, task, KILLED, died(told)), schedule)
+            if what == DONE:
+                told, why_not = told
+                self._check(task, why_not)
+                self._seconds += 0.2 * (told["wall_time"] - self._seconds)
+            self._keeper.settle(task, (what, told))
 
-    def _take(self, task: Task, row: Row, why_not: str | None, schedule: Schedule) -> None:
-        """A row has come; if it only says that the model cannot be loaded, this must be so here, too."""
-        if why_not is not None:
-            try:
-                self._plan.load(self._plan.condition(task.condition))
-            except EpicycleError:
-                pass
-            else:
-                raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
-        self._seconds += 0.2 * (row["wall_time"] - self._seconds)
-        self._keep(task, row, schedule)
-
-    def _keep(self, task: Task, row: Row, schedule: Schedule) -> None:
-        with writing(self._store.folder):
-            self._writer.add(row)
-        schedule.finished(task, Done(row["status"], row[self._decides] if self._decides else None))
+    def _check(self, task: Task, why_not: str | None) -> None:
+        """A model that cannot be loaded there must not be loaded here, either."""
+        if why_not is None:
+            return
+        plan = self._keeper.plan
+        try:
+            plan.load(plan.condition(task.condition))
+        except EpicycleError:
+            return
+        raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
 
 
-async def _result_of(future: Any) -> list[host.Outcome]:
-    found: list[host.Outcome] = await future.result()
+async def _result_of(future: Any) -> list[Outcome]:
+    found: list[Outcome] = await future.result()
     return found
 
 

@@ -1,4 +1,4 @@
-"""Schedule: which run comes next, and when a condition has had enough."""
+"""The backlog of a study: which run comes next, and when a condition has had enough."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from .plan import Condition, Plan
-from .statistics import half_width
+from ..inference import half_width
+from ..plan import Condition, Plan
 
 OK, FAILED, TIMEOUT, KILLED = "ok", "failed", "timeout", "killed"
 RETRIED = (TIMEOUT, KILLED)  # what hangs on the machine, not on the model alone
@@ -45,7 +45,7 @@ class _Open:
     values: dict[int, float] = field(default_factory=dict)
 
 
-class Schedule:
+class Backlog:
     """Hands out the runs of a plan that are not there yet, condition by condition.
 
     With ``until``, a condition gets its replications in batches, and is looked at only between batches: what is run
@@ -73,6 +73,11 @@ class Schedule:
     def over(self) -> int:
         """The runs that are over."""
         return self.there.total() + self.made.total()
+
+    @property
+    def failed(self) -> int:
+        """How many of those are not ok."""
+        return self.over - self.made[OK] - self.there[OK]
 
     @property
     def left(self) -> int:

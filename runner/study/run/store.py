@@ -34,8 +34,8 @@ from uuid import uuid4
 
 from epicycle.actors import counted, irregular, read_regular
 
+from .backlog import FAILED, KILLED, OK, TIMEOUT, Done
 from .manifest import DamagedError, StoreError, checksum, manifest_text, read_manifest, schema_of
-from .schedule import FAILED, KILLED, OK, RETRIED, TIMEOUT, Done
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -217,15 +217,10 @@ def writing(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise WriteError(cannot_write(folder, error.strerror or str(error))) from error
-
-
-def cannot_write(folder: Path, reason: str) -> str:
-    """The message of a folder that takes nothing more."""
-    message = f"cannot write to {folder}: {reason}"
-    if not (folder / "manifest.json").is_file():  # nothing has begun
-        return message
-    return f"{message}\n   help: what was finished is kept; 'epicycle resume {folder}' goes on"
+        message = f"cannot write to {folder}: {error.strerror or error}"
+        if (folder / "manifest.json").is_file():  # something has begun
+            message += f"\n   help: what was finished is kept; 'epicycle resume {folder}' goes on"
+        raise WriteError(message) from error
 
 
 # -- writing rows -----------------------------------------------------------------------------------------------------
@@ -269,14 +264,18 @@ class Writer:
 
     def flush(self) -> None:
         """Make a part of the rows."""
-        if self._journal is None:
-            return
         if self._rows:
             write_part(self._store, self._path.stem, self._rows)
         # Only now, as the part has them all.
-        self._path.unlink()
-        os.close(self._journal)
-        self._journal = None
+        if self._journal is not None:
+            self._path.unlink()
+        self.close()
+
+    def close(self) -> None:
+        """Leave the journal as it is, if there is one."""
+        if self._journal is not None:
+            os.close(self._journal)
+            self._journal = None
         self._rows = []
 
 
@@ -371,8 +370,3 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Write a file of the folder so that it appears all at once; raises ``StoreError``."""
     with writing(path.parent):
         _replace(path, write)
-
-
-def is_wanted(done: Done, retry: bool) -> bool:
-    """Whether a run that is there counts, or is to be made again."""
-    return not (retry and done.status in RETRIED)

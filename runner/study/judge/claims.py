@@ -14,26 +14,21 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import Formula
 
-from .dimensions import Factor
-from .metrics import asks_for_none
-from .questions import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
-from .samples import MISSING, Place, Samples
-from .statistics import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
-
-if TYPE_CHECKING:
-    from .results import StudyResults
+from ..inference import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
+from ..language import ALWAYS, FALLS, GREATER, RISES, Claim, Factor, Selection, asks_for_none
+from .samples import Levels, Place, Samples, finite, has_enough
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
 CONFIRMED, REVERSED = "confirmed", "reversed"
 ALMOST_ALL = 0.9  # what Wilson's lower bound has to reach for "in every run", if none is against it
 RESAMPLES = 1_999
 
-Levels = dict[str, Factor]
+Choices = Sequence[Sequence[int]]  # levels, by dimension
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ class Finding:
     @property
     def has_enough(self) -> bool:
         """Whether so few numbers are missing that the mean says something."""
-        return self.count > 1 and self.missing <= MISSING * (self.count + self.missing)
+        return has_enough(self.count, self.missing)
 
 
 @dataclass(frozen=True)
@@ -122,8 +117,8 @@ class Judgement:
             "undecided": self.counts(UNDECIDED),
             "agreeing": self.agreeing,
             "missing": self.missing,
-            "weakest": None if weakest is None else _finite(asdict(weakest)),
-            "findings": [_finite(asdict(finding)) for finding in self.findings],
+            "weakest": None if weakest is None else finite(asdict(weakest)),
+            "findings": [finite(asdict(finding)) for finding in self.findings],
         }
 
 
@@ -151,8 +146,14 @@ class Standing:
 
     def as_dict(self) -> dict[str, Any]:
         """For a JSON file."""
-        verdicts = {each.replace(" ", "_"): self.counts(each) for each in (REPRODUCED, UNDECIDED, NOT_REPRODUCED)}
-        return {"where": self.where, "in_means": self.in_means, **verdicts, "agreeing": self.agreeing}
+        return {
+            "where": self.where,
+            "in_means": self.in_means,
+            "reproduced": self.counts(REPRODUCED),
+            "undecided": self.counts(UNDECIDED),
+            "not_reproduced": self.counts(NOT_REPRODUCED),
+            "agreeing": self.agreeing,
+        }
 
 
 def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
@@ -171,12 +172,9 @@ def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
     )
 
 
-def judge(results: StudyResults, level: float = LEVEL) -> list[Judgement]:
+def judge(samples: Samples, level: float = LEVEL) -> list[Judgement]:
     """Judge all claims of a study, one after the other; those of another study at each level of what that has not."""
-    questions = results.plan.study.questions
-    if not questions.claims:
-        return []
-    samples = Samples(results)
+    questions = samples.study.questions
     return [
         _judged(claim, apart, samples, level) for apart in samples.levels(questions.apart) for claim in questions.claims
     ]
@@ -187,16 +185,15 @@ def _judged(claim: Claim, apart: Levels, samples: Samples, level: float) -> Judg
     if claim.form == ALWAYS:
         findings = list(_occurrences(claim, where, samples, level))
     else:
-        contrasts = _ordered if claim.form in (RISES, FALLS) else _compared
-        findings = [
-            _finding(contrast, samples, level)
-            for metric in claim.metrics
-            for contrast in contrasts(claim, metric.text, where, samples)
-        ]
+        contrasts = list(_contrasts(claim, where, samples))
+        findings = [_finding(metric.text, each, samples, level) for metric in claim.metrics for each in contrasts]
         corrected = holm([finding.p for finding in findings])
         findings = [replace(each, p_holm=p) for each, p in zip(findings, corrected, strict=True)]
         findings = [replace(each, outcome=_outcome(claim, each, level)) for each in findings]
-    findings = [replace(each, where=_without(each.where, apart)) for each in findings]
+    findings = [
+        replace(each, where={name: value for name, value in each.where.items() if name not in apart})
+        for each in findings
+    ]
     return Judgement(claim, apart, verdict(claim, findings), tuple(findings))
 
 
@@ -223,95 +220,86 @@ def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
 class _Contrast:
     """A weighed sum of conditions."""
 
-    metric: str
     weights: Mapping[Place, float]
     where: Levels
     level: Levels
     against: Levels
 
 
-def _compared(claim: Claim, metric: str, where: Selection, samples: Samples) -> Iterator[_Contrast]:
-    """``at`` less ``than``, at every combination of the other dimensions."""
+def _contrasts(claim: Claim, where: Selection, samples: Samples) -> Iterator[_Contrast]:
+    """What a claim compares, at every combination of the dimensions that it says nothing of."""
     choices = samples.choices(where)
-    homes = samples.homes(claim.at)
-    others = [home for home in range(len(choices)) if home not in homes]
+    ordered = claim.form in (RISES, FALLS)
+    compared = samples.homes([claim.over] if ordered else claim.at)
+    slope = _slope(claim, choices, samples) if claim.per else {(): 1.0}
+    homes = [*compared, *(samples.homes([claim.per]) if claim.per else ())]
+    pairs = list(_steps(claim, choices, samples) if ordered else _pairs(claim, choices, compared, samples))
+    for rest in samples.places(choices, homes):
+        for this, that in pairs:
+            weights = {
+                _with(rest, homes, (*levels, *inner)): sign * weight
+                for sign, levels in ((1.0, this), (-1.0, that))
+                for inner, weight in slope.items()
+                if weight
+            }
+            yield _Contrast(
+                weights,
+                samples.values(rest, [home for home in range(len(choices)) if home not in homes]),
+                samples.values(_with(rest, compared, this), compared),
+                samples.values(_with(rest, compared, that), compared),
+            )
+
+
+def _pairs(claim: Claim, choices: Choices, homes: Sequence[int], samples: Samples) -> Iterator[tuple[Place, Place]]:
+    """Every one of the levels of ``at`` with every one of ``than``."""
 
     def levels(selection: Selection) -> list[Place]:
         within = samples.choices(selection)
         return list(product(*([each for each in choices[home] if each in within[home]] for home in homes)))
 
-    these = levels(claim.at)
-    those = levels(claim.than or {})
+    these, those = levels(claim.at), levels(claim.than or {})
     if claim.than is None:
         those = [each for each in those if each not in these]
-    for rest in samples.places(choices, dict.fromkeys(homes, 0)):
-        for this in these:
-            for that in those:
-                first, second = _with(rest, homes, this), _with(rest, homes, that)
-                yield _Contrast(
-                    metric,
-                    {first: 1.0, second: -1.0},
-                    samples.values(first, others),
-                    samples.values(first, homes),
-                    samples.values(second, homes),
-                )
+    yield from product(these, those)
 
 
-def _ordered(claim: Claim, metric: str, where: Selection, samples: Samples) -> Iterator[_Contrast]:
-    """Each level of a factor against the one before it: their means, or their slopes over another factor."""
-    choices = samples.choices(where)
+def _steps(claim: Claim, choices: Choices, samples: Samples) -> Iterator[tuple[Place, Place]]:
+    """Each level of a factor with the one before it."""
     (home,) = samples.homes([claim.over])
-    levels = choices[home]
+    levels = list(choices[home])
     if samples.dimensions[home].columns[claim.over] in ("int", "float"):
-        levels = sorted(levels, key=lambda index: _number(samples.level(home, index, claim.over)))
-    slope: dict[int, float] = {0: 1.0}
-    inner: list[int] = []
-    if claim.per:
-        inner = samples.homes([claim.per])
-        at = {index: _number(samples.level(inner[0], index, claim.per)) for index in choices[inner[0]]}
-        center = math.fsum(at.values()) / len(at)
-        spread = math.fsum((each - center) * (each - center) for each in at.values())
-        slope = {index: (each - center) / spread for index, each in at.items()}
-    others = [each for each in range(len(choices)) if each != home and each not in inner]
-    for rest in samples.places(choices, dict.fromkeys([home, *inner], 0)):
-        for before, after in pairwise(levels):
-            weights = {
-                _with(rest, [home, *inner], [index, place] if inner else [index]): sign * weight
-                for sign, index in ((1.0, after), (-1.0, before))
-                for place, weight in slope.items()
-                if weight
-            }
-            yield _Contrast(
-                metric,
-                weights,
-                samples.values(rest, others),
-                samples.values(_with(rest, [home], [after]), [home]),
-                samples.values(_with(rest, [home], [before]), [home]),
-            )
+        levels.sort(key=lambda index: _number(samples.level(home, index, claim.over)))
+    for before, after in pairwise(levels):
+        yield (after,), (before,)
 
 
-def _finding(contrast: _Contrast, samples: Samples, level: float) -> Finding:
+def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, float]:
+    """What the values at the levels of a factor are weighed with, so that their sum is the slope over it."""
+    (home,) = samples.homes([claim.per])
+    at = {index: _number(samples.level(home, index, claim.per)) for index in choices[home]}
+    center = math.fsum(at.values()) / len(at)
+    spread = math.fsum((each - center) * (each - center) for each in at.values())
+    return {(index,): (each - center) / spread for index, each in at.items()}
+
+
+def _finding(metric: str, contrast: _Contrast, samples: Samples, level: float) -> Finding:
     """The mean of a contrast over the replications in which all its conditions have a number."""
-    numbers = {place: samples.numbers(place, contrast.metric) for place in contrast.weights}
+    numbers = {place: samples.numbers(place, metric) for place in contrast.weights}
     over = set.intersection(*(samples.over(place) for place in numbers))
     pairs = sorted(set.intersection(*(set(each) for each in numbers.values())))
     terms = [[weight * numbers[place][each] for place, weight in contrast.weights.items()] for each in pairs]
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
     found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
-    student, bootstrap = found.estimate, bootstrap_mean(values, level, resamples=RESAMPLES)
+    bootstrap = bootstrap_mean(values, level, resamples=RESAMPLES)
     return Finding(
-        metric=contrast.metric,
-        where=contrast.where,
-        level=contrast.level,
-        against=contrast.against,
-        value=student.value,
-        error=student.error,
-        low=student.low,
-        high=student.high,
+        metric,
+        contrast.where,
+        contrast.level,
+        contrast.against,
+        **asdict(found.estimate),
+        missing=len(over) - len(pairs),
         bootstrap_low=bootstrap.low,
         bootstrap_high=bootstrap.high,
-        count=student.count,
-        missing=len(over) - len(pairs),
         p=found.p,
     )
 
@@ -333,18 +321,7 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float)
         answers = [is_true(row) for row in samples.rows(place, formula.names)]
         holds, missing = answers.count(True), answers.count(None)
         found = rate(holds, len(answers) - missing, level)
-        finding = Finding(
-            metric=claim.condition,
-            where=samples.values(place),
-            level={},
-            against={},
-            value=found.value,
-            error=found.error,
-            low=found.low,
-            high=found.high,
-            count=found.count,
-            missing=missing,
-        )
+        finding = Finding(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)
         yield replace(finding, outcome=_outcome_of_rate(claim, finding, holds))
 
 
@@ -397,16 +374,6 @@ def _with(place: Place, homes: Sequence[int], levels: Sequence[int]) -> Place:
     return tuple(found)
 
 
-def _without(values: Levels, apart: Levels) -> Levels:
-    return {factor: value for factor, value in values.items() if factor not in apart}
-
-
 def _number(value: Factor) -> float:
     assert isinstance(value, (int, float))
     return float(value)
-
-
-def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in values.items()
-    }

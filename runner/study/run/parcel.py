@@ -15,10 +15,18 @@ from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any
 
-from ..provenance import versions
-from .executor import WorkerError
-from .plan import Plan
+from ...provenance import versions
+from ..language import ModelError, noting
+from ..plan import Plan
+from .backlog import Task
+from .processes import WorkerError
+from .runner import Runner
+from .store import Row
 
+SENT = (
+    "   help: files are sent along if they are named by a path from the study or the model; packages have to be "
+    "installed there"
+)
 _CODE = ("epicycle.actors", "epicycle.aspects", "epicycle.runner")
 _NO_MATTER = ("pyarrow",)  # workers write no files
 _OPTIONAL = ("casadi",)  # which takes part in runs, where it is installed
@@ -60,6 +68,39 @@ def unpack(parcel: bytes, root: Path) -> Plan:
     os.chdir(folder)
     types = [str(below(root, name)) for name in manifest["types"]]
     return Plan.of_manifest(manifest | {"file": str(study), "types": types})
+
+
+class Guest:
+    """Makes runs of a plan among files that lie elsewhere than in the study's place."""
+
+    def __init__(self, parcel: bytes, folder: str) -> None:
+        self._root = str(Path(folder).resolve())
+        try:
+            plan = unpack(parcel, Path(self._root))
+        except ModelError as error:
+            raise WorkerError(
+                f"cannot read the study, which is right here:\n{self._named(str(error))}\n{SENT}"
+            ) from error
+        self._runner = Runner(plan)
+
+    def prepare(self, task: Task) -> None:
+        """Load the model; raises ``WorkerError`` if this reads anything else than it does at the study's place."""
+        with noting() as noted:
+            self._runner.prepare(task)
+        if noted.files and (unlike := self._runner.plan.unlike(noted)):
+            raise WorkerError(f"has another {self._named(unlike[0])} than this machine\n{SENT}")
+
+    def make(self, task: Task) -> tuple[Row, str | None]:
+        """The row of a run; and why its model could not be loaded, if that was so."""
+        why_not = self._runner.why_not(task)
+        row = self._runner.make(task)
+        if row["error"] is not None:
+            row["error"] = self._named(row["error"])
+        return row, None if why_not is None else self._named(why_not)
+
+    def _named(self, text: str) -> str:
+        """The names of files as they are at the study's place."""
+        return text.replace(self._root, "")
 
 
 def below(root: Path, name: str) -> Path:

@@ -13,15 +13,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from .dimensions import Factor
-from .questions import Guideline
-from .samples import MISSING, Place, Samples
-from .statistics import LEVEL, Estimate, mean, paired_difference, resampled_sums
-
-if TYPE_CHECKING:
-    from .results import StudyResults
+from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
+from ..language import Factor, Guideline
+from .samples import Levels, Place, Samples, finite, has_enough
 
 RESAMPLES = 9_999
 
@@ -47,7 +43,7 @@ class Recommendation:
     the tolerance.
     """
 
-    where: dict[str, Factor]
+    where: Levels
     choose: str
     metric: str
     best: Factor
@@ -62,20 +58,19 @@ class Recommendation:
 
     def as_dict(self) -> dict[str, Any]:
         """For a JSON file; numbers that are not finite are None."""
-        found: dict[str, Any] = _finite(asdict(self))
+        found: dict[str, Any] = finite(asdict(self))
         return {**found, "not_worse": self.not_worse}
 
 
-def recommend(results: StudyResults, level: float = LEVEL) -> list[Recommendation]:
+def recommend(samples: Samples, level: float = LEVEL) -> list[Recommendation]:
     """The recommended level of the factor to choose, for every combination of the others."""
-    guideline = results.plan.study.questions.guideline
+    guideline = samples.study.questions.guideline
     if guideline is None:
         return []
-    samples = Samples(results)
     (home,) = samples.homes([guideline.choose])
     choices = samples.choices({})
     found = []
-    for rest in samples.places(choices, {home: 0}):
+    for rest in samples.places(choices, [home]):
         places = [(*rest[:home], index, *rest[home + 1 :]) for index in choices[home]]
         where = samples.values(rest, [each for each in range(len(rest)) if each != home])
         levels = [samples.level(home, index, guideline.choose) for index in choices[home]]
@@ -85,7 +80,7 @@ def recommend(results: StudyResults, level: float = LEVEL) -> list[Recommendatio
 
 def _recommended(
     guideline: Guideline,
-    where: dict[str, Factor],
+    where: Levels,
     levels: list[Factor],
     places: list[Place],
     samples: Samples,
@@ -95,11 +90,7 @@ def _recommended(
     metric = guideline.metric.text
     numbers = [samples.numbers(place, metric) for place in places]
     missing = [len(samples.over(place)) - len(each) for place, each in zip(places, numbers, strict=True)]
-    fit = [
-        index
-        for index, each in enumerate(numbers)
-        if len(each) > 1 and missing[index] <= MISSING * (len(each) + missing[index])
-    ]
+    fit = [index for index, each in enumerate(numbers) if has_enough(len(each), missing[index])]
     means = [mean(list(each.values()), level) for each in numbers]
     best = min(fit, key=lambda index: sign * means[index].value, default=None)
     confidence = _confidence([numbers[index] for index in fit], sign)
@@ -159,11 +150,3 @@ def _confidence(numbers: list[dict[int, float]], sign: float) -> list[float]:
     is_best = means == means.min(axis=0)
     ties = np.count_nonzero(is_best, axis=0)
     return [math.fsum((1.0 / ties[best]).tolist()) / RESAMPLES for best in is_best]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _finite(each) for name, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

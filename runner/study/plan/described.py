@@ -7,10 +7,7 @@ from dataclasses import dataclass
 
 from epicycle.actors import declared_parameters, parse_unit
 
-from ..model import Model
-from ..model.patterns import select
-from .dimensions import Dimension, split_number
-from .metrics import StudyMetric
+from ..language import Dimension, Model, StudyMetric, select, split_number
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
 
 from epicycle.actors import EpicycleError, readable
 
-from ..engine import LogFilter, Results, Simulation
-from ..model import Model
-from .plan import Condition, Plan
-from .schedule import FAILED, OK, Task
+from ...engine import LogFilter, Results, Simulation
+from ..language import Model
+from ..plan import Condition, Plan
+from .backlog import FAILED, OK, Task
 from .store import Row
 
 _MODELS_KEPT = 4
@@ -21,37 +23,26 @@ class Runner:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self._models: OrderedDict[int, tuple[Condition, Model | str]] = OrderedDict()
+        self._model = lru_cache(_MODELS_KEPT)(self._load)
+
+    @classmethod
+    def of_manifest(cls, manifest: Mapping[str, Any]) -> Runner:
+        """That of a results folder."""
+        return cls(Plan.of_manifest(manifest))
 
     def prepare(self, task: Task) -> None:
         """Load the model of the task's condition, unless it is there."""
-        if task.condition in self._models:
-            self._models.move_to_end(task.condition)
-            return
-        condition = self.plan.condition(task.condition)
-        try:
-            model: Model | str = self.plan.load(condition)
-            assert isinstance(model, Model)
-            # Recording costs time and memory, and most studies need none of it.
-            wanted = {signal for metric in self.plan.metrics for signal in metric.signals}
-            model.recorded = [name for name in model.recorded if name in wanted]
-        except EpicycleError as error:
-            model = str(error)
-        self._models[task.condition] = condition, model
-        if len(self._models) > _MODELS_KEPT:
-            self._models.popitem(last=False)
+        self._model(task.condition)
 
     def why_not(self, task: Task) -> str | None:
         """Why the model of the task's condition cannot be loaded; None if it can."""
-        self.prepare(task)
-        _, model = self._models[task.condition]
+        model = self._model(task.condition)
         return model if isinstance(model, str) else None
 
-    def row(self, task: Task) -> Row:
-        """Make the run; whatever it raises is told in the row."""
-        self.prepare(task)
-        condition, model = self._models[task.condition]
-        row = empty_row(self.plan, condition, task)
+    def make(self, task: Task) -> Row:
+        """The row of a run; whatever it raises is told there."""
+        model = self._model(task.condition)
+        row = empty_row(self.plan, task)
         started = time.perf_counter()
         try:
             if isinstance(model, str):
@@ -66,9 +57,20 @@ class Runner:
         row["wall_time"] = time.perf_counter() - started
         return row
 
+    def _load(self, index: int) -> Model | str:
+        try:
+            model = self.plan.load(self.plan.condition(index))
+        except EpicycleError as error:
+            return str(error)
+        # Recording costs time and memory, and most studies need none of it.
+        wanted = {signal for metric in self.plan.metrics for signal in metric.signals}
+        model.recorded = [name for name in model.recorded if name in wanted]
+        return model
 
-def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:
+
+def empty_row(plan: Plan, task: Task) -> Row:
     """What a row holds before the run."""
+    condition = plan.condition(task.condition)
     return {
         "run": task.key,
         "condition": condition.key,

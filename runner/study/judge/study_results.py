@@ -5,30 +5,27 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import math
 from collections import Counter
 from dataclasses import asdict
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, counted, did_you_mean, read_regular
+from epicycle.actors import EpicycleError, counted, read_regular
 
-from ..tables import pandas_module
-from .dimensions import Factor
-from .manifest import StoreError
-from .plan import Plan
-from .schedule import OK
-from .statistics import LEVEL, holm, mean, paired_difference
-from .store import BEST_FIRST, Store, replace_file
+from ...tables import pandas_module
+from ..inference import LEVEL, holm, mean, paired_difference
+from ..language import Factor, did_you_mean
+from ..plan import Plan
+from ..run import BEST_FIRST, OK, Store, StoreError, replace_file
+from .claims import Judgement, Standing, judge, ranked
+from .guideline import Recommendation, recommend
+from .samples import Samples
 
 if TYPE_CHECKING:
     import pandas
     import pyarrow as pa
     import xarray
-
-    from .claims import Judgement, Standing
-    from .guideline import Recommendation
 
 TIMES = ("wall_time",)  # what is not the same each time
 
@@ -167,29 +164,24 @@ class StudyResults:
 
     def values(self, metric: str) -> dict[int, dict[int, float]]:
         """The numbers of a metric by condition and replication; runs that are not ``ok`` or have none are left out."""
-        if metric not in self.metrics:
-            guess = did_you_mean(metric, self.metrics)
-            raise StoreError(f"{self.folder} has no metric {metric!r}{guess}; it has {', '.join(self.metrics)}")
-        table = self.table().select(["condition", "replication", "status", metric])
-        found: dict[int, dict[int, float]] = {condition: {} for condition in table["condition"].to_pylist()}
-        for condition, replication, status, value in zip(*(each.to_pylist() for each in table.columns), strict=True):
-            if status == OK and value is not None and math.isfinite(value):
-                found[condition][replication] = value
-        return found
+        self._check("metric", metric, self.metrics)
+        samples = self._samples()
+        return {condition: samples.numbers_of(condition, metric) for condition in samples.runs()}
 
     def means(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
         """A row for each condition: what was varied, the mean with its standard error and interval, how many runs.
 
         ``runs`` are those that are over, ``count`` those of them that have a number.
         """
-        runs = Counter(self.table()["condition"].to_pylist())
+        self._check("metric", metric, self.metrics)
+        samples = self._samples()
         return [
             {
                 **self.plan.condition(condition).values,
-                **asdict(mean(list(numbers.values()), level)),
-                "runs": runs[condition],
+                **asdict(mean(list(samples.numbers_of(condition, metric).values()), level)),
+                "runs": runs,
             }
-            for condition, numbers in self.values(metric).items()
+            for condition, runs in samples.runs().items()
         ]
 
     def differences(self, metric: str, over: str, level: float = LEVEL) -> list[dict[str, Any]]:
@@ -198,9 +190,7 @@ class StudyResults:
         Each row has the other factors, the two levels as ``first`` and ``second``, the mean of second less first over
         common replications with its interval, ``p`` of a paired test, and ``p_holm`` corrected for all rows.
         """
-        if over not in self.factors:
-            guess = did_you_mean(over, self.factors)
-            raise StoreError(f"{self.folder} has no factor {over!r}{guess}; it has {', '.join(self.factors) or 'none'}")
+        self._check("factor", over, self.factors)
         groups: dict[tuple[Factor, ...], list[tuple[Factor, dict[int, float]]]] = {}
         others = [name for name in self.factors if name != over]
         for condition, numbers in self.values(metric).items():
@@ -215,23 +205,25 @@ class StudyResults:
         corrected = holm([row["p"] for row in rows])
         return [{**row, "p_holm": p} for row, p in zip(rows, corrected, strict=True)]
 
+    def _samples(self) -> Samples:
+        return Samples(self.plan.study, self.table())
+
+    def _check(self, what: str, name: str, known: list[str]) -> None:
+        if name not in known:
+            told = f"{self.folder} has no {what} {name!r}{did_you_mean(name, known)}"
+            raise StoreError(f"{told}; it has {', '.join(known) or 'none'}")
+
     def claims(self, level: float = LEVEL) -> list[Judgement]:
         """What came of the claims of the study's file; those of another study, at each level of what that has not."""
-        from .claims import judge
-
-        return judge(self, level)
+        return judge(self._samples(), level)
 
     def standings(self, level: float = LEVEL) -> list[Standing]:
         """How much speaks for each level that claims are judged apart for, the best first."""
-        from .claims import ranked
-
         return ranked(self.claims(level))
 
     def guideline(self, level: float = LEVEL) -> list[Recommendation]:
         """What the study's guideline recommends, at every combination of the factors that are not to be chosen."""
-        from .guideline import recommend
-
-        return recommend(self, level)
+        return recommend(self._samples(), level)
 
     def find(self, run: str) -> dict[str, Any]:
         """The row of a run, by the beginning of its key; raises ``StoreError``."""

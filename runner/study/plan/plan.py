@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
 from pathlib import Path
@@ -15,15 +16,26 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
-from ..model import Model, ModelError, Problems, did_you_mean, load_model
-from ..model.document import plain
-from ..model.files import Noted, noting
-from ..model.own_types import types_of_file
-from ..model.settings import Setting
-from .columns import Column, columns_of
-from .declaration import RESERVED, Study, study_of_text
-from .dimensions import Factor, Level
-from .metrics import StudyMetric
+from ..language import (
+    RESERVED,
+    Dimension,
+    Factor,
+    Level,
+    Model,
+    ModelError,
+    Noted,
+    Problems,
+    Setting,
+    Study,
+    StudyMetric,
+    did_you_mean,
+    load_model,
+    noting,
+    plain,
+    study_of_text,
+    types_of_file,
+)
+from .described import Column, columns_of
 
 _LOGGER = logging.getLogger("epicycle")
 
@@ -80,8 +92,8 @@ class Plan:
         self.columns = columns
         self.made_with = made_with  # the version of Epicycle
         self._extra = extra  # by dimension, the files that single levels read beside the others
-        self._sizes = [dimension.size for dimension in study.dimensions]
-        self.conditions = prod(self._sizes)
+        self.conditions = prod(dimension.size for dimension in study.dimensions)
+        self._condition = lru_cache(16)(self._worked_out)  # runs of one follow each other
 
     # -- making one -----------------------------------------------------------------------------------------------
 
@@ -199,6 +211,11 @@ class Plan:
         """How many runs there are, at most."""
         return self.conditions * self.replications
 
+    @property
+    def decides(self) -> str | None:
+        """The metric that decides how many replications a condition gets, if one does."""
+        return None if self.study.until is None else self.study.until.metric
+
     def __iter__(self) -> Iterator[Condition]:
         index = 0
         while index < self.conditions:
@@ -207,11 +224,14 @@ class Plan:
 
     def condition(self, index: int) -> Condition:
         """A condition by its number; the last dimension changes fastest."""
-        indices = _digits(index, self._sizes)
-        levels = [dimension.level(at) for dimension, at in zip(self.study.dimensions, indices, strict=True)]
+        return self._condition(index)
+
+    def _worked_out(self, index: int) -> Condition:
+        place = place_of(index, self.study.dimensions)
+        levels = _levels(self.study, place)
         settings, disturb = _together(self.study, levels)
         sources = dict(self.sources)
-        for extra, at in zip(self._extra, indices, strict=True):
+        for extra, at in zip(self._extra, place, strict=True):
             sources.update(extra.get(at, {}))
         identity = {
             "epicycle": self.made_with,
@@ -229,11 +249,10 @@ class Plan:
 
     def find(self, key: str, values: Mapping[str, Factor]) -> int | None:
         """The number of the condition with this key, which has these values; None if the plan has none."""
-        index = 0
-        for dimension in self.study.dimensions:
-            if (at := dimension.find(values)) is None:
-                return None
-            index = index * dimension.size + at
+        place = [at for each in self.study.dimensions if (at := each.find(values)) is not None]
+        if len(place) < len(self.study.dimensions):
+            return None
+        index = index_of(place, self.study.dimensions)
         return index if self.condition(index).key == key else None
 
     def seed(self, condition: Condition, replication: int) -> int:
@@ -275,13 +294,25 @@ def _hash(value: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _digits(index: int, sizes: list[int]) -> list[int]:
+def place_of(index: int, dimensions: Sequence[Dimension]) -> list[int]:
     """The levels of a condition, by dimension."""
     found = []
-    for size in reversed(sizes):
-        index, digit = divmod(index, size)
-        found.append(digit)
+    for dimension in reversed(dimensions):
+        index, level = divmod(index, dimension.size)
+        found.append(level)
     return found[::-1]
+
+
+def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
+    """The number of the condition with these levels."""
+    found = 0
+    for dimension, level in zip(dimensions, place, strict=True):
+        found = found * dimension.size + level
+    return found
+
+
+def _levels(study: Study, place: Iterable[int]) -> list[Level]:
+    return [dimension.level(at) for dimension, at in zip(study.dimensions, place, strict=True)]
 
 
 def _spread(size: int) -> list[int]:
@@ -312,12 +343,11 @@ class _Read:
     files: dict[str, None] = field(default_factory=dict)
 
 
-def _tried(study: Study, indices: list[int], read: _Read, problems: Problems) -> Sources:
+def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> Sources:
     """Load the model with these levels; the files that this reads."""
-    levels = [dimension.level(at) for dimension, at in zip(study.dimensions, indices, strict=True)]
     with noting() as noted:
         try:
-            read.models.append(_load(study, *_together(study, levels)))
+            read.models.append(_load(study, *_together(study, _levels(study, place))))
         except ModelError as error:
             for problem in error.problems:
                 problems.add(problem.message, problem.position, *problem.help)
