@@ -23,7 +23,6 @@ from .run import (
     Backlog,
     StoreError,
     check_executor,
-    collect,
     duration,
     lock,
     make_runs,
@@ -86,7 +85,6 @@ def run_study(
             executor=executor,
             scheduler=scheduler,
         )
-        collect(store)
         table = StudyResults(folder).write_table()
         made, there = backlog.made.total(), backlog.there.total()
         return Outcome(made, there, backlog.failed, backlog.stopped_early, table)

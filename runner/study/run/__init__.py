@@ -7,7 +7,7 @@ from .processes import WorkerError
 from .pulse import duration, progress
 from .replays import Replay, ReplayError, repeat
 from .runner import again
-from .store import BEST_FIRST, Store, WriteError, collect, is_running, lock, prepare, replace_file
+from .store import BEST_FIRST, Store, WriteError, is_running, lock, prepare, replace_file
 
 __all__ = [
     "BEST_FIRST",
@@ -27,7 +27,6 @@ __all__ = [
     "WriteError",
     "again",
     "check_executor",
-    "collect",
     "duration",
     "is_running",
     "lock",

@@ -5,14 +5,14 @@
     manifest.json          what the study is, and what its results were made with
     parts/<name>-<checksum>.parquet
                            rows of runs; a part appears all at once, and is never changed
-    journals/<name>.jsonl  one writer's rows since its last part, a line each: checksum, row
+    journals/<name>.jsonl  the rows of a session since its last part, a line each: checksum, row
     table.parquet          all rows in the order of the plan, made at the end
     lock                   held by the process that writes
     damaged/               files that were not any more what was written
 
 A run counts as finished when its line is in a journal, that is before anybody is told: the line is handed to the
 operating system at once, where no ``kill`` can reach it, and brought to the disk at most once a second.  The next to
-open the folder makes a part of every journal that a writer has left behind.  A row that is in two places is one row.
+open the folder makes a part of every journal that was left behind.  A row that is in two places is one row.
 
 The manifest has a checksum in it, a part in its name, a row of a journal before it, and no byte is believed before its
 checksum is seen to be right.  Who only reads is told of damage; who goes on with the study puts the damaged file aside,
@@ -29,7 +29,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 from uuid import uuid4
 
 from epicycle.actors import counted, irregular, read_regular
@@ -69,50 +69,35 @@ class Store:
     def rows(self, columns: list[str] | None = None) -> Iterator[pa.RecordBatch]:
         """All rows, part by part; those of a run that was written twice come twice."""
         import pyarrow as pa
-
-        for path in sorted((self.folder / "parts").glob("*.parquet")):
-            yield from self._part(path, columns)
-        for path in sorted((self.folder / "journals").glob("*.jsonl")):
-            with suppress(FileNotFoundError):  # its writer has just made a part of it
-                rows, damaged = read_journal(path)
-                if damaged:
-                    raise DamagedError(f"{path} {damaged}{self._help()}")
-                if rows:
-                    batch = pa.RecordBatch.from_pylist(rows, self.schema)
-                    yield batch if columns is None else batch.select(columns)
-
-    def _part(self, path: Path, columns: list[str] | None) -> Iterator[pa.RecordBatch]:
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
-        data, damaged = read_part(path)
-        if damaged:
-            raise DamagedError(f"{path} {damaged}{self._help()}")
-        with pq.ParquetFile(pa.BufferReader(data)) as file:
-            if not file.schema_arrow.equals(self.schema):
-                raise StoreError(f"{path} has not the columns of {self.folder}/manifest.json: it is of another study")
-            yield from file.iter_batches(columns=columns)
-
-    def _help(self) -> str:
-        return f"\n   help: 'epicycle resume {self.folder}' puts it aside and makes the runs anew that are lost with it"
+        for path in sorted((self.folder / "parts").glob("*.parquet")):
+            data = self._whole(path, *read_part(path))
+            with pq.ParquetFile(pa.BufferReader(data)) as file:
+                if not file.schema_arrow.equals(self.schema):
+                    told = f"{path} has not the columns of {self.folder}/manifest.json: it is of another study"
+                    raise StoreError(told)
+                yield from file.iter_batches(columns=columns)
+        for path in sorted((self.folder / "journals").glob("*.jsonl")):
+            with suppress(FileNotFoundError):  # its writer has just made a part of it
+                if rows := self._whole(path, *read_journal(path)):
+                    yield pa.RecordBatch.from_pylist(rows, self.schema).select(columns or self.schema.names)
 
     def known(self, value: str | None = None) -> dict[str, Done]:
         """The runs that are there, by key; ``value`` names the metric that is wanted of each."""
         found: dict[str, Done] = {}
-        columns = ["run", "status", *([value] if value else [])]
-        for batch in self.rows(columns):
-            values = batch.column(2).to_pylist() if value else [None] * batch.num_rows
-            for key, status, number in zip(
-                batch.column(0).to_pylist(), batch.column(1).to_pylist(), values, strict=True
-            ):
-                if (before := found.get(key)) is None or rank(status) < rank(before.status):
-                    found[key] = Done(status, number)
+        for batch in self.rows(["run", "status", *([value] if value else [])]):
+            for key, status, *number in zip(*(column.to_pylist() for column in batch.columns), strict=True):
+                before = found.get(key)
+                if before is None or BEST_FIRST.index(status) < BEST_FIRST.index(before.status):
+                    found[key] = Done(status, *number)
         return found
 
-
-def rank(status: str) -> int:
-    """The smaller, the better."""
-    return BEST_FIRST.index(status)
+    def _whole(self, path: Path, contents: Any, damage: str) -> Any:
+        if damage:
+            told = f"'epicycle resume {self.folder}' puts it aside and makes the runs anew that are lost with it"
+            raise DamagedError(f"{path} {damage}\n   help: {told}")
+        return contents
 
 
 # -- opening it to write ----------------------------------------------------------------------------------------------
@@ -121,7 +106,7 @@ def rank(status: str) -> int:
 def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
     """Make a results folder, or see that one that is there holds results of the same study; journals become parts.
 
-    Raises ``StoreError``.  The caller holds the lock.
+    Raises ``StoreError``.  The caller holds the lock, so that whoever has left a journal behind is gone.
     """
     path = folder / "manifest.json"
     before: Mapping[str, Any] | None = None
@@ -136,45 +121,53 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
         each.name not in ("lock", "parts", "journals", "damaged") and not each.name.startswith(".manifest.json")
         for each in folder.iterdir()
     ):
-        raise StoreError(
-            f"{folder} is not empty, and holds no results of a study\n   help: choose another folder with --out"
-        )
+        raise StoreError(f"{folder} is not empty, and holds no results of a study{_ANOTHER}")
     if before is not None:
-        if before["study"] != manifest["study"]:
-            raise StoreError(
-                f"{folder} holds results of the study {before['study']!r}, not of {manifest['study']!r}\n"
-                "   help: choose another folder with --out"
-            )
+        name = manifest["study"]
+        if before["study"] != name:
+            raise StoreError(f"{folder} holds results of the study {before['study']!r}, not of {name!r}{_ANOTHER}")
         for what in ("factors", "metrics"):
             if list(before[what].items()) != list(manifest[what].items()):
-                raise StoreError(
-                    f"{folder} was made when {manifest['study']} had other {what}: {_shown(before[what])}, "
-                    f"not {_shown(manifest[what])}\n   help: choose another folder with --out"
-                )
+                had, has = _shown(before[what]), _shown(manifest[what])
+                raise StoreError(f"{folder} was made when {name} had other {what}: {had}, not {has}{_ANOTHER}")
     with writing(folder):
         for name in ("parts", "journals"):
             (folder / name).mkdir(exist_ok=True)
         _replace(path, lambda aside: aside.write_text(manifest_text(manifest), encoding="utf-8"))
-        store = Store(folder)
         for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*"):
             for aside in folder.glob(pattern):
                 aside.unlink()  # what somebody was writing when killed
+        store = Store(folder)
         for part in sorted((folder / "parts").glob("*.parquet")):
-            if damaged := read_part(part)[1]:
-                _put_aside(part, f"{damaged}; its runs are made anew")
-    collect(store)
+            if damage := read_part(part)[1]:
+                _put_aside(part, f"{damage}; its runs are made anew")
+        for journal in sorted((folder / "journals").glob("*.jsonl")):
+            if kind := irregular(journal):
+                _put_aside(journal, f"is {kind}")
+                continue
+            rows, damage = read_journal(journal)
+            if rows:
+                write_part(store, journal.stem, rows)
+            if damage:
+                _put_aside(journal, f"{damage}; their runs are made anew")
+            else:
+                journal.unlink()
     return store
 
 
-def collect(store: Store) -> None:
-    """Make parts of the journals that writers have left behind."""
-    with writing(store.folder):
-        for journal in sorted((store.folder / "journals").glob("*.jsonl")):
-            _recover(journal, store)
+_ANOTHER = "\n   help: choose another folder with --out"
 
 
 def _shown(columns: Mapping[str, str]) -> str:
     return ", ".join(name if name == what else f"{name} ({what})" for name, what in columns.items()) or "none"
+
+
+def _put_aside(path: Path, damage: str) -> None:
+    """Keep a damaged file where it does no harm, and say so."""
+    aside = path.parent.parent / "damaged"
+    aside.mkdir(exist_ok=True)
+    os.replace(path, aside / path.name)
+    _LOGGER.warning("%s %s\n   what is damaged is kept in %s", path, damage, aside)
 
 
 @contextmanager
@@ -186,12 +179,9 @@ def lock(folder: Path) -> Iterator[None]:
             raise StoreError(f"{folder / 'lock'} is {kind}: delete it")
         file = (folder / "lock").open("a+")
     with file:
-        if fcntl is not None:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                file.seek(0)
-                raise StoreError(f"{folder} is being written by another process ({file.read().strip()})") from None
+        if not _is_locked(file):
+            file.seek(0)
+            raise StoreError(f"{folder} is being written by another process ({file.read().strip()})")
         file.truncate(0)
         file.write(f"pid {os.getpid()}\n")
         file.flush()
@@ -203,12 +193,20 @@ def is_running(folder: Path) -> bool:
     if not (folder / "lock").is_file():
         return False
     with (folder / "lock").open("a+") as file:
-        try:
-            if fcntl is not None:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return True
-    return False
+        return not _is_locked(file)
+
+
+def _is_locked(file: IO[str]) -> bool:
+    """Lock a file, if nobody else has."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+# -- writing ----------------------------------------------------------------------------------------------------------
 
 
 @contextmanager
@@ -223,11 +221,8 @@ def writing(folder: Path) -> Iterator[None]:
         raise WriteError(message) from error
 
 
-# -- writing rows -----------------------------------------------------------------------------------------------------
-
-
 class Writer:
-    """One writer of rows; raises ``OSError`` if it cannot write, and then nothing half is left."""
+    """Writes rows; raises ``OSError`` if it cannot, and then nothing half is left."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -241,8 +236,6 @@ class Writer:
         if self._journal is None:
             self._path = self._store.folder / "journals" / f"{uuid4().hex}.jsonl"
             self._journal = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-            if fcntl is not None:
-                fcntl.flock(self._journal, fcntl.LOCK_EX)
             _sync_folder(self._path.parent)
         text = json.dumps(row).encode()
         line = b"%s %s\n" % (checksum(text).encode(), text)
@@ -290,55 +283,10 @@ def write_part(store: Store, name: str, rows: list[Row]) -> None:
     _replace(store.folder / "parts" / f"{name}-{checksum(data)}.parquet", lambda aside: aside.write_bytes(data))
 
 
-def read_part(path: Path) -> tuple[bytes, str]:
-    """The contents of a part, and what is wrong with them."""
-    try:
-        data = read_regular(path)
-    except OSError as error:
-        return b"", f"cannot be read: {error.strerror}"
-    return data, "" if path.stem.endswith(f"-{checksum(data)}") else "is damaged: it is not what was written"
-
-
-def read_journal(path: Path) -> tuple[list[Row], str]:
-    """The rows of a journal, and what is wrong with others; a last line that is not whole was not finished."""
-    try:
-        lines = read_regular(path).split(b"\n")[:-1]
-    except FileNotFoundError:
-        raise
-    except OSError as error:
-        return [], f"cannot be read: {error.strerror}"
-    halves = [line.partition(b" ") for line in lines]
-    whole = [json.loads(text) for digest, _, text in halves if digest == checksum(text).encode()]
-    lost = len(lines) - len(whole)
-    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} are not what was written" if lost else ""
-
-
-def _recover(journal: Path, store: Store) -> None:
-    """Make a part of a journal whose writer is gone."""
-    if kind := irregular(journal):
-        _put_aside(journal, f"is {kind}")
-        return
-    with journal.open("rb") as file:
-        if fcntl is not None:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                return  # a worker that outlived its study is just ending: rows are read from the journal as it is
-        rows, damaged = read_journal(journal)
-        if rows:
-            write_part(store, journal.stem, rows)
-        if damaged:
-            _put_aside(journal, f"{damaged}; their runs are made anew")
-        else:
-            journal.unlink()
-
-
-def _put_aside(path: Path, damage: str) -> None:
-    """Keep a damaged file where it does no harm, and say so."""
-    aside = path.parent.parent / "damaged"
-    aside.mkdir(exist_ok=True)
-    os.replace(path, aside / path.name)
-    _LOGGER.warning("%s %s\n   what is damaged is kept in %s", path, damage, aside)
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+    """Write a file of the folder so that it appears all at once; raises ``WriteError``."""
+    with writing(path.parent):
+        _replace(path, write)
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:
@@ -366,7 +314,27 @@ def _sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file of the folder so that it appears all at once; raises ``StoreError``."""
-    with writing(path.parent):
-        _replace(path, write)
+# -- reading ----------------------------------------------------------------------------------------------------------
+
+
+def read_part(path: Path) -> tuple[bytes, str]:
+    """The contents of a part, and what is wrong with them."""
+    try:
+        data = read_regular(path)
+    except OSError as error:
+        return b"", f"cannot be read: {error.strerror}"
+    return data, "" if path.stem.endswith(f"-{checksum(data)}") else "is damaged: it is not what was written"
+
+
+def read_journal(path: Path) -> tuple[list[Row], str]:
+    """The rows of a journal, and what is wrong with others; a last line that is not whole was not finished."""
+    try:
+        lines = read_regular(path).split(b"\n")[:-1]
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        return [], f"cannot be read: {error.strerror}"
+    halves = [line.partition(b" ") for line in lines]
+    whole = [json.loads(text) for digest, _, text in halves if digest == checksum(text).encode()]
+    lost = len(lines) - len(whole)
+    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} are not what was written" if lost else ""
