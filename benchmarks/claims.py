@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from epicycle.runner import StudyResults, open_study
+from epicycle.runner.language import ALWAYS
 from epicycle.runner.study import (
-    ALWAYS,
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,

@@ -81,7 +81,7 @@ def add_types(command: argparse.ArgumentParser) -> None:
 
 def own_types(options: argparse.Namespace) -> list[type]:
     """The types of the files that ``--types`` names."""
-    from ..model.own_types import types_of_file
+    from ..catalogue import types_of_file
 
     return [each for file in options.types for each in types_of_file(Path(file))]
 
@@ -123,7 +123,8 @@ def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) ->
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     """The model that the options describe; warnings are printed, or with ``strict`` raised."""
-    from ..model import ModelError, load_model
+    from ..model import load_model
+    from ..text import ModelError
 
     model = load_model(
         options.model,

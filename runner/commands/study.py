@@ -75,7 +75,7 @@ def count(text: str) -> int:
 
 def first_seed(text: str) -> int:
     """A seed after which those of all replications are seeds, too."""
-    from ..study import MAX_STUDY_SEED
+    from ..language import MAX_STUDY_SEED
 
     if not text.isdecimal() or len(text) > 20 or int(text) > MAX_STUDY_SEED:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {MAX_STUDY_SEED}")
@@ -103,8 +103,9 @@ def seconds(text: str) -> float:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Read, try and run the study."""
+    from ..language import read_study
     from ..show.report import check_figures
-    from ..study import Plan, available_cores, check_size, read_study
+    from ..study import Plan, available_cores, check_size
 
     check_session(options)
     types = [Path(file) for file in options.types]

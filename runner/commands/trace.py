@@ -64,7 +64,7 @@ def _actors(patterns: list[str], graph: ModelGraph) -> dict[str, Actor]:
     """The actors that some patterns select, or that stand in composites that they select."""
     from epicycle.actors import EpicycleError
 
-    from ..model import PatternError, did_you_mean, select
+    from ..text import PatternError, did_you_mean, select
 
     known = [*graph.actors, *graph.composites]
     chosen: set[str] = set()

@@ -10,9 +10,8 @@ import networkx as nx
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
+from ..text import RAISE_IT, Position, Problems
 from .graph import Detour, Hop, ModelGraph, Wire
-from .limits import RAISE_IT
-from .problems import Position, Problems
 from .schedule import dependencies
 
 MAX_PASSAGE = 200  # composite ports in a row

@@ -15,12 +15,11 @@ import networkx as nx
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, Request
 
+from ..language import PartText, PointcutText
+from ..text import PathIndex, Position, Problems, did_you_mean
 from .configuration import place_of
-from .declarations import PartText, PointcutText
 from .firing_times import without_port
 from .graph import Detour, ModelGraph
-from .patterns import PathIndex
-from .problems import Position, Problems, did_you_mean
 from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect
 

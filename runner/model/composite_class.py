@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from .catalogue import Catalogue, installed
-from .declarations import CompositeText, DeclarationReader, ModelText, PartText
-from .document import Mapping, read
+from ..catalogue import Catalogue, installed
+from ..language import (
+    CompositeText,
+    DeclarationReader,
+    ModelText,
+    PartText,
+    Settings,
+    find_library,
+    included_composites,
+    inherit,
+)
+from ..text import Mapping, Position, Problems, Text, call_site, did_you_mean, entries_of, read
 from .elaborate import Elaborator
 from .graph import ModelGraph
-from .inheritance import inherit
-from .load import find_library, included_composites
 from .model import Model
-from .problems import Position, Problems, did_you_mean
-from .reading import Text
-from .settings import Settings
-from .site import call_site, entries_of
 
 
 class CompositeClass:

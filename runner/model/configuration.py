@@ -8,16 +8,10 @@ from pathlib import Path
 
 from epicycle.actors import Configurable, EpicycleError, ParameterError, declared_parameters, unknown_parameter
 
+from ..language import CompositeText, Setting, Settings, Values
+from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, TooManyError, data_file, did_you_mean, nearest
 from .culprit import describe, raised_at
-from .declarations import CompositeText
-from .document import Entry, Mapping, Node
-from .files import data_file
 from .graph import ModelGraph
-from .limits import RAISE_IT
-from .patterns import TooManyError
-from .problems import Position, Problems, did_you_mean, nearest
-from .settings import Setting, Settings
-from .values import Values
 
 _INDEX = re.compile(r"\[(\d+|\*)\]")
 # What people may try to set, and how it is done.

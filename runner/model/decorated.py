@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping
 from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import Aspect, Decoration, decorations
 
-from .declarations import PointcutText
+from ..language import PointcutText
+from ..text import Position, Problems, Text
 from .graph import ModelGraph
-from .problems import Position, Problems
-from .reading import Text
 from .weave import Paths, Weaving
 from .woven import WovenAspect
 

@@ -18,19 +18,15 @@ from epicycle.actors import (
     to_nanoseconds,
 )
 
-from .catalogue import Catalogue, CatalogueError
+from ..catalogue import Catalogue, CatalogueError, PortTypeError, read_type, token_types
+from ..language import CompositeText, ModelText, PartText, PortText, Settings
+from ..text import NORMAL, RAISE_IT, Entry, Limits, Mapping, Position, Problems, did_you_mean
 from .checks import check
 from .composite_aspect import as_actor
-from .declarations import CompositeText, ModelText, PartText, PortText
-from .document import Entry, Mapping
 from .elaborate_aspects import AspectElaborator
 from .graph import ModelGraph
-from .limits import NORMAL, RAISE_IT, Limits
 from .model import Model
 from .observation import Observation
-from .port_types import PortTypeError, read_type, token_types
-from .problems import Position, Problems, did_you_mean
-from .settings import Settings
 from .wiring import Child, Wiring
 from .woven import WovenAspect, check_processors
 

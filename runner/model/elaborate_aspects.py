@@ -15,15 +15,12 @@ from epicycle.aspects import (
     class_decorations,
 )
 
-from .catalogue import Catalogue, CatalogueError
+from ..catalogue import Catalogue, CatalogueError
+from ..language import CompositeText, PartText, PointcutText, Settings
+from ..text import RAISE_IT, Position, Problems, TooManyError, did_you_mean
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .configuration import Configurator, place_of
-from .declarations import CompositeText, PartText, PointcutText
 from .decorated import arranged, weave_decorations
-from .limits import RAISE_IT
-from .patterns import TooManyError
-from .problems import Position, Problems, did_you_mean
-from .settings import Settings
 from .weave import Paths, Weaving
 from .woven import WovenAspect
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
-from .problems import ModelError, Position, Problem, Problems
+from ..text import ModelError, Position, Problem, Problems
 
 if TYPE_CHECKING:
     from .model import Model

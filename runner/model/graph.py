@@ -16,10 +16,8 @@ import networkx as nx
 from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_own_ports
 from epicycle.aspects import Request
 
+from ..text import NORMAL, Position, could_be_within
 from .clock import Clock
-from .limits import NORMAL
-from .patterns import could_be_within
-from .problems import Position
 
 
 @dataclass(frozen=True, eq=False)

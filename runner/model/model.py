@@ -7,24 +7,22 @@ from pathlib import Path
 
 from epicycle.actors import Stop, Tag, counted, declared_parameters
 
+from ..catalogue import take_problem
 from ..collection import without_collection
+from ..language import Values
 from ..tables import Table, as_html, as_text, short
+from ..text import NAME, Problem, Problems, Text, call_site, within
+from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .decorated import arranged
-from .document import Mapping as MappingNode
 from .ends import Port, raising
 from .graph import ModelGraph
-from .measure import take_problem
 from .observation import Metric, Observation, checked_seed, nanoseconds
-from .problems import Problem, Problems
-from .reading import NAME, Text, within
 from .schedule import firing_order
 from .scope import Composite, Scope
 from .scopes import Scopes, is_within
-from .site import call_site
 from .transaction import all_or_nothing, transaction
-from .values import Values
 from .woven import WovenAspect, check_processors
 
 

@@ -8,20 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, to_nanoseconds, type_name
 
-from .declarations import DeclarationReader, MetricText, ModelText
-from .document import Node, Scalar, plain
-from .limits import RAISE_IT
-from .measure import Measure
-from .patterns import PathIndex, PatternError, TooManyError
-from .problems import Position, Problems, did_you_mean
-from .reading import Text
-from .values import Values
+from ..catalogue import Measure
+from ..language import DeclarationReader, MetricText, ModelText, Values
+from ..text import (
+    MAX_SEED,
+    RAISE_IT,
+    Node,
+    PathIndex,
+    PatternError,
+    Position,
+    Problems,
+    Scalar,
+    Text,
+    TooManyError,
+    did_you_mean,
+    plain,
+)
 
 if TYPE_CHECKING:
     from .model import Model
 
 # Larger seeds could not be told apart in the int64 columns of result files.
-MAX_SEED = 2**63 - 1
 
 
 @dataclass

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
+from ..language import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText, Values
+from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
 from .composite_aspect import ModelWeaving, check_nesting
-from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
 from .decorated import weave_decorations
-from .document import Scalar
 from .ends import (
     CompositePort,
     Ends,
@@ -31,11 +31,7 @@ from .ends import (
     raising,
 )
 from .graph import Hop
-from .problems import Position, Problems, did_you_mean
-from .reading import NAME, Text, within
-from .site import call_site, node_of
 from .transaction import all_or_nothing
-from .values import Values
 from .weave import Paths, Weaving
 from .wiring import Child, Wiring
 from .woven import WovenAspect

@@ -5,9 +5,8 @@ from __future__ import annotations
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from .problems import Position
+from ..text import Position, call_site
 from .scope import OF_NO_CLASS, Composite
-from .site import call_site
 from .wiring import Child
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from ..text import call_site
 from .ends import mistake
-from .site import call_site
 
 if TYPE_CHECKING:
     from .model import Model

@@ -6,12 +6,10 @@ from collections.abc import Collection, Mapping
 
 from epicycle.actors import counted
 
+from ..language import CompositeText, ModelText, PartText, Settings, Values
+from ..text import RAISE_IT
 from .checks import check
-from .declarations import CompositeText, ModelText, PartText
 from .elaborate import Elaborator, TooLargeError
-from .limits import RAISE_IT
-from .settings import Settings
-from .values import Values
 
 _OVERHEAD = 3  # what a class takes beside what is in it, as many actors
 

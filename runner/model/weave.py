@@ -22,12 +22,10 @@ from epicycle.aspects import (
     SelectionParameter,
 )
 
-from .declarations import PointcutText
+from ..language import PointcutText
+from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, nearest
 from .firing_times import unknown_inputs
 from .graph import ModelGraph
-from .patterns import PathIndex, PatternError
-from .problems import Position, Problems, did_you_mean, nearest
-from .reading import Text
 from .woven import WovenAspect
 
 

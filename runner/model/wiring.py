@@ -8,14 +8,10 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import Actor, Parameter, ParameterError, counted, declared_ports, has_own_ports, to_nanoseconds
 
-from .declarations import CompositeText, ConnectionText
-from .document import Scalar
+from ..language import CompositeText, ConnectionText, Values
+from ..text import RAISE_IT, Problems, Scalar, Text, did_you_mean, within
 from .graph import ModelGraph
 from .indices import BadIndexError, resolve
-from .limits import RAISE_IT
-from .problems import Problems, did_you_mean
-from .reading import Text, within
-from .values import Values
 
 _ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
 

@@ -9,8 +9,8 @@ from epicycle.actors import counted
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, CompositeExecutionAspect, ExecutionAspect, FiringTime, Reading, Selection
 
+from ..text import Problems
 from .graph import ModelGraph
-from .problems import Problems
 
 
 @dataclass

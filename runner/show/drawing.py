@@ -7,10 +7,9 @@ from pathlib import Path
 from epicycle.actors import EpicycleError, ParameterError, declared_parameters, readable, unknown_parameter, variants
 
 from ..engine import Results
-from ..model import Model, Position, Problems, describe, did_you_mean, raised_at, told_raised
+from ..model import Model, describe, raised_at
 from ..model.configuration import place_of
-from ..model.document import Mapping, Sequence, plain
-from ..model.patterns import PatternError, select
+from ..text import Mapping, PatternError, Position, Problems, Sequence, did_you_mean, plain, select, told_raised
 from .canvas import plain_text
 from .figures import Figure
 

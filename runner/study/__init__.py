@@ -19,21 +19,7 @@ from .judge import (
     open_study,
     ranked,
 )
-from .language import (
-    ALWAYS,
-    MAX_STUDY_SEED,
-    Dimension,
-    Factor,
-    MetricError,
-    Study,
-    StudyMetric,
-    find_study,
-    in_si,
-    is_study,
-    read_study,
-    split_number,
-)
-from .plan import Column, Condition, Plan
+from .plan import Column, Condition, MetricError, Plan
 from .run import (
     OK,
     Backlog,
@@ -51,9 +37,7 @@ from .run import (
 from .session import Outcome, TooManyRunsError, available_cores, check_size, plan_of_folder, run_study
 
 __all__ = [
-    "ALWAYS",
     "CONFIRMED",
-    "MAX_STUDY_SEED",
     "NOT_REPRODUCED",
     "OK",
     "REPRODUCED",
@@ -62,9 +46,7 @@ __all__ = [
     "Backlog",
     "Column",
     "Condition",
-    "Dimension",
     "Estimate",
-    "Factor",
     "Finding",
     "Judgement",
     "MetricError",
@@ -76,8 +58,6 @@ __all__ = [
     "ReplayError",
     "Standing",
     "StoreError",
-    "Study",
-    "StudyMetric",
     "StudyResults",
     "TooManyRunsError",
     "WorkerError",
@@ -85,19 +65,14 @@ __all__ = [
     "again",
     "available_cores",
     "check_size",
-    "find_study",
     "half_width",
-    "in_si",
     "is_running",
-    "is_study",
     "mean",
     "open_study",
     "plan_of_folder",
     "progress",
     "ranked",
-    "read_study",
     "repeat",
     "replace_file",
     "run_study",
-    "split_number",
 ]

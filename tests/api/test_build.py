@@ -24,7 +24,8 @@ from epicycle.actors import (
 )
 from epicycle.aspects import MeasurementFailure, PacketLoss
 from epicycle.runner import Model, ModelError, Results, Simulation, load_composite, load_model
-from epicycle.runner.model import firing_order, packaged_models
+from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.model import firing_order
 
 
 class Noisy(Actor):

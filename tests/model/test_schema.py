@@ -22,19 +22,16 @@ from epicycle.actors import (
 )
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
-from epicycle.runner.model import Problems, packaged_models
-from epicycle.runner.model import declarations as language
-from epicycle.runner.model.catalogue import Catalogue, built_in
-from epicycle.runner.model.document import parse, plain
+from epicycle.runner.catalogue import Catalogue, built_in, model_folders, packaged_models
+from epicycle.runner.language import declarations as language
+from epicycle.runner.language.schema import _BESIDE as BESIDE
+from epicycle.runner.language.schema import CONNECTION, PATTERN, QUANTITY, RULES, json_schema
+from epicycle.runner.language.schema import _value as value_schema
 from epicycle.runner.model.indices import BadIndexError, resolve
-from epicycle.runner.model.load import model_folders
-from epicycle.runner.model.patterns import PatternError, compile_pattern
-from epicycle.runner.model.schema import _BESIDE as BESIDE
-from epicycle.runner.model.schema import CONNECTION, PATTERN, QUANTITY, RULES, json_schema
-from epicycle.runner.model.schema import _value as value_schema
 from epicycle.runner.model.wiring import _ENDPOINT as ENDPOINT
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import study_figure_types
+from epicycle.runner.text import PatternError, Problems, compile_pattern, parse, plain
 from tests.bad_models.test_bad_models import CASES
 from tests.cases import Case
 from tests.model.model_parts import TYPES

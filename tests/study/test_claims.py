@@ -17,12 +17,11 @@ import pytest
 from scipy import stats
 
 from epicycle.runner import open_study
-from epicycle.runner.model.packaged import packaged_models
-from epicycle.runner.model.problems import Position
+from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.language import Claim, Study, read_study, study_of_text
 from epicycle.runner.show.report import answers
 from epicycle.runner.show.report.data import Data
-from epicycle.runner.study import Plan, Study, read_study, run_study
-from epicycle.runner.study.declaration import study_of_text
+from epicycle.runner.study import Plan, run_study
 from epicycle.runner.study.judge.claims import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -35,7 +34,7 @@ from epicycle.runner.study.judge.claims import (
 )
 from epicycle.runner.study.judge.guideline import Recommendation, recommend
 from epicycle.runner.study.judge.samples import Samples
-from epicycle.runner.study.questions import Claim
+from epicycle.runner.text import Position
 
 HEAD = """
 study: s

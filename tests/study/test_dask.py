@@ -19,7 +19,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.runner.cli import main
-from epicycle.runner.study import Plan, open_study, read_study
+from epicycle.runner.language import read_study
+from epicycle.runner.study import Plan, open_study
 from epicycle.runner.study.run.backlog import Backlog
 from epicycle.runner.study.run.parcel import fitness, pack
 from epicycle.runner.study.run.runner import Runner

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from epicycle.actors import counted
 
+from ...language import ALWAYS
 from ...study import (
-    ALWAYS,
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,

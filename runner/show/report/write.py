@@ -12,8 +12,9 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, abridged
 
-from ...model import ModelError, Problems, describe, raised_at
+from ...model import describe, raised_at
 from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
+from ...text import ModelError, Problems
 from ..drawing import FigureError
 from ..folder import MAX_NAME
 from .data import Data

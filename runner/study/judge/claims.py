@@ -19,8 +19,8 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import Formula
 
+from ...language import ALWAYS, FALLS, GREATER, RISES, Claim, Factor, Selection, asks_for_none
 from ..inference import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
-from ..language import ALWAYS, FALLS, GREATER, RISES, Claim, Factor, Selection, asks_for_none
 from .samples import Levels, Place, Samples, finite, has_enough
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"

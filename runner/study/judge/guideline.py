@@ -15,8 +15,8 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ...language import Factor, Guideline
 from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
-from ..language import Factor, Guideline
 from .samples import Levels, Place, Samples, finite, has_enough
 
 RESAMPLES = 9_999

@@ -8,7 +8,7 @@ from functools import cache, cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ..language import Factor, Selection, Study
+from ...language import Factor, Selection, Study
 from ..plan import index_of
 from ..run import OK
 

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, counted, read_regular
 
+from ...language import Factor
 from ...tables import pandas_module
+from ...text import did_you_mean
 from ..inference import LEVEL, holm, mean, paired_difference
-from ..language import Factor, did_you_mean
 from ..plan import Plan
 from ..run import BEST_FIRST, OK, Store, StoreError, replace_file
 from .claims import Judgement, Standing, judge, ranked

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from epicycle.actors import declared_parameters, parse_unit
 
-from ..language import Dimension, Model, StudyMetric, select, split_number
+from ...language import Dimension, StudyMetric, split_number
+from ...model import Model
+from ...text import select
 
 
 @dataclass(frozen=True)

@@ -16,26 +16,12 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
-from ..language import (
-    RESERVED,
-    Dimension,
-    Factor,
-    Level,
-    Model,
-    ModelError,
-    Noted,
-    Problems,
-    Setting,
-    Study,
-    StudyMetric,
-    did_you_mean,
-    load_model,
-    noting,
-    plain,
-    study_of_text,
-    types_of_file,
-)
+from ...catalogue import types_of_file
+from ...language import RESERVED, Dimension, Factor, Level, Setting, Study, StudyMetric, study_of_text
+from ...model import Model, load_model
+from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
 from .described import Column, columns_of
+from .metrics import check_metric
 
 _LOGGER = logging.getLogger("epicycle")
 
@@ -119,7 +105,7 @@ class Plan:
         if metrics is None:
             metrics = [StudyMetric(metric.name, metric.name) for metric in read.models[0].metrics]
         for metric in metrics:
-            metric.check(read.models, problems)
+            check_metric(metric, read.models, problems)
             if study.metrics is None and (metric.name in RESERVED or metric.name in study.factors):
                 problems.add(
                     f"metric {metric.name!r} of the model has the name of another column of the table",

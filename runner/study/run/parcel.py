@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...provenance import versions
-from ..language import ModelError, noting
+from ...text import ModelError, noting
 from ..plan import Plan
 from .backlog import Task
 from .processes import WorkerError

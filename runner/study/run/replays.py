@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from epicycle.actors import EpicycleError
 
 from ...engine import Results, Simulation
-from ..language import Model
+from ...model import Model
 from ..plan import Plan
 from .processes import DONE, Processes
 

@@ -10,8 +10,8 @@ from typing import Any
 from epicycle.actors import EpicycleError, readable
 
 from ...engine import LogFilter, Results, Simulation
-from ..language import Model
-from ..plan import Condition, Plan
+from ...model import Model
+from ..plan import Condition, Plan, value_of
 from .backlog import FAILED, OK, Task
 from .store import Row
 
@@ -48,7 +48,7 @@ class Runner:
             if isinstance(model, str):
                 raise EpicycleError(model)
             results = Simulation(model, seed=task.seed).run()
-            row |= {metric.name: metric.value(results) for metric in self.plan.metrics}
+            row |= {metric.name: value_of(metric, results) for metric in self.plan.metrics}
             row |= {"status": OK, "events": results.events, "digest": results.digest}
         except Exception as error:
             told = str(error) if isinstance(error, EpicycleError) else f"{type(error).__name__}: {error}"

@@ -14,10 +14,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+from ..text import NORMAL, RAISE_IT, Limits, Position, Problems, Text, did_you_mean
 from .declarations import CompositeText, ConnectionText, PartText, PointcutText, PortText
-from .limits import NORMAL, RAISE_IT, Limits
-from .problems import Position, Problems, did_you_mean
-from .reading import Text
 
 MAX_BASES = 50
 

@@ -20,7 +20,7 @@ import epicycle.aspects
 from epicycle.actors import Actor, Configurable, EpicycleError, Process
 from epicycle.aspects import Aspect, ClockAspect
 
-from .files import note_package
+from ..text import note_package
 
 GROUPS: dict[type, str] = {Actor: "epicycle.actors", Aspect: "epicycle.aspects"}
 _ENTRY = re.compile(r"[A-Za-z_][\w.]*\s*:\s*[A-Za-z_][\w.]*\s*(\[.*\])?\Z", re.ASCII)

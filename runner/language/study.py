@@ -7,17 +7,27 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..model import Position, Problems, did_you_mean
-from ..model.declarations import STUDY_KEYS, STUDY_METRIC_KEYS, UNTIL_KEYS, DeclarationReader, PartText
-from ..model.disturbance import find_disturbance
-from ..model.document import Entry, Mapping, Node, Scalar, parse, read
-from ..model.observation import MAX_SEED
-from ..model.packaged import find, is_path, packaged_disturbances, packaged_models, packaged_studies, unreadable
-from ..model.reading import NodeReader, is_empty
-from ..model.settings import Setting, parse_setting, settings_in
+from ..catalogue import find, is_path, packaged_disturbances, packaged_models, packaged_studies, unreadable
+from ..text import (
+    MAX_SEED,
+    Entry,
+    Mapping,
+    Node,
+    NodeReader,
+    Position,
+    Problems,
+    Scalar,
+    did_you_mean,
+    is_empty,
+    parse,
+    read,
+)
+from .declarations import STUDY_KEYS, STUDY_METRIC_KEYS, UNTIL_KEYS, DeclarationReader, PartText
 from .dimensions import Dimension, Level, Listed
-from .metrics import StudyMetric, checked_metric
+from .disturbance import find_disturbance
 from .questions import QuestionReader, Questions, without
+from .settings import Setting, parse_setting, settings_in
+from .study_metric import StudyMetric, checked_metric
 from .variation import DimensionReader
 
 LARGE = 10_000_000  # bytes of a file

@@ -15,9 +15,8 @@ import numpy as np
 from epicycle.actors import declared_ports, shaped
 from epicycle.aspects import Request
 
-from .catalogue import Catalogue
-from .problems import did_you_mean
-from .reading import split
+from ..text import did_you_mean, split
+from .types import Catalogue
 
 BUILT_IN: dict[str, Any] = {
     "any": Any,

@@ -8,12 +8,30 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..text import (
+    NAME,
+    NORMAL,
+    Comparisons,
+    Entry,
+    Limits,
+    Mapping,
+    Node,
+    PatternError,
+    Position,
+    Problems,
+    Scalar,
+    Sequence,
+    Text,
+    check_pattern,
+    did_you_mean,
+    matches,
+    names_asked,
+    names_of,
+    parse,
+    read,
+    split,
+)
 from .declarations import ModelText, PartText, PointcutText
-from .document import Entry, Mapping, Node, Scalar, Sequence, parse, read
-from .limits import NORMAL, Limits
-from .patterns import Comparisons, PatternError, check_pattern, matches, names_asked, names_of
-from .problems import Position, Problems, did_you_mean
-from .reading import NAME, Text, split
 
 
 @dataclass

@@ -8,10 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from epicycle.actors import Actor, declared_parameters
 from epicycle.actors.expression import ExpressionError, names_in
 
-from .catalogue import CatalogueError
+from ..catalogue import CatalogueError
+from ..text import Entry, Node, Problems, Scalar, Sequence, nearest
 from .declarations import CompositeText, ModelText, PartText
-from .document import Entry, Node, Scalar, Sequence
-from .problems import Problems, nearest
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _MAX_STRANGE = 50  # comparing names takes time

@@ -12,9 +12,8 @@ from typing import Any, TypeAlias
 
 from epicycle.actors import Quantity, UnitError
 
-from ..model.document import Node, Scalar, plain
-from ..model.problems import Position
-from ..model.settings import Setting
+from ..text import Node, Position, Scalar, plain
+from .settings import Setting
 
 Factor: TypeAlias = bool | int | float | str | None
 KINDS: dict[str, type] = {"bool": bool, "int": int, "float": float, "text": str}

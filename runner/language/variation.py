@@ -6,13 +6,10 @@ from decimal import Decimal
 
 from epicycle.actors import UnitError, parse_unit, random_stream
 
-from ..model import Position
-from ..model.declarations import HYPERCUBE_KEYS, RANGE_KEYS
-from ..model.document import Entry, Mapping, Node, Sequence
-from ..model.observation import MAX_SEED
-from ..model.reading import NodeReader, is_empty
-from ..model.settings import Setting, is_pattern, settings_in
+from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Sequence, is_empty
+from .declarations import HYPERCUBE_KEYS, RANGE_KEYS
 from .dimensions import Dimension, Level, Listed, Ranged, as_factor, in_si, kind_of, number_node, split_number
+from .settings import Setting, is_pattern, settings_in
 
 MAX_LEVELS = 10**12  # of a range
 MAX_SAMPLES = 100_000  # of a Latin hypercube, which is made as a whole

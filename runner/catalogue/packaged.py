@@ -8,7 +8,7 @@ from pathlib import Path
 
 from epicycle.actors import irregular
 
-from .problems import Problems, did_you_mean
+from ..text import Problems, did_you_mean
 
 
 def model_folders() -> list[Path]:

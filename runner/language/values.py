@@ -8,10 +8,8 @@ from typing import Any
 from epicycle.actors import MAX_DEPTH, Parameter, ParameterError, Quantity, UnitError, is_too_deep
 from epicycle.actors.expression import Budget, BudgetError, ExpressionError, check_names, interpolate, names_in
 
+from ..text import Mapping, Node, Position, Problems, Scalar, Sequence, inside
 from .declarations import ParameterText
-from .document import Mapping, Node, Scalar, Sequence
-from .problems import Position, Problems
-from .reading import inside
 
 MAX_STEPS = 500_000
 

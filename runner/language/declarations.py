@@ -9,10 +9,22 @@ from epicycle.actors import Parameter, ParameterError, UnitError, declared_param
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import FiringTime
 
-from .document import Entry, Mapping, Node, Scalar, Sequence
-from .measure import TAKES, Measure, take_problem
-from .problems import Position, nearest
-from .reading import NAME, SURE, NodeReader, Text, inside, split
+from ..catalogue import TAKES, Measure, take_problem
+from ..text import (
+    NAME,
+    SURE,
+    Entry,
+    Mapping,
+    Node,
+    NodeReader,
+    Position,
+    Scalar,
+    Sequence,
+    Text,
+    inside,
+    nearest,
+    split,
+)
 
 MODEL_KEYS = (
     "model",

@@ -18,12 +18,9 @@ from epicycle.actors import Actor, Configurable, MappingParameter, Parameter, de
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect, FiringTimeParameter
 
+from ..catalogue import TAKES, Catalogue, Measure, as_written, doc_of, first_sentence, is_part, parts_of, shown
+from ..text import MAX_SEED, NORMAL
 from . import declarations as language
-from .catalogue import Catalogue
-from .limits import NORMAL
-from .measure import TAKES, Measure
-from .observation import MAX_SEED
-from .reference import as_written, doc_of, first_sentence, is_part, parts_of, shown
 from .schema_parts import QUANTITY, TEXT, Schema, mapping, one_or_more, ref, text
 from .study_schema import STUDY_RULES, claim, dimension, study
 

@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import Parameter, ParameterError
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..model import Position, Problems, did_you_mean
-from ..model.declarations import CLAIM_KEYS, GUIDELINE_KEYS
-from ..model.document import Entry, Node, Scalar, Sequence, parse
-from ..model.document import Mapping as MappingNode
-from ..model.packaged import find, is_path, packaged_studies, unreadable
-from ..model.reading import NodeReader, Text, inside
+from ..catalogue import find, is_path, packaged_studies, unreadable
+from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence, Text, did_you_mean, inside, parse
+from ..text import Mapping as MappingNode
+from .declarations import CLAIM_KEYS, GUIDELINE_KEYS
 from .dimensions import Dimension, Factor, as_factor
 
 if TYPE_CHECKING:
-    from .declaration import Study
+    from .study import Study
 
 LESS, GREATER, RISES, FALLS, ALWAYS = "less", "greater", "rises", "falls", "always"
 FORMS = {
