@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, complain_traceback, tell
-from .options import DONE, FAILED, INTERRUPTED, add_types
+from .options import DONE, FAILED, INTERRUPTED, add_types, seed
 
 if TYPE_CHECKING:
     from ..study import Plan, StudyResults
@@ -77,9 +77,7 @@ def first_seed(text: str) -> int:
     """A seed after which those of all replications are seeds, too."""
     from ..language import MAX_STUDY_SEED
 
-    if not text.isdecimal() or len(text) > 20 or int(text) > MAX_STUDY_SEED:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {MAX_STUDY_SEED}")
-    return int(text)
+    return seed(text, MAX_STUDY_SEED)
 
 
 def address(text: str) -> str:
