@@ -25,6 +25,7 @@ from epicycle.runner.study.run.backlog import Backlog
 from epicycle.runner.study.run.parcel import fitness, pack
 from epicycle.runner.study.run.runner import Runner
 from tests.study.dask_cluster import Cluster, a_cluster, without_epicycle
+from tests.study.study_commands import study
 from tests.study.study_parts import STUDY, THIS, command, write
 
 pytest.importorskip("distributed")
@@ -44,12 +45,6 @@ def table_of(folder: Path) -> bytes:
 def without_progress(text: str) -> str:
     """What was said, without the line a minute that a slow machine may add."""
     return re.sub(r"^\d\d:\d\d:\d\d walks: .*\n", "", text, flags=re.M)
-
-
-def study(folder: Path, *arguments: object, out: str = "out") -> int:
-    return main(
-        ["study", str(folder / "walks.yaml"), "--types", str(THIS), "--out", str(folder / out), *map(str, arguments)]
-    )
 
 
 def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
