@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from epicycle.actors import counted
 
 from ...language import ALWAYS
-from ...study.claims import (
+from ...study import (
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,
@@ -16,9 +16,9 @@ from ...study.claims import (
     UNDECIDED,
     Finding,
     Judgement,
+    Recommendation,
     ranked,
 )
-from ...study.guideline import Recommendation
 from .data import Data, Names, shown
 from .html import Content, Html, table, tag, with_class
 from .numbers import estimated, rounded

@@ -25,8 +25,7 @@ from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
 from ...engine import Results
 from ...model import Model
-from ...study import Plan
-from ...study.statistics import half_width
+from ...study import Plan, half_width
 from ...text import Problems, select
 from ..drawing import draw, figures_of
 from ..figures import Figure, positions

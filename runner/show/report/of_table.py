@@ -12,8 +12,7 @@ from typing import Any
 from epicycle.actors import Parameter, counted, texts_parameter
 
 from ...language import Factor
-from ...study import Plan
-from ...study.statistics import mean
+from ...study import Plan, mean
 from .data import Condition, Data, Names, is_numeric
 from .figure import Complaint, Layout, Panel, Roles, RunKey, StudyFigure, layout, roles, unknown
 from .style import DASHES, LIMIT, MARKERS, PALETTE, Sheet

@@ -10,9 +10,7 @@ from typing import Any
 from epicycle.actors import counted
 
 from ...language import Factor
-from ...study.claims import Judgement
-from ...study.guideline import Recommendation
-from ...study.statistics import mean
+from ...study import Judgement, Recommendation, mean
 from . import answers
 from .data import Condition, Data, shown
 from .html import Content, Html, page, table, tag, with_class
