@@ -16,8 +16,7 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print every packaged model, disturbance and study with the first sentence of its doc."""
-    from ..model import load_model, packaged_disturbances, packaged_models, packaged_studies
-    from ..model.disturbance import load_disturbance
+    from ..model import load_disturbance, load_model, packaged_disturbances, packaged_models, packaged_studies
     from ..study import read_study
     from ..text import Problems
 

@@ -81,7 +81,7 @@ def add_types(command: argparse.ArgumentParser) -> None:
 
 def own_types(options: argparse.Namespace) -> list[type]:
     """The types of the files that ``--types`` names."""
-    from ..model.own_types import types_of_file
+    from ..model import types_of_file
 
     return [each for file in options.types for each in types_of_file(Path(file))]
 

@@ -75,7 +75,7 @@ def count(text: str) -> int:
 
 def first_seed(text: str) -> int:
     """A seed after which those of all replications are seeds, too."""
-    from ..study.declaration import MAX_STUDY_SEED
+    from ..study import MAX_STUDY_SEED
 
     if not text.isdecimal() or len(text) > 20 or int(text) > MAX_STUDY_SEED:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {MAX_STUDY_SEED}")
@@ -153,12 +153,10 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Make the runs that are missing, and tell what came of it."""
     from epicycle.actors import counted
 
-    from ..study import WorkerError, WriteError, open_study, run_study
-    from ..study.one_run import again
-    from ..study.progress import progress
+    from ..study import WorkerError, WriteError, again, open_study, progress_bar, run_study
 
     try:
-        with progress(plan.study.name) as told:
+        with progress_bar(plan.study.name) as told:
             outcome = run_study(
                 plan,
                 folder,

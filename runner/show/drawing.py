@@ -7,9 +7,7 @@ from pathlib import Path
 from epicycle.actors import EpicycleError, ParameterError, declared_parameters, readable, unknown_parameter, variants
 
 from ..engine import Results
-from ..model import Model, describe, raised_at
-from ..model.configuration import place_of
-from ..model.patterns import PatternError, select
+from ..model import Model, PatternError, describe, place_of, raised_at, select
 from ..text import Mapping, Position, Problems, Sequence, did_you_mean, plain, told_raised
 from .canvas import plain_text
 from .figures import Figure

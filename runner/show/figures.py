@@ -16,7 +16,7 @@ from epicycle.actors import Configurable, Parameter, array_parameter, shortened,
 from epicycle.aspects import STAMP
 
 from ..engine import Results, Signal, cell, leaves
-from ..model.patterns import select
+from ..model import select
 from ..tables import short
 
 MAX_TEXT = 200  # characters of a label

@@ -12,17 +12,18 @@ from rich.text import Text
 
 from epicycle.actors import Configurable, variants
 
-from ..model import Model
-from ..model.catalogue import Catalogue
-from ..model.measure import TAKES, Measure
-from ..model.reference import (
+from ..model import (
+    TAKES,
+    Catalogue,
+    Measure,
+    Model,
     ParameterReference,
     PortReference,
     TypeReference,
     as_written,
-    describe,
+    as_yaml,
+    describe_type,
     parts_of,
-    shown,
 )
 from .figures import Figure
 
@@ -34,14 +35,15 @@ def figure_types() -> dict[str, type[Figure]]:
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
     """What types declare, topic by topic and in the order of their names."""
-    found = [describe(name, cls) for name, cls in types.items()]
+    found = [describe_type(name, cls) for name, cls in types.items()]
     return sorted(found, key=lambda each: (each.group, each.name.casefold()))
 
 
 def parts_described(types: Iterable[type[Configurable]]) -> dict[str, list[TypeReference]]:
     """What the parts declare that parameters of these types take, by the base of the parts."""
     return {
-        base.__name__: [describe(name, cls) for name, cls in known.items()] for base, known in parts_of(types).items()
+        base.__name__: [describe_type(name, cls) for name, cls in known.items()]
+        for base, known in parts_of(types).items()
     }
 
 
@@ -116,7 +118,7 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
         given = {name: value for name, value in written.items() if name != "type"} if isinstance(written, dict) else {}
         for path in woven.places:
             here = {**given, **({} if woven.model is None else woven.model.at(path))}
-            parameters = ", ".join(f"{name}: {shown(value)}" for name, value in here.items())
+            parameters = ", ".join(f"{name}: {as_yaml(value)}" for name, value in here.items())
             found.setdefault(path, []).append((woven.name, woven.kind, parameters))
     places = dict.fromkeys((*model.graph.ports.nodes, *model.graph.actors, *found))  # the others come last
     return {path: found[path] for path in places if path in found}
@@ -174,7 +176,7 @@ def _metrics() -> list[str]:
     ]
     options = [
         [f"`{row[0]}`", *row[1:]]
-        for row in map(_parameter_row, describe("metric", Measure).parameters)
+        for row in map(_parameter_row, describe_type("metric", Measure).parameters)
         if row[0] != "take"
     ]
     return [
@@ -253,6 +255,6 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
         parameter.name,
         kind,
         parameter.unit,
-        "required" if parameter.required else shown(parameter.default),
+        "required" if parameter.required else as_yaml(parameter.default),
         parameter.doc,
     ]

@@ -13,9 +13,7 @@ from typing import Any
 
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 
-from ...model import Model, WovenAspect
-from ...model.clock import Clock
-from ...model.graph import Hop
+from ...model import Clock, Hop, Model, WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded if nothing else is asked for
 

@@ -7,10 +7,8 @@ from contextlib import suppress
 
 from epicycle.actors import ParameterError, UnitError, declared_parameters, did_you_mean, unknown_parameter, variants
 
-from ...model import Model
-from ...model.declarations import PartText
-from ...study import Plan
-from ...study.dimensions import in_si, split_number
+from ...model import Model, PartText
+from ...study import Plan, in_si, split_number
 from ...text import Mapping, ModelError, Node, Position, Problems, Sequence, plain
 from .figure import Complaint, SignalFigure, StudyFigure
 from .of_signals import Series, SingleRun, Tracks

@@ -12,8 +12,7 @@ from epicycle.actors import Configurable, MappingParameter, Parameter, counted, 
 
 from ...engine import Results
 from ...model import Model
-from ...study import Plan
-from ...study.dimensions import Dimension, Factor
+from ...study import Dimension, Factor, Plan
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 from .style import MAX_LINES, MAX_PANELS
 

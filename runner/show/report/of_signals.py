@@ -24,10 +24,8 @@ from epicycle.actors import (
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
 from ...engine import Results
-from ...model import Model
-from ...model.patterns import select
-from ...study import Plan
-from ...study.statistics import half_width
+from ...model import Model, select
+from ...study import Plan, half_width
 from ...text import Problems
 from ..drawing import draw, figures_of
 from ..figures import Figure, positions

@@ -9,10 +9,7 @@ from typing import Any
 
 from epicycle.actors import counted
 
-from ...study.claims import Judgement
-from ...study.dimensions import Factor
-from ...study.guideline import Recommendation
-from ...study.statistics import mean
+from ...study import Factor, Judgement, Recommendation, mean
 from . import answers
 from .data import Condition, Data, shown
 from .html import Content, Html, page, table, tag, with_class
