@@ -9,7 +9,7 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..collection import without_collection
 from ..tables import Table, as_html, as_text, short
-from ..text import NAME, Problem, Problems, Text, call_site, within
+from ..text import NAME, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
@@ -140,6 +140,10 @@ class Model(Scope):
         problems.raise_if_any()
         values = {"take": take, **options}
         self._watch([of], lambda observation, text: observation.metric(name, text, values, position))
+
+    def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
+        """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
+        return Observation(self, Values(problems), problems).select(Text(pattern, position), what)
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[Observation, Text], None]) -> None:
         """Let an ``Observation`` do what it does for a model file."""

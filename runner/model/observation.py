@@ -88,14 +88,14 @@ class Observation:
 
     def record(self, text: Text) -> None:
         """Keep what the ports behind a pattern send."""
-        found = [path for path in self._select(text, "record") if path not in self._recorded]
+        found = [path for path in self.select(text, "record") if path not in self._recorded]
         self._recorded.update(found)
         self.model.recorded += found
 
     def stop_when(self, text: Text) -> None:
         """End the run when a port behind the pattern sends something true."""
         self.graph.positions["stop_when"] = text.position
-        for path in self._select(text, "stop_when"):
+        for path in self.select(text, "stop_when"):
             self.model.stop_ports.append(path)
             for port in self.graph.source_of(path):
                 if not accepts(float | bool, port.type):
@@ -120,7 +120,7 @@ class Observation:
         if measure is None:
             return
         self.graph.positions[what] = position
-        paths = self._select(of, what)
+        paths = self.select(of, what)
         self._watched += len(paths)
         limit = self.graph.limits.watched
         if self._watched > limit:
@@ -162,7 +162,7 @@ class Observation:
             self.problems.add(f"{what}: {problem}", places.get(option, position), *([advice] if advice else []))
         return measure
 
-    def _select(self, text: Text, what: str) -> list[str]:
+    def select(self, text: Text, what: str) -> list[str]:
         """The output ports that a pattern selects, composites' included."""
         try:
             found = self._outputs.select(text.text)

@@ -7,7 +7,6 @@ Colours are Okabe and Ito's, which people with any colour vision can tell apart;
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 import networkx as nx
 
 from ...model import extent
-from ..canvas import PLAIN, open_matplotlib
+from ..pen import new_canvas, save, style
 from . import text
 from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width
 from .outline import short_name
@@ -27,37 +26,19 @@ ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0
 DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
 # Of a PNG: whole pixels for a point, so that lines are sharp; how many pixels there may be, and on one side.
 DPI, PIXELS, SIDE = (288, 144, 72), 4e7, 30000
-# What matplotlib would write into a file of its own accord: names, versions, times.
-METADATA = {
-    "svg": ("Creator", "Date", "Format", "Type"),
-    "png": ("Software",),
-    "pdf": ("Creator", "Producer", "CreationDate"),
-}
 
 
 def write_picture(drawing: Drawing, path: Path) -> None:
     """Draw into a file, whose ending decides the format; the same drawing gives the same bytes."""
-    open_matplotlib()
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     legend = _legend(drawing)
     width = max([drawing.width, *(row.width + 2 * MARGIN for row in legend)])
     height = drawing.height + sum(row.height for row in legend) + (MARGIN if legend else 0.0)
-    kind = path.suffix.lower()[1:]
-    with mpl.rc_context(), warnings.catch_warnings():
-        mpl.rcdefaults()  # whatever the user's own style is
-        mpl.rcParams.update({"svg.hashsalt": "epicycle", "svg.fonttype": "path", "path.simplify": False, **PLAIN})
-        warnings.filterwarnings("ignore", message="Glyph")  # a box stands for what the font lacks
-        figure = Figure(figsize=(width / 72, height / 72))
-        FigureCanvasAgg(figure)
-        sheet = figure.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
+    with style({"path.simplify": False}):
+        canvas = new_canvas(width / 72, height / 72)
+        sheet = canvas.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
         sheet.set_axis_off()
         _Painter(sheet, drawing, legend).paint()
-        figure.savefig(
-            path, format=kind, dpi=_resolution(width, height), facecolor="white", metadata=dict.fromkeys(METADATA[kind])
-        )
+        save(canvas, path, dpi=_resolution(width, height), facecolor="white")
 
 
 def _resolution(width: float, height: float) -> float:

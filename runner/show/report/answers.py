@@ -19,10 +19,9 @@ from ...study import (
     Recommendation,
     ranked,
 )
-from .data import Data, Names, shown
+from .data import Data, Names, mean_of, shown
 from .html import Content, Html, table, tag, with_class
 from .numbers import estimated, rounded
-from .of_table import mean_of
 
 
 def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,6 +27,11 @@ class Condition:
     def good(self) -> list[dict[str, Any]]:
         """The rows of the runs that came to their end."""
         return [row for row in self.rows if row["status"] == OK]
+
+    def numbers(self, metric: str) -> list[float]:
+        """The numbers of a metric; runs that failed or have none are left out."""
+        values = (row[metric] for row in self.good)
+        return [value for value in values if value is not None and math.isfinite(value)]
 
 
 class Data:
@@ -126,3 +132,8 @@ def _is_number(value: object) -> bool:
 def is_numeric(plan: Plan, factor: str) -> bool:
     """Whether the levels of a factor are numbers."""
     return plan.study.factors[factor] in ("int", "float")
+
+
+def mean_of(what: str) -> str:
+    """What the mean of something is called; that of a mean is one, too."""
+    return what if what.startswith("mean ") else f"mean {what}"

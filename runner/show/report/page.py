@@ -14,7 +14,6 @@ from . import answers
 from .data import Condition, Data, shown
 from .html import Content, Html, page, table, tag, with_class
 from .numbers import estimated
-from .of_table import numbers
 
 MAX_ROWS = 400  # of one table
 MAX_FAILURES = 50  # that are told one by one
@@ -326,7 +325,7 @@ def _cell(condition: Condition | None, metric: str) -> Content:
     """A mean with its interval, and the number of runs behind it if that is not all that are over."""
     if condition is None:
         return ""
-    values = numbers(condition, metric)
+    values = condition.numbers(metric)
     few = tag("small", f"{len(values)} of {len(condition.rows)}") if len(values) < len(condition.rows) else None
     return [estimated(mean(values)), few]
 
