@@ -8,7 +8,8 @@ from pathlib import Path
 from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..collection import without_collection
-from ..tables import Table, as_html, as_text, short
+from ..shown import short
+from ..tables import Table, as_html, as_text
 from ..text import NAME, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check

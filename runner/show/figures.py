@@ -15,7 +15,7 @@ from epicycle.aspects import STAMP
 
 from ..engine import Results, Signal, cell, leaves
 from ..model import select
-from ..tables import short
+from ..shown import short
 from .pen import LIMIT, PALETTE, Sheet, legend_beside
 
 MAX_STATES = 24  # in a legend

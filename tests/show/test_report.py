@@ -17,7 +17,7 @@ from epicycle.runner.cli import main
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.show.report.figure import layout, roles
-from epicycle.runner.show.report.numbers import rounded
+from epicycle.runner.shown import rounded
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
 from epicycle.runner.study import Plan, StudyMetric, read_study

@@ -9,7 +9,8 @@ from typing import Any
 
 from epicycle.actors import abridged, visible
 
-from ...study import OK, Factor, Plan, StudyResults
+from ...shown import in_words, rounded
+from ...study import OK, Estimate, Factor, Plan, StudyResults
 
 MAX_LISTED = 12  # levels in a message
 MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level
@@ -116,13 +117,15 @@ class Names:
 
 def shown(value: Factor) -> str:
     """A level as people write it."""
-    if value is None:
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, (int, float)):
-        return f"{value:g}" if isinstance(value, float) else str(value)
-    return abridged(visible(value), MAX_LEVEL)
+    return abridged(visible(in_words(value)), MAX_LEVEL)
+
+
+def estimated(estimate: Estimate) -> str:
+    """A number with its interval, to two digits of that: ``4.81 ± 0.06``."""
+    width = estimate.high - estimate.low
+    if estimate.count == 0 or not math.isfinite(width) or width == 0:
+        return rounded(estimate.value, width)
+    return f"{rounded(estimate.value, width)} ± {rounded(width / 2, width)}"
 
 
 def _is_number(value: object) -> bool:
