@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .model import Composite, Model, load_composite, load_model
     from .study import StudyResults, open_study
     from .text import ModelError
+    from .text import ModelError
     from .trial import Trial
 
 __all__ = [
@@ -35,7 +36,7 @@ _HOMES = {
     "Simulation": "engine",
     "Trial": "trial",
     "Model": "model",
-    "ModelError": "model",
+    "ModelError": "text",
     "load_composite": "model",
     "load_model": "model",
     "StudyResults": "study",

@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..language import MAX_STUDY_SEED
 from ..printing import complain, complain_traceback, tell
 from .options import DONE, FAILED, INTERRUPTED, add_types, seed
 
@@ -75,7 +76,6 @@ def count(text: str) -> int:
 
 def first_seed(text: str) -> int:
     """A seed after which those of all replications are seeds, too."""
-    from ..language import MAX_STUDY_SEED
 
     return seed(text, MAX_STUDY_SEED)
 
@@ -152,10 +152,11 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Make the runs that are missing, and tell what came of it."""
     from epicycle.actors import counted
 
-    from ..study import WorkerError, WriteError, again, open_study, progress, run_study
+    from ..study import WorkerError, WriteError, again, open_study, run_study
+    from ..study import progress as progress_bar
 
     try:
-        with progress(plan.study.name) as told:
+        with progress_bar(plan.study.name) as told:
             outcome = run_study(
                 plan,
                 folder,

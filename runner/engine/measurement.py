@@ -14,7 +14,7 @@ from epicycle.actors.expression import Formula, operand
 
 from ..catalogue import MSER5, TIME, Measure
 from ..model import Metric
-from ..tables import short
+from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, Interval, TimeBatches, TokenBatches, batch_interval, mser
 from .statistic import statistic_of
 

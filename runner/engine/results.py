@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, to_seconds
 
-from ..tables import Table, as_html, as_text, pandas_module, short
+from ..shown import short
+from ..tables import Table, as_html, as_text, pandas_module
 from ..text import did_you_mean
 from .batches import Interval
 from .encoding import cell, leaves

@@ -10,7 +10,8 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 from ..catalogue import take_problem
 from ..collection import without_collection
 from ..language import Values
-from ..tables import Table, as_html, as_text, short
+from ..shown import short
+from ..tables import Table, as_html, as_text
 from ..text import NAME, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
@@ -153,6 +154,10 @@ class Model(Scope):
         problems.raise_if_any()
         values = {"take": take, **options}
         self._watch([of], lambda watching, text: watching.metric(name, text, values, position))
+
+    def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
+        """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
+        return Watching(self.draft, Values(problems), problems).select(Text(pattern, position), what)
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[Watching, Text], None]) -> None:
         """Find out what is to be watched as for a model file."""

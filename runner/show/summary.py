@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from rich.console import Group
@@ -13,6 +12,7 @@ from epicycle.actors import shortened, visible
 
 from ..engine import Results, plain
 from ..model import Model, extent
+from ..shown import finite, in_words
 
 WIDEST = 400  # characters of a text in the table
 
@@ -35,17 +35,6 @@ def summary_object(results: Results) -> dict[str, Any]:
         }
     )
     return result
-
-
-def finite(value: Any) -> Any:
-    """The same with every number that is not finite replaced by None."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def summary_table(model: Model, results: Results) -> Group:
@@ -83,10 +72,4 @@ def _cell(text: str) -> Text:
 
 def shown(value: Any) -> str:
     """A metric's value in few characters."""
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.4g}" if abs(value) < 1e5 else f"{value:.6g}"
-    return str(plain(value))
+    return in_words(plain(value), digits=4, nothing="-")

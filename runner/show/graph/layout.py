@@ -66,13 +66,18 @@ class Wire:
 
 @dataclass(frozen=True)
 class Pill:
-    """A badge on a line: an aspect where it stands, or the ``label`` of a connection (aspect is empty)."""
+    """A badge on a line: an aspect where it stands, or the label of a connection (aspect is empty) with its delay."""
 
     text: str
     aspect: str
     x: float
     y: float  # of its middle
-    width: float
+    delay: int | None = None  # ns
+
+    @property
+    def width(self) -> float:
+        """How wide it is."""
+        return pill_width(self.text)
 
 
 @dataclass(frozen=True)
@@ -290,14 +295,13 @@ class _Scope:
                     ports.append(PlacedPort(port, side, edge, at, port.path in joined))
                     start = edge - HEAD - _pills_width(port) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
                     for aspect in port.aspects:
-                        drawing.pills.append(Pill(aspect, aspect, start, at, pill_width(aspect)))
+                        drawing.pills.append(Pill(aspect, aspect, start, at))
                         start += pill_width(aspect) + PILL_GAP
                     drawing.words.append(_port_name(ports[-1], child.is_open))
             drawing.words += self._names(child, left, upper, cell.width)
             hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
             for name in reversed(child.aspects):
-                wide = pill_width(name)
-                drawing.pills.append(Pill(name, name, left + (cell.width - wide) / 2, hidden, wide))
+                drawing.pills.append(Pill(name, name, left + (cell.width - pill_width(name)) / 2, hidden))
                 hidden -= PILL_HEIGHT + PILL_GAP
             drawing.boxes.append(PlacedBox(child, left, upper, cell.width, cell.height, level, tuple(ports)))
             if child in self.inner:
@@ -308,7 +312,8 @@ class _Scope:
                 cell, words = net.labelled, label(links[0])
                 forward = cell.layer > net.source.cell.layer
                 start = self.begins[cell.layer] + 4.0 if forward else self.ends_at[cell.layer] - cell.width + 4.0
-                drawing.pills.append(Pill(words, "", x + start, top + cell.y + cell.height / 2, pill_width(words)))
+                at = top + cell.y + cell.height / 2
+                drawing.pills.append(Pill(words, "", x + start, at, links[0].delay))
 
     def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
         """The name and type of a box: in one line above the inside of a composite, else one below the other."""
