@@ -53,7 +53,7 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "aspects/crash.py": (("sum",), WHOLE),
     "aspects/tokens.py": (("sum",), WHOLE),
     "runner/engine/statistic.py": (("sum",), WHOLE),
-    "runner/engine/encoding.py": (("sum",), "only asks whether a sum is NaN"),
+    "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/model/checks.py": (("sum",), WHOLE),
     "runner/model/problems.py": (("sum",), WHOLE),
     "runner/columns.py": (("numpy.cumsum",), WHOLE),

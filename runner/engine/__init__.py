@@ -1,13 +1,23 @@
 """From a model to its results: director, event log, simulation."""
 
+from ..results import (
+    EventLog,
+    LogError,
+    LogFile,
+    Record,
+    Results,
+    Signal,
+    SignalError,
+    canonical,
+    cell,
+    check_log_path,
+    leaves,
+    plain,
+    write_log,
+)
 from .director import ActorError, Director, LoopError
-from .encoding import canonical, cell, leaves, plain
-from .log import EventLog, LogError, Record
-from .log_file import LogFile, check_log_path, write_log
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
-from .results import Results
-from .signal import Signal, SignalError
 from .simulation import Simulation
 from .trace import Arrival, Firing, Tracer
 

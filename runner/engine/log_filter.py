@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..model import Model, PatternError, did_you_mean, select
-from .log import LogError
+from ..results import LogError
 
 _SHOWN = 12  # names in a message
 

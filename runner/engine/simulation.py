@@ -10,16 +10,14 @@ from typing import Any
 from epicycle.actors import Actor, EpicycleError, to_nanoseconds, to_seconds
 
 from ..collection import without_collection
+from ..interrupt import between_steps
 from ..model import Model, WovenAspect, describe, raised_at
+from ..results import EventLog, Record, Results, Signal
 from .director import ActorError, Director
-from .interrupt import between_steps
 from .local import Deliver
-from .log import EventLog, Record
 from .log_filter import LogFilter
 from .measurement import Measurement
 from .pace import Pace
-from .results import Results
-from .signal import Signal
 from .trace import Tracer, TracingDirector, TracingLog
 from .wiring import Wiring
 
@@ -61,7 +59,7 @@ class Simulation:
         self.director = (
             Director(order, self.seed, limits) if tracer is None else TracingDirector(order, self.seed, tracer, limits)
         )
-        self.log.crowd = self.director.crowd
+        self.log.crowd = self.director.crowd.add
         self.signals = {name: Signal(name) for name in model.recorded}
         self._measurements = {metric.name: Measurement(metric) for metric in model.metrics}
         self._has_run = False

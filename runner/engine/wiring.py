@@ -21,13 +21,12 @@ from epicycle.actors import (
 from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint, Medium, Unit
 
 from ..model import Clock, Hop, Model, WovenAspect, describe
+from ..results import EventLog, Signal, Write
 from .director import ActorError, CrowdError, Director, LoopError
 from .execution import Execution
 from .local import Deliver, LocalDirector, Passage
-from .log import EventLog, Write
 from .parameters import VaryingParameter
 from .requests import Requests
-from .signal import Signal
 
 
 class Wiring:

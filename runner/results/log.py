@@ -18,8 +18,6 @@ from .waiting import LARGE, WaitingTokens
 if TYPE_CHECKING:
     import pandas
 
-    from .director import Crowd
-
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
 _TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 _PIECES = 3_000  # that are hashed together, when a tag is over
@@ -93,7 +91,7 @@ class EventLog:
         self._hashed = 0  # records
         self._tag: Tag | None = None  # of the last record
         self._stamp = b""  # the same in bytes
-        self.crowd: Crowd | None = None  # is told of many records at one tag
+        self.crowd: Callable[[Tag, str, int], None] | None = None  # is told of many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
@@ -118,7 +116,7 @@ class EventLog:
             pieces.extend((self._stamp, head, kept))
             if len(pieces) > _MOST_PIECES:  # all of them at one tag, nearly
                 if self.crowd is not None:
-                    self.crowd.add(tag, f"{actor}.{port}", _MOST_PIECES // 3)
+                    self.crowd(tag, f"{actor}.{port}", _MOST_PIECES // 3)
                 self._hash_pieces()
             elif type(kept) is bytes and len(kept) > LARGE:
                 self._hash_pieces()

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import EpicycleError, Tag, counted, to_seconds
+from epicycle.actors import EpicycleError, Tag, counted, did_you_mean, to_seconds
 
-from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
 from .encoding import field_names, leaves
 
