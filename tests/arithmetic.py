@@ -56,7 +56,7 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/model/checks.py": (("sum",), WHOLE),
     "runner/model/problems.py": (("sum",), WHOLE),
-    "runner/columns.py": (("numpy.cumsum",), WHOLE),
+    "runner/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
     "runner/study/claims.py": (("sum",), WHOLE),
     "runner/study/cluster.py": (("sum",), WHOLE),
