@@ -15,16 +15,18 @@ from ..results import (
     plain,
     write_log,
 )
+from .copies import CopyError
 from .director import ActorError, Director, LoopError
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
-from .simulation import Simulation
+from .simulation import Simulation, Snapshot, SnapshotError
 from .trace import Arrival, Firing, Tracer
 
 __all__ = [
     "SLOWEST",
     "ActorError",
     "Arrival",
+    "CopyError",
     "Director",
     "EventLog",
     "Firing",
@@ -38,6 +40,8 @@ __all__ = [
     "Signal",
     "SignalError",
     "Simulation",
+    "Snapshot",
+    "SnapshotError",
     "Tracer",
     "canonical",
     "cell",

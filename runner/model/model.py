@@ -69,7 +69,6 @@ class Model(Scope):
         self.figures: dict[str, tuple[str, dict[str, object], MappingNode]] = {}  # type, values, as written
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
-        self.is_running = False
         self._order: dict[str, int] | None = None  # worked out since then
         self.stop = stop
 

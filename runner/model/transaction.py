@@ -11,9 +11,6 @@ from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from .ends import mistake
-from .site import call_site
-
 if TYPE_CHECKING:
     from .model import Model
     from .scope import Scope
@@ -22,7 +19,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def all_or_nothing(method: F) -> F:
-    """Let a method of a scope leave the model as it was if it raises; a model that is being run is not changed."""
+    """Let a method of a scope leave the model as it was if it raises."""
 
     @wraps(method)
     def whole(scope: Scope, *arguments: Any, **keywords: Any) -> Any:
@@ -35,12 +32,6 @@ def all_or_nothing(method: F) -> F:
 @contextmanager
 def transaction(model: Model) -> Iterator[None]:
     """What is done inside is undone if it raises."""
-    if model.is_running:
-        raise mistake(
-            f"{model.name} is being run and cannot be changed",
-            call_site(),
-            "change it before or after the run; what is to change in a run is for an aspect",
-        )
     graph, before = model.graph, _Before(model)
     try:
         yield

@@ -5,7 +5,7 @@ from .log import EventLog, LogError, Record, Write
 from .log_file import LogFile, check_log_path, write_log
 from .outcome import Interval, Outcome
 from .results import Results
-from .signal import Signal, SignalError
+from .signal import Past, Signal, SignalError
 from .signal_file import write_signals
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "LogError",
     "LogFile",
     "Outcome",
+    "Past",
     "Record",
     "Results",
     "Signal",

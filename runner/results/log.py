@@ -13,6 +13,7 @@ from epicycle.actors import EpicycleError, Tag, to_seconds
 
 from ..tables import pandas_module, short
 from .encoding import canonical, plain
+from .signal import Past
 from .waiting import LARGE, WaitingTokens
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class EventLog:
         keeps: Callable[[str, str, str, str], bool] | None = None,
         log_to: Callable[[Record], None] | None = None,
     ) -> None:
-        self.records: list[Record] = []
+        self.records: list[Record] = Past()
         self._log_to = log_to
         self._keeps = keeps
         self._writers: dict[tuple[str, str, str, str, int | None], Write] = {}
