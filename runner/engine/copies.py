@@ -56,8 +56,8 @@ class Copies:
         self._known: dict[int, Any] = {id(thing): thing for thing in shared}
         self._callbacks = callbacks
         self._kept: list[Any] = []  # copied things live on, lest another gets the id of one
-        self._to_fill: list[tuple[_Fill, Any, Any, str]] = []
-        self._owner = ""  # what is copied just now: whose it is, and its attribute
+        self._to_fill: list[tuple[_Fill, Any, Any, tuple[Any, str]]] = []
+        self._owner: tuple[Any, str] = None, ""  # whose that is which is copied just now, and the attribute
 
     def of(self, thing: T) -> T:
         """The copy of a thing, whole; raises ``CopyError``."""
@@ -193,6 +193,13 @@ class Copies:
         there = thing()
         return thing if there is None else weakref.ref(self._copy(there))
 
+    def _actor(self, thing: Actor) -> Any:
+        """An actor; one of a model in less time, for there may be thousands."""
+        if self._callbacks is None:
+            return self._object(thing)
+        made = thing.twin(self._known)
+        return self._later(self._fill_object, thing, made)
+
     def _object(self, thing: Any) -> Any:
         made = object.__new__(type(thing))
         self._later(self._fill_object, thing, made)
@@ -202,17 +209,18 @@ class Copies:
 
     def _fill_object(self, thing: Any, made: Any) -> None:
         cls: Any = type(thing)
-        whose = _told(thing) if isinstance(thing, (Actor, JoinPoint, Aspect)) else ""
+        owns = isinstance(thing, (Actor, JoinPoint, Aspect))
         shared: tuple[str, ...] = getattr(cls, "copies_share", ())
         descriptors, put = _descriptors(cls), object.__setattr__
         for name, value in getattr(thing, "__dict__", _EMPTY).items():
-            if whose:
-                self._owner = f"{whose}.{name}"
-            copied = value if name in shared else self._copy(value)
+            if type(value) not in _CONSTANT and name not in shared:
+                if owns:
+                    self._owner = thing, name
+                value = self._copy(value)
             if name in descriptors:
-                made.__dict__[name] = copied
+                made.__dict__[name] = value
             else:
-                put(made, name, copied)  # one by one, see ``_Port.bind``
+                put(made, name, value)  # one by one, see ``_Port.bind``
         for name in _slots(cls):
             if (value := getattr(thing, name, _NOTHING)) is not _NOTHING:
                 put(made, name, self._copy(value))
@@ -227,7 +235,7 @@ class Copies:
             raise
         except Exception as error:
             raise CopyError(
-                f"{self._owner or 'the run'} holds a {type(thing).__qualname__}, which cannot be copied ({error}): let "
+                f"{_told(*self._owner)} holds a {type(thing).__qualname__}, which cannot be copied ({error}): let "
                 "its class say how, with __deepcopy__, or name the attribute in copies_share for copies of the run to "
                 "have it in common"
             ) from error
@@ -239,6 +247,8 @@ def _made_of(cls: Any) -> Callable[[Copies, Any], Any]:
     """What copies the things of a class."""
     if issubclass(cls, _UNCHANGING):
         return lambda _, thing: thing
+    if issubclass(cls, Actor):
+        return Copies._actor
     if hasattr(cls, "__deepcopy__") or not _is_plain(cls):
         return (
             Copies._tuple
@@ -280,10 +290,11 @@ def _is_global(thing: Any) -> bool:
     return getattr(module, getattr(thing, "__qualname__", ""), _NOTHING) is thing
 
 
-def _told(thing: Actor | JoinPoint | Aspect) -> str:
-    if isinstance(thing, Actor):
-        return thing.path
-    return f"aspect {thing.aspect} at {thing.port}" if isinstance(thing, JoinPoint) else type(thing).__name__
+def _told(owner: Any, attribute: str) -> str:
+    """An attribute of an actor or aspect, in words."""
+    if isinstance(owner, JoinPoint):
+        return f"aspect {owner.aspect} at {owner.port}"
+    return f"{owner.path if isinstance(owner, Actor) else type(owner).__name__}.{attribute}" if owner else "the run"
 
 
 _HASH: Any = object.__hash__
