@@ -261,6 +261,10 @@ def _made_of(cls: Any) -> Callable[[Copies, Any], Any]:
 
 def _is_plain(cls: type) -> bool:
     """Whether an instance is its attributes and nothing else."""
+    try:
+        object.__new__(cls)
+    except TypeError:  # there is more to it, of which only the class knows
+        return False
     is_python = all(base is object or base.__flags__ & _HEAP_TYPE for base in cls.__mro__)
     return is_python and all(getattr(cls, name, None) is getattr(object, name, None) for name in _PROTOCOL)
 
