@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from .collection import seldom_collecting
 from .commands import COMMANDS
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
-from .engine import LoopError
 from .leaving import leave
 from .printing import complain, complain_traceback, open_streams
 
@@ -32,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except EpicycleError as error:
         if options.debug:
             complain_traceback(error)
-        from .engine import ActorError
+        from .engine import ActorError, LoopError  # here, for many commands do without the engine
         from .text import ModelError
 
         complain(str(error) if isinstance(error, ModelError) else f"error: {error}")
