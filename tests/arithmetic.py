@@ -58,8 +58,8 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "runner/text/problems.py": (("sum",), WHOLE),
     "runner/columns.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
-    "runner/study/claims.py": (("sum",), WHOLE),
-    "runner/study/cluster.py": (("sum",), WHOLE),
+    "runner/study/judge/claims.py": (("sum",), WHOLE),
+    "runner/study/run/cluster.py": (("sum",), WHOLE),
 }
 
 

@@ -29,7 +29,7 @@ def print_reference(
 
     from epicycle.actors import EpicycleError
 
-    from ..model import load_all
+    from ..catalogue import load_all
     from ..show import described, detail, overview, parts_described
     from ..text import did_you_mean
 

@@ -20,8 +20,8 @@ from epicycle.actors import (
 )
 
 from ..engine import Results
-from ..model import Model, PatternError, describe, place_of, raised_at, select
-from ..text import Mapping, Position, Problems, Sequence, did_you_mean, plain, told_raised
+from ..model import Model, describe, place_of, raised_at
+from ..text import Mapping, PatternError, Position, Problems, Sequence, did_you_mean, plain, select, told_raised
 from .figures import Figure
 from .pen import style
 

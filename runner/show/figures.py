@@ -14,8 +14,8 @@ from epicycle.actors import Configurable, EpicycleError, Parameter, array_parame
 from epicycle.aspects import STAMP
 
 from ..engine import Results, Signal, cell, leaves
-from ..model import select
 from ..shown import short
+from ..text import select
 from .pen import LIMIT, PALETTE, Sheet, legend_beside
 
 MAX_STATES = 24  # in a legend

@@ -12,19 +12,19 @@ from rich.text import Text
 
 from epicycle.actors import Configurable, variants
 
-from ..model import (
+from ..catalogue import (
     TAKES,
     Catalogue,
     Measure,
-    Model,
     ParameterReference,
     PortReference,
     TypeReference,
     as_written,
-    as_yaml,
-    describe_type,
+    describe,
     parts_of,
+    shown,
 )
+from ..model import Model
 from ..printing import columns
 from .figures import Figure
 
@@ -36,15 +36,14 @@ def figure_types() -> dict[str, type[Figure]]:
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
     """What types declare, topic by topic and in the order of their names."""
-    found = [describe_type(name, cls) for name, cls in types.items()]
+    found = [describe(name, cls) for name, cls in types.items()]
     return sorted(found, key=lambda each: (each.group, each.name.casefold()))
 
 
 def parts_described(types: Iterable[type[Configurable]]) -> dict[str, list[TypeReference]]:
     """What the parts declare that parameters of these types take, by the base of the parts."""
     return {
-        base.__name__: [describe_type(name, cls) for name, cls in known.items()]
-        for base, known in parts_of(types).items()
+        base.__name__: [describe(name, cls) for name, cls in known.items()] for base, known in parts_of(types).items()
     }
 
 
@@ -112,7 +111,7 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
         given = {name: value for name, value in written.items() if name != "type"} if isinstance(written, dict) else {}
         for path in woven.places:
             here = {**given, **({} if woven.model is None else woven.model.at(path))}
-            parameters = ", ".join(f"{name}: {as_yaml(value)}" for name, value in here.items())
+            parameters = ", ".join(f"{name}: {shown(value)}" for name, value in here.items())
             found.setdefault(path, []).append((woven.name, woven.kind, parameters))
     places = dict.fromkeys((*model.graph.ports.nodes, *model.graph.actors, *found))  # the others come last
     return {path: found[path] for path in places if path in found}
@@ -170,7 +169,7 @@ def _metrics() -> list[str]:
     ]
     options = [
         [f"`{row[0]}`", *row[1:]]
-        for row in map(_parameter_row, describe_type("metric", Measure).parameters)
+        for row in map(_parameter_row, describe("metric", Measure).parameters)
         if row[0] != "take"
     ]
     return [
@@ -250,6 +249,6 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
         parameter.name,
         kind,
         parameter.unit,
-        "required" if parameter.required else as_yaml(parameter.default),
+        "required" if parameter.required else shown(parameter.default),
         parameter.doc,
     ]

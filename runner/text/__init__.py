@@ -2,7 +2,20 @@
 
 from .document import MAX_BYTES, Entry, Mapping, Node, Scalar, Sequence, Value, parse, plain, read
 from .files import COMMAND_LINE, Noted, data_file, note_file, note_package, noting
-from .limits import NORMAL, RAISE_IT, Limits
+from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
+from .patterns import (
+    Comparisons,
+    PathIndex,
+    PatternError,
+    TooManyError,
+    check_pattern,
+    compile_pattern,
+    could_be_within,
+    matches,
+    names_asked,
+    names_of,
+    select,
+)
 from .problems import (
     MAX_PROBLEMS,
     ModelError,
@@ -15,17 +28,20 @@ from .problems import (
     told_raised,
     visible,
 )
-from .reading import NAME, SURE, NodeReader, Text, inside, is_empty, split, within
+from .reading import NAME, NAMES_HAVE, SURE, NodeReader, Text, inside, is_empty, split, within
 from .site import call_site, entries_of, node_of
 
 __all__ = [
     "COMMAND_LINE",
     "MAX_BYTES",
     "MAX_PROBLEMS",
+    "MAX_SEED",
     "NAME",
+    "NAMES_HAVE",
     "NORMAL",
     "RAISE_IT",
     "SURE",
+    "Comparisons",
     "Entry",
     "Limits",
     "Mapping",
@@ -33,20 +49,29 @@ __all__ = [
     "Node",
     "NodeReader",
     "Noted",
+    "PathIndex",
+    "PatternError",
     "Position",
     "Problem",
     "Problems",
     "Scalar",
     "Sequence",
     "Text",
+    "TooManyError",
     "Value",
     "call_site",
+    "check_pattern",
+    "compile_pattern",
+    "could_be_within",
     "data_file",
     "did_you_mean",
     "entries_of",
     "inside",
     "is_empty",
     "marked",
+    "matches",
+    "names_asked",
+    "names_of",
     "nearest",
     "node_of",
     "note_file",
@@ -55,6 +80,7 @@ __all__ = [
     "parse",
     "plain",
     "read",
+    "select",
     "split",
     "told_raised",
     "visible",

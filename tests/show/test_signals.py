@@ -17,8 +17,8 @@ import pytest
 
 from epicycle.actors import Actor, OutputPort, Tag
 from epicycle.runner import Simulation, load_model
+from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.engine import Results, Signal, plain
-from epicycle.runner.model import packaged_models
 from epicycle.runner.show import draw, figures_of
 from epicycle.runner.show.folder import write_signals
 from epicycle.runner.show.pen import Sheet

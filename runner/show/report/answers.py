@@ -8,9 +8,9 @@ from collections.abc import Iterable, Sequence
 from epicycle.actors import counted
 
 from ...html import Content, Html, note, tag, wide_table
+from ...language import ALWAYS
 from ...shown import rounded
 from ...study import (
-    ALWAYS,
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,

@@ -9,8 +9,9 @@ from typing import Any
 
 from epicycle.actors import abridged, visible
 
+from ...language import Factor
 from ...shown import in_words, rounded
-from ...study import OK, Estimate, Factor, Plan, StudyResults
+from ...study import OK, Estimate, Plan, StudyResults
 
 MAX_LISTED = 12  # levels in a message
 MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level

@@ -6,8 +6,9 @@ from contextlib import suppress
 
 from epicycle.actors import UnitError, variants
 
+from ...language import in_si, split_number
 from ...model import Model
-from ...study import Plan, in_si, split_number
+from ...study import Plan
 from ...text import Mapping, Node, Problems, Sequence, plain
 from ..drawing import Complaint, made, place, tell
 from .figure import SignalFigure, StudyFigure
@@ -60,7 +61,7 @@ def figures_of_study(plan: Plan, problems: Problems) -> dict[str, StudyFigure]:
         figure = made(name, known, (part.type.text, values, written), problems, of_study=True)
         if figure is not None:
             found[name] = figure
-            for complaint in figure.check(plan):
+            for complaint in figure.complaints(plan):
                 tell(complaint, name, written, problems)
     return found
 

@@ -11,8 +11,9 @@ from typing import Any, ClassVar
 from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
 
 from ...engine import Results
+from ...language import Dimension, Factor
 from ...model import Model
-from ...study import Dimension, Factor, Plan
+from ...study import Plan
 from ..drawing import Complaint
 from ..pen import MAX_LINES, MAX_PANELS, Sheet
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
@@ -53,7 +54,7 @@ class StudyFigure(Configurable):
         Parameter(str), {}, doc="what metrics and factors are called in it, without their units"
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
         """What is wrong with the figure in this study: names that it does not have, levels that do not occur."""
         factors, metrics = list(plan.study.factors), [metric.name for metric in plan.metrics]
         known = {"factor": factors, "metric": metrics, "column": factors + metrics}

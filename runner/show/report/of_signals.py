@@ -69,8 +69,8 @@ class Series(RepeatedFigure):
         str, None, doc="factor with a line for each level; the next one if left out"
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         if self._formula.references:
             yield Complaint("value", f"{self._formula.references[0]!r} is no part of the token", "write 'token.name'")
 

@@ -11,7 +11,8 @@ from typing import Any
 
 from epicycle.actors import Parameter, counted, texts_parameter
 
-from ...study import Factor, Plan, mean
+from ...language import Factor
+from ...study import Plan, mean
 from ..drawing import Complaint
 from ..pen import DASHES, LIMIT, MARKERS, PALETTE
 from .data import Condition, Data, Names, is_numeric, mean_of
@@ -89,8 +90,8 @@ class Distributions(TableFigure):
     )
     limit: Parameter[float | None] = Parameter(float, None, doc="a value with a line, such as a distance to be kept")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         if not self.metrics:
             yield Complaint("metrics", "there is no metric in it", "name one at least")
 

@@ -12,7 +12,8 @@ from typing import Any
 from epicycle.actors import counted
 
 from ...html import Content, Html, note, page, tag, wide_table
-from ...study import Factor, Judgement, Recommendation, mean
+from ...language import Factor
+from ...study import Judgement, Recommendation, mean
 from . import answers
 from .data import Condition, Data, estimated, shown
 
