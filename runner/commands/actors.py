@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from ..catalogue import installed
 from .options import DONE, add_types, own_types
 from .reference import add_json, print_reference
 
@@ -20,6 +19,7 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print the reference."""
+    from ..catalogue import installed
 
     known = installed().with_types(own_types(options))
     print_reference(known.actors, known.aspects, "actor", options.name, options.json)

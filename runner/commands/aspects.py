@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from ..catalogue import installed, is_path, packaged_models
 from ..printing import console, tell_json
 from .options import DONE, add_changes, load, own_types
 from .reference import add_json, print_reference
@@ -30,6 +29,8 @@ def add(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print the reference, or a model's aspects."""
     from epicycle.actors import EpicycleError
+
+    from ..catalogue import installed, is_path, packaged_models
 
     known = installed().with_types(own_types(options))
     name, types, models = options.model, known.aspects, packaged_models()

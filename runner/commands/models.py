@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from ..catalogue import packaged_disturbances, packaged_models, packaged_studies
-from ..language import load_disturbance, read_study
 from ..printing import tell
 from .options import DONE
 
@@ -18,6 +16,8 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print every packaged model, disturbance and study with the first sentence of its doc."""
+    from ..catalogue import packaged_disturbances, packaged_models, packaged_studies
+    from ..language import load_disturbance, read_study
     from ..model import load_model
     from ..text import Problems
 

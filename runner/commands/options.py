@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..catalogue import types_of_file
 from ..printing import complain, complain_traceback
 
 if TYPE_CHECKING:
@@ -82,6 +81,7 @@ def add_types(command: argparse.ArgumentParser) -> None:
 
 def own_types(options: argparse.Namespace) -> list[type]:
     """The types of the files that ``--types`` names."""
+    from ..catalogue import types_of_file
 
     return [each for file in options.types for each in types_of_file(Path(file))]
 

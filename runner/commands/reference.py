@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..catalogue import load_all
 from ..printing import complain, console, tell_json
 
 
@@ -30,6 +29,7 @@ def print_reference(
 
     from epicycle.actors import EpicycleError
 
+    from ..catalogue import load_all
     from ..show import described, detail, overview, parts_described
     from ..text import did_you_mean
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..catalogue import installed
-from ..language import json_schema, schema_text
 from ..printing import complain, tell, tell_json_text
 from .options import DONE, add_types, own_types
 
@@ -24,6 +22,8 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Write the schema."""
+    from ..catalogue import installed
+    from ..language import json_schema, schema_text
     from ..show import figure_types
     from ..show.report import study_figure_types
 

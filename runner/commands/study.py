@@ -8,7 +8,6 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..language import MAX_STUDY_SEED
 from ..printing import complain, complain_traceback, tell
 from .options import DONE, FAILED, INTERRUPTED, add_types, seed
 
@@ -76,6 +75,7 @@ def count(text: str) -> int:
 
 def first_seed(text: str) -> int:
     """A seed after which those of all replications are seeds, too."""
+    from ..language import MAX_STUDY_SEED
 
     return seed(text, MAX_STUDY_SEED)
 
@@ -152,11 +152,10 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Make the runs that are missing, and tell what came of it."""
     from epicycle.actors import counted
 
-    from ..study import WorkerError, WriteError, again, open_study, run_study
-    from ..study import progress as progress_bar
+    from ..study import WorkerError, WriteError, again, open_study, progress, run_study
 
     try:
-        with progress_bar(plan.study.name) as told:
+        with progress(plan.study.name) as told:
             outcome = run_study(
                 plan,
                 folder,

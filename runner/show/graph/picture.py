@@ -155,12 +155,7 @@ class _Painter:
 
     def port(self, x: float, y: float, ink: str, is_multi: bool) -> None:
         """A mark on the edge, white if any number of connections may meet there."""
-        look: dict[str, Any] = {
-            "facecolor": "white" if is_multi else ink,
-            "edgecolor": ink,
-            "linewidth": 0.8,
-            "zorder": 3,
-        }
+        look: Any = {"facecolor": "white" if is_multi else ink, "edgecolor": ink, "linewidth": 0.8, "zorder": 3}
         self.sheet.add_artist(self.shapes.Rectangle((x - 2.2, y - 2.2), 4.4, 4.4, **look))
 
     def wires(self) -> None:
