@@ -17,6 +17,7 @@ from epicycle.actors import declared_parameters
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
+    JoinPointAspect,
     PortsParameter,
     Reading,
     SelectionParameter,
@@ -99,8 +100,8 @@ class Weaving:
             self._problem(nowhere, pointcuts[0])
         for name, parameter in declared_parameters(type(aspect)).items():
             if isinstance(parameter, SelectionParameter):
-                patterns = parameter.patterns(getattr(aspect, name))
-                found = {each: self._selected(name, each, parameter, position_of(name)) for each in patterns}
+                selecting = parameter.patterns(getattr(aspect, name))
+                found = {each: self._selected(name, each, parameter, position_of(name)) for each in selecting}
                 woven.selections[name] = found
                 if isinstance(parameter, PortsParameter):
                     woven.reads += [port for ports in found.values() for port in ports]
@@ -112,7 +113,8 @@ class Weaving:
                 for reference, fields in formula.given_fields:
                     self._check_given(name, reference, fields, woven.ports, position)
         self.check_times(woven, position_of)
-        chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
+        patterns = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
+        chosen = (port for pattern in patterns for port in self.ports.select(self._full(pattern)))
         woven.reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return woven
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import binom
 
 from epicycle.actors import random_stream
-from epicycle.aspects import Aspect, CommunicationAspect, JoinPoint
+from epicycle.aspects import CommunicationAspect, JoinPoint, PortAspect
 from epicycle.runner.engine import ActorError, Results, Simulation
 from epicycle.runner.model import load_model
 from tests.engine.engine_parts import load, seen, sends, simulate
@@ -144,7 +144,7 @@ class Mark(CommunicationAspect):
         point.forward(f"{token}{point.aspect}")
 
 
-class Echo(Aspect):
+class Echo(PortAspect):
     """Forwards at once, in the next microstep, and a second later."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
@@ -153,7 +153,7 @@ class Echo(Aspect):
         point.forward(token, 1)
 
 
-class Broken(Aspect):
+class Broken(PortAspect):
     """Fails."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:

@@ -121,9 +121,10 @@ def test_first_tag_spared() -> None:
         ("uniform", stats.uniform(3, 4)),
         ("normal", stats.norm(5, 2)),
         ("exponential", stats.expon(5, 2)),
+        ({"type": "Gamma", "shape": 2, "mean": 1}, stats.gamma(2, 5, 1)),
     ],
 )
-def test_latency_follows_its_law(distribution: str, law: Any) -> None:
+def test_latency_follows_its_law(distribution: Any, law: Any) -> None:
     aspect = Latency(delay="5 ms", jitter="2 ms", distribution=distribution, reordering=True)
     bench = Bench(aspect).play(range(5000), period=0.5)
     delays = np.array([time - 0.5 * token for time, token in bench.passed])
@@ -211,9 +212,13 @@ def test_throttle_lets_what_is_on_time_pass() -> None:
         ("normal", stats.norm(0, 3)),
         ("uniform", stats.uniform(-3 * 3**0.5, 6 * 3**0.5)),
         ("laplace", stats.laplace(0, 3 / 2**0.5)),
+        (
+            {"type": "Triangular", "low": -(6**0.5), "mode": 0, "high": 6**0.5},
+            stats.triang(0.5, -3 * 6**0.5, 6 * 6**0.5),
+        ),
     ],
 )
-def test_noise(distribution: str, law: Any) -> None:
+def test_noise(distribution: Any, law: Any) -> None:
     bench = Bench(Noise(deviation=3, distribution=distribution)).play([float(i) for i in range(5000)])
     errors = np.array(bench.tokens) - np.arange(5000)
     assert stats.kstest(errors, law.cdf).pvalue > 1 - SURE

@@ -382,7 +382,7 @@ def test_files_that_tell_no_times(rows: list[str], reason: str, tmp_path: Path) 
     with pytest.raises(ActorError) as caught:
         Simulation(load_model(tmp_path / "m.yaml", types=TYPES)).run()
     assert str(caught.value).partition("\n")[0] == (
-        f"aspect it failed in pass_token() at a at (0 s, 1): the execution times in {tmp_path}/t.csv cannot be used: "
+        f"aspect it failed in schedule() at a at (0 s, 1): the execution times in {tmp_path}/t.csv cannot be used: "
         f"{reason}"
     )
 
@@ -530,7 +530,7 @@ def test_an_error_in_an_aspect_names_it() -> None:
 
     with pytest.raises(ActorError) as caught:
         chain("type: Wrong, at: a", types=[Wrong])
-    assert str(caught.value).partition("\n")[0] == "aspect it failed in pass_token() at a at (0 s, 1): KeyError: 'x'"
+    assert str(caught.value).partition("\n")[0] == "aspect it failed in schedule() at a at (0 s, 1): KeyError: 'x'"
 
 
 def test_a_class_that_does_without_an_actor_does_without_its_aspect() -> None:

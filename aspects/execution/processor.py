@@ -9,10 +9,15 @@ from typing import Any, ClassVar
 
 from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
-from .core import JoinPoint
-from .duration import FiringTime, FiringTimeParameter, time_needed
-from .execution import ActorPoint, ExecutionAspect, Job
-from .selection import ByActorParameter
+from ..core import (
+    ActorPoint,
+    ByActorParameter,
+    ExecutionAspect,
+    FiringTime,
+    FiringTimeParameter,
+    Job,
+    time_needed,
+)
 
 FCFS, PRIORITY, EDF = "fcfs", "priority", "edf"
 
@@ -73,7 +78,7 @@ class Processor(ExecutionAspect):
             task = self._task(job, point, to_nanoseconds(seconds))
             self._core(point).arrive(task, preemptive=self.preemptive)
 
-    def pass_by(self, job: Job, point: ActorPoint) -> None:  # type: ignore[override]
+    def pass_by(self, job: Job, point: ActorPoint) -> None:
         # It takes no time, but has to stay behind the earlier ones of its actor.
         core = self._core(point)
         if core.has_any(point):
@@ -81,8 +86,7 @@ class Processor(ExecutionAspect):
         else:
             point.forward(job)
 
-    def forget(self, point: JoinPoint) -> None:
-        assert isinstance(point, ActorPoint)
+    def forget(self, point: ActorPoint) -> None:
         self._core(point).remove(point)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
@@ -113,7 +117,7 @@ class Processor(ExecutionAspect):
     def _of(value: Mapping[str, Any], name: str, point: ActorPoint) -> Any:
         known = point.memory.setdefault(name, {})
         if "value" not in known:
-            known["value"] = ByActorParameter.of(value, point.selected(name), point.port)
+            known["value"] = ByActorParameter.of(value, point.selected(name), point.owner)
         return known["value"]
 
 

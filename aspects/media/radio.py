@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 from epicycle.actors import EpicycleError, Parameter, to_nanoseconds, to_seconds
 
-from .core import JoinPoint
-from .media import Medium, Message, WaitingLine
+from ..core import JoinPoint
+from .medium import Medium, Message, WaitingLine
 
 
 class RadioMedium(Medium):

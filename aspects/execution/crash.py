@@ -6,9 +6,7 @@ from typing import Any, ClassVar
 
 from epicycle.actors import Parameter, array_parameter, to_nanoseconds, to_seconds
 
-from .core import JoinPoint
-from .duration import DurationParameter, drawn
-from .execution import ActorPoint, ExecutionAspect, Job, Unit
+from ..core import ActorPoint, DurationParameter, ExecutionAspect, Job, JoinPoint, Unit, drawn
 
 LOST, KEPT = "lost", "kept"
 
