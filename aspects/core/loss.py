@@ -38,7 +38,8 @@ class RandomLoss(LossAspect):
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
         lost = self.draw(point)
-        return lost and not (self.spare_first and point.tag == point.memory.setdefault("first tag", point.tag))
+        first = point.memory.setdefault("first tag", point.tag) if self.spare_first else None
+        return lost and point.tag != first
 
 
 def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:

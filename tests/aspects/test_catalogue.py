@@ -112,6 +112,13 @@ def test_first_tag_spared() -> None:
     assert Bench(MeasurementFailure(probability=0.5, burst=1e9, spare_first=True), seed=3).play(range(5)).tokens[0] == 0
 
 
+def test_the_first_tag_is_that_of_the_first_token_and_not_of_the_first_loss() -> None:
+    for cls in (PacketLoss, MeasurementFailure):
+        bare = Bench(cls(probability=0.5), seed=1).play(range(50))
+        assert 0 in bare.tokens  # it is not lost anyway
+        assert Bench(cls(probability=0.5, spare_first=True), seed=1).play(range(50)).tokens == bare.tokens
+
+
 # -- delay, order, copies --------------------------------------------------------------------------------------------
 
 
