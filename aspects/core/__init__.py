@@ -18,8 +18,11 @@ from .join_point import TOKEN, AspectContext, JoinPoint, JoinPointAspect, Readin
 from .loss import LossAspect, RandomLoss, is_bad
 from .port import CommunicationAspect, MeasurementAspect, ObservationAspect, PortAspect
 from .selection import ByActorParameter, GroupsParameter, PortsParameter, SelectionParameter
+from .server import NEWEST, OLDEST, Server, Task, WaitingLine
 
 __all__ = [
+    "NEWEST",
+    "OLDEST",
     "STAMP",
     "TOKEN",
     "ActorPoint",
@@ -52,7 +55,10 @@ __all__ = [
     "Request",
     "Selection",
     "SelectionParameter",
+    "Server",
+    "Task",
     "Unit",
+    "WaitingLine",
     "altered",
     "aspect_stream",
     "class_decorations",

@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 
 from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
-from ..core import JoinPoint
-from .medium import Medium, Message, WaitingLine
+from ..core import JoinPoint, Server
+from .medium import Medium, Message
 
 
 class Bus(Medium):
@@ -31,20 +31,15 @@ class Bus(Medium):
     factor = Parameter(float, min=0.0, unit="s", doc="time that it takes to carry a message of length 1")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        bus: _Server = point.shared.setdefault("bus", _Server())
-        now = point.tag.time
+        bus: _Carrier = point.shared.setdefault("bus", _Carrier())
         duration = to_nanoseconds(self.factor * self.length_of(token))
-        message = Message(self.priority_of(token), bus.come, token, point, duration)
-        bus.come += 1
-        if bus.carried is not None and bus.begun + bus.carried.duration <= now:
-            bus.finish(bus.carried)  # which is over by now, though the director has not called yet
-        if bus.is_idle and not bus.line:
-            bus.begin(message)
-        elif dropped := bus.line.add(message, self.capacity, self.overflow):
-            dropped.point.act("dropped", dropped.token)
+        if dropped := bus.arrive(
+            Message(self.priority_of(token), token, point, duration), self.capacity, self.overflow
+        ):
+            dropped.point.act("dropped", dropped.passing)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
-        bus: _Server = shared.get("bus", _Server())
+        bus: _Carrier = shared.get("bus", _Carrier())
         return {
             "utilisation": bus.busy_until(end) / end if end else None,
             "mean_wait": to_seconds(bus.waited) / bus.begins if bus.begins else None,
@@ -52,46 +47,8 @@ class Bus(Medium):
         }
 
 
-class _Server:
-    """What is on a bus, and what has been; times in ns."""
+class _Carrier(Server[Message]):
+    """What is on a bus, and what has been."""
 
-    def __init__(self) -> None:
-        self.line: WaitingLine[Message] = WaitingLine()
-        self.carried: Message | None = None
-        self.begun = 0  # when the carriage of the carried one began
-        self.come = 0  # messages
-        self.begins = 0  # carriages
-        self.waited = 0  # by all whose carriage has begun
-        self._busy = 0  # by all whose carriage is over
-
-    @property
-    def is_idle(self) -> bool:
-        """Whether it carries nothing."""
-        return self.carried is None
-
-    def begin(self, message: Message) -> None:
-        """Carry a message, now."""
-        now = message.point.tag.time
-        self.carried, self.begun = message, now
-        self.begins += 1
-        self.waited += now - message.came
-        if message.duration > 0:
-            message.point.later(to_seconds(message.duration), self.finish, message)
-        else:
-            self._deliver(message)
-
-    def finish(self, message: Message) -> None:
-        """Deliver the carried message, if it still is this one, and go on with the next."""
-        if message is self.carried:
-            self._deliver(message)
-            while self.is_idle and self.line:
-                self.begin(self.line.pop(message.point.tag.time))
-
-    def _deliver(self, message: Message) -> None:
-        self._busy += message.duration
-        self.carried = None
-        message.arrive()
-
-    def busy_until(self, end: int) -> int:
-        """How long it was busy before ``end``, which is not before the present."""
-        return self._busy + (end - self.begun if self.carried is not None else 0)
+    def release(self, task: Message, now: int) -> None:
+        task.arrive()

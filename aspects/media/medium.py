@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import heapq
 import math
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Generic, TypeVar
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from epicycle.actors import Parameter, to_seconds
 
-from ..core import CommunicationAspect, FieldError, JoinPoint, field_of, numbers_in
-
-NEWEST, OLDEST = "newest", "oldest"
+from ..core import NEWEST, OLDEST, CommunicationAspect, FieldError, Task, field_of, numbers_in
 
 
 class Medium(CommunicationAspect):
@@ -70,61 +67,16 @@ def _number(token: Any, name: str, role: str) -> float:
 
 
 @dataclass(order=True)
-class Message:
-    """A message that waits for a medium, or is carried by it; times in ns."""
-
-    priority: float
-    number: int  # which of all that have come
-    token: Any = field(compare=False)
-    point: JoinPoint = field(compare=False)
-    duration: int = field(compare=False)  # of its carriage
+class Message(Task):
+    """A message that waits for a medium, or is carried by it."""
 
     def __post_init__(self) -> None:
-        self.came = self.point.tag.time
-        self._release = self.point.hold(self.token)
+        super().__post_init__()
+        self._release = self.point.hold(self.passing)
 
     def arrive(self) -> None:
         """Pass it on, and note how long it took."""
         taken = self.point.tag.time - self.came
         if taken > 0:
-            self.point.act("delayed", self.token, to_seconds(taken))
+            self.point.act("delayed", self.passing, to_seconds(taken))
         self._release()
-
-
-M = TypeVar("M", bound=Message)
-
-
-class WaitingLine(Generic[M]):
-    """Messages that wait, the most urgent first, and in the order in which they came among equals."""
-
-    def __init__(self) -> None:
-        self._heap: list[M] = []
-        self._area = 0  # the integral of the number of messages over time (ns)
-        self._since = 0
-
-    def __len__(self) -> int:
-        return len(self._heap)
-
-    def area(self, now: int) -> int:
-        """The integral of the number of messages from time 0 to the present, in ns."""
-        self._area += len(self._heap) * (now - self._since)
-        self._since = now
-        return self._area
-
-    def add(self, message: M, capacity: int | None, overflow: str) -> M | None:
-        """Let a message wait; returns the one that is dropped for it, which can be itself."""
-        self.area(message.came)
-        heapq.heappush(self._heap, message)
-        if capacity is None or len(self._heap) <= capacity:
-            return None
-        least = max(each.priority for each in self._heap)
-        choose = max if overflow == NEWEST else min
-        dropped = choose((each for each in self._heap if each.priority == least), key=lambda each: each.number)
-        self._heap.remove(dropped)
-        heapq.heapify(self._heap)
-        return dropped
-
-    def pop(self, now: int) -> M:
-        """The message whose turn it is."""
-        self.area(now)
-        return heapq.heappop(self._heap)
