@@ -256,7 +256,7 @@ def test_an_exception_in_an_aspect_names_the_aspect() -> None:
         fan(outside="bad: {type: Broken, at: 'fan[1].in'}")
     told, _, where = str(caught.value).partition("\n")
     assert told == "aspect bad failed in pass_token() at fan[1].in at (0 s, 1): LookupError: no idea"
-    assert where.startswith("   raised at tests/aspects/test_aspects.py:")
+    assert where.startswith("   raised at tests/aspects/core/test_aspects.py:")
     assert 'raise LookupError("no idea")' in where.splitlines()[1]
     assert where.endswith("m.yaml:12:11")
 
