@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
 
 from ...engine import Results
+from ...language import Dimension, Factor
 from ...model import Model
 from ...study import Plan
-from ...study.dimensions import Dimension, Factor
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 from .style import MAX_LINES, MAX_PANELS
 
@@ -52,7 +52,7 @@ class StudyFigure(Configurable):
         Parameter(str), {}, doc="what metrics and factors are called in it, without their units"
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
         """What is wrong with the figure in this study."""
         yield from unknown("where", list(self.where), list(plan.study.factors), "factor")
         for name, wanted in self.where.items():

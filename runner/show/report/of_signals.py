@@ -24,10 +24,9 @@ from epicycle.actors import (
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
 from ...engine import Results
-from ...model import Model, Problems
-from ...model.patterns import select
-from ...study import Plan
-from ...study.statistics import half_width
+from ...model import Model
+from ...study import Plan, half_width
+from ...text import Problems, select
 from ..drawing import draw, figures_of
 from ..figures import Figure, positions
 from .data import Condition, Data
@@ -46,8 +45,8 @@ class RepeatedFigure(SignalFigure):
     runs = Parameter(int, 10, min=1, max=10_000, doc="how many runs of each condition are shown, from the first one on")
     panels = texts_parameter((), doc="factors with a panel for each level; all that are left, if left out")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         yield from unknown("panels", self.panels, list(plan.study.factors), "factor")
 
     def runs_of(self, data: Data) -> list[RunKey]:
@@ -79,8 +78,8 @@ class Series(RepeatedFigure):
         str, None, doc="factor with a line for each level; the next one if left out"
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         yield from unknown("lines", [self.lines] if self.lines else [], list(plan.study.factors), "factor")
         if self._formula.references:
             yield Complaint("value", f"{self._formula.references[0]!r} is no part of the token", "write 'token.name'")
@@ -250,8 +249,8 @@ class SingleRun(SignalFigure):
         doc="among how many runs of each condition it is chosen, from the first one on; all if left out",
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         yield from unknown("metric", [self.metric], [metric.name for metric in plan.metrics], "metric")
 
     def check_model(self, model: Model) -> Iterator[Complaint]:

@@ -11,9 +11,8 @@ from typing import Any
 
 from epicycle.actors import Parameter, counted, texts_parameter
 
-from ...study import Plan
-from ...study.dimensions import Factor
-from ...study.statistics import mean
+from ...language import Factor
+from ...study import Plan, mean
 from .data import Condition, Data, Names, is_numeric
 from .figure import Complaint, Layout, Panel, Roles, RunKey, StudyFigure, layout, roles, unknown
 from .style import DASHES, LIMIT, MARKERS, PALETTE, Sheet
@@ -29,8 +28,8 @@ class TableFigure(StudyFigure):
     )
     panels = texts_parameter((), doc="factors with a panel for each level; all that are left, if left out")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         factors = list(plan.study.factors)
         yield from unknown("lines", [self.lines] if self.lines else [], factors, "factor")
         yield from unknown("panels", self.panels, factors, "factor")
@@ -46,8 +45,8 @@ class Means(TableFigure):
     )
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         yield from unknown("metric", [self.metric], [metric.name for metric in plan.metrics], "metric")
         yield from unknown("over", [self.over] if self.over else [], list(plan.study.factors), "factor")
 
@@ -116,8 +115,8 @@ class Distributions(TableFigure):
     )
     limit: Parameter[float | None] = Parameter(float, None, doc="a value with a line, such as a distance to be kept")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         yield from unknown("metrics", self.metrics, [metric.name for metric in plan.metrics], "metric")
         yield from unknown("over", [self.over] if self.over else [], list(plan.study.factors), "factor")
         if not self.metrics:

@@ -116,7 +116,7 @@ def test_weaving_in_python() -> None:
         model.weave("loss", PacketLoss(probability=1), at=scale)  # type: ignore[arg-type]
     assert [problem.message for problem in caught.value.problems] == ["scale is an actor, not a port"]
     model.remove("scale")
-    assert woven.actors == {}
+    assert [each.actors for each in model.aspects] == [{}]
 
 
 def test_a_class_that_does_without_an_actor_does_without_its_aspect() -> None:
