@@ -1,19 +1,81 @@
-"""Messages and measurements that are lost by where bodies are and who they are."""
+"""Disturbances that depend on where bodies are and who they are: distance, range, line of sight, partition.
+
+A body is known by the output port that sends where it is: ``main.state`` stands for whatever belongs to ``main``.  Such
+a port sends positions in m, as arrays, lists or (on a line) numbers, or tokens with such a field ``position``.
+"""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
 from collections.abc import Iterable
+from itertools import takewhile
 from typing import Any, ClassVar
 
-from epicycle.actors import Parameter, elementary
+from epicycle.actors import EpicycleError, Parameter, elementary
+from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand
 
-from ..core import CommunicationAspect, GroupsParameter, JoinPoint, LossAspect, MeasurementAspect, PortsParameter
-from .bodies import Position, SenderParameter, SituatedLoss, distance_to_line, ports_of, position_of, sender_of
+from .core import (
+    TOKEN,
+    CommunicationAspect,
+    GroupsParameter,
+    JoinPoint,
+    LossAspect,
+    MeasurementAspect,
+    PortsParameter,
+)
+
+Position = list[float]
 
 
-class RangeLoss(SituatedLoss, CommunicationAspect):
+class SituationError(EpicycleError):
+    """Something of which cannot be told where or who it is."""
+
+
+class _SenderParameter(PortFormulaParameter):
+    """Who sent a message."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            None,
+            given=(TOKEN,),
+            doc="expression for the path of who sent the message, such as token.robot; none: whose port the connection "
+            "leaves",
+        )
+
+
+def _sender(token: Any, sender: PortFormula | None, point: JoinPoint) -> str:
+    """The path of who sent a token, by a ``_SenderParameter``."""
+    if sender is None:
+        return point.source.rpartition(".")[0]
+    path = point.value_of(sender, token=token)
+    if not isinstance(path, str) or not path:
+        raise SituationError(f"sender: {sender.source} is {path!r}, but the path of the sender is needed")
+    return path
+
+
+class _SituatedLoss(LossAspect):
+    """A loss that depends on where bodies are."""
+
+    positions = PortsParameter(doc="output ports that send where the bodies are, one for each")
+
+    def body(self, path: str, point: JoinPoint) -> str:
+        """The port of the body to which a path belongs: the one whose own path has most of its segments in common."""
+        known: dict[str, str] = point.memory.setdefault("bodies", {})
+        if path not in known:
+            ports = _ports(point, "positions")
+            common = {port: _common(path, port) for port in ports}
+            most = max(common.values(), default=0)
+            nearest = [port for port in ports if common[port] == most > 0]
+            if len(nearest) != 1:
+                several = f"several ports tell where it may be: {', '.join(nearest)}"
+                none = f"no port tells where it is; 'positions' selects {', '.join(ports) or 'none'}"
+                raise SituationError(f"{path}: {several if nearest else none}")
+            known[path] = nearest[0]
+        return known[path]
+
+
+class RangeLoss(_SituatedLoss, CommunicationAspect):
     """Drops messages that come from afar: log-distance path loss with log-normal shadowing.
 
     At the distance d from sender to receiver the received power is 10 * exponent * log10(range / d) + X dB above what
@@ -25,7 +87,7 @@ class RangeLoss(SituatedLoss, CommunicationAspect):
     Communications, 2nd ed., section 4.9; correlation: Gudmundson, Electronics Letters 27, 1991.
     """
 
-    sender = SenderParameter()
+    sender = _SenderParameter()
     range = Parameter(float, min=1e-9, unit="m", doc="distance at which half of the messages are lost")
     exponent = Parameter(
         float, 3.0, min=0.0, unit="1", doc="path-loss exponent: 2 in free space, 3 to 5 around obstacles"
@@ -37,8 +99,8 @@ class RangeLoss(SituatedLoss, CommunicationAspect):
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
         draw = point.random.standard_normal()
-        sender = self.body(sender_of(token, self.sender, point), point)
-        here, there = position_of(sender, point), position_of(self.body(point.owner, point), point)
+        sender = self.body(_sender(token, self.sender, point), point)
+        here, there = _position(sender, point), _position(self.body(point.owner, point), point)
         if here is None or there is None:
             return False
         if self.correlation is not None:
@@ -60,7 +122,7 @@ class RangeLoss(SituatedLoss, CommunicationAspect):
         return draw
 
 
-class _SightLoss(SituatedLoss, MeasurementAspect):
+class _SightLoss(_SituatedLoss, MeasurementAspect):
     """A sensor, where the body is to which it belongs, and its target: write ``hides``."""
 
     target = PortsParameter(single=True, doc="output port that sends where the target is")
@@ -70,11 +132,11 @@ class _SightLoss(SituatedLoss, MeasurementAspect):
         """Whether the sensor does not see the target; ``others`` are where all other bodies are."""
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
-        own, targets = self.body(point.owner, point), ports_of(point, "target")
-        sensor, target = position_of(own, point), next((position_of(port, point) for port in targets), None)
+        own, targets = self.body(point.owner, point), _ports(point, "target")
+        sensor, target = _position(own, point), next((_position(port, point) for port in targets), None)
         if sensor is None or target is None:
             return False
-        others = (position_of(port, point) for port in ports_of(point, "positions") if port not in (own, *targets))
+        others = (_position(port, point) for port in _ports(point, "positions") if port not in (own, *targets))
         return self.hides(sensor, target, (place for place in others if place is not None))
 
 
@@ -105,7 +167,7 @@ class Occlusion(_SightLoss):
     radius = Parameter(float, min=0.0, unit="m", doc="radius of the bodies; 0 occludes nothing")
 
     def hides(self, sensor: Position, target: Position, others: Iterable[Position]) -> bool:
-        return any(distance_to_line(place, sensor, target) < self.radius for place in others)
+        return any(_distance(place, sensor, target) < self.radius for place in others)
 
 
 class Outage(LossAspect, CommunicationAspect):
@@ -115,11 +177,11 @@ class Outage(LossAspect, CommunicationAspect):
     ``until`` and ``every`` say when.  Event: ``dropped``.
     """
 
-    sender = SenderParameter()
+    sender = _SenderParameter()
     groups = GroupsParameter(doc="the parts: {name: [actors or composites, as patterns], ...}")
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
-        sender = self._groups_of(sender_of(token, self.sender, point), point)
+        sender = self._groups_of(_sender(token, self.sender, point), point)
         receiver = self._groups_of(point.owner, point)
         return bool(sender and receiver and not sender & receiver)
 
@@ -136,3 +198,39 @@ class Outage(LossAspect, CommunicationAspect):
                 if any(not around.isdisjoint(selected[pattern]) for pattern in patterns)
             )
         return known[path]
+
+
+def _ports(point: JoinPoint, parameter: str) -> list[str]:
+    """All ports that the patterns in a parameter select, once each."""
+    return list(dict.fromkeys(port for ports in point.selected(parameter).values() for port in ports))
+
+
+def _position(port: str, point: JoinPoint) -> Position | None:
+    """Where a body is, by what its port has sent last; None before that."""
+    token = operand(point.latest(port))
+    if token is None:
+        return None
+    position = token.get("position") if isinstance(token, dict) else token
+    position = [position] if _is_number(position) else position
+    if not (isinstance(position, list) and position and all(_is_number(each) for each in position)):
+        raise SituationError(f"{port} sends no position: numbers, or a token with such a field 'position'")
+    return [float(each) for each in position]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _common(path: str, other: str) -> int:
+    """How many segments two paths begin with in common."""
+    pairs = zip(path.split("."), other.split("."), strict=False)
+    return len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
+
+
+def _distance(place: Position, start: Position, end: Position) -> float:
+    """From a place to the segment between two others."""
+    along = [b - a for a, b in zip(start, end, strict=True)]
+    length = elementary.total(step * step for step in along)
+    there = elementary.total((x - a) * step for x, a, step in zip(place, start, along, strict=True))
+    share = 0.0 if length == 0.0 else min(1.0, max(0.0, there / length))
+    return elementary.distance(place, [a + share * step for a, step in zip(start, along, strict=True)])

@@ -1,1 +1,0 @@
-from aspects.situation import *
