@@ -130,7 +130,7 @@ class Weaving:
 
     def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         """The ports, connections and actors that the pointcuts select."""
-        if "actor" in self.cls.stands_at:
+        if not self.cls.at_ports:
             return [], [], self._select_actors(pointcuts)
         return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
 
