@@ -293,6 +293,8 @@ class Configurable:
 
     # Names that the YAML uses beside parameters, which no parameter may take.
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
+    # What is said of names that one might take for parameters, and are none.
+    refused: ClassVar[Mapping[str, str]] = {}
 
     def __init__(self, **values: object) -> None:
         self._configure(values)
@@ -357,6 +359,8 @@ def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
 
 def unknown_parameter(cls: type, name: str) -> str:
     """The message for a parameter that the class does not have."""
+    if issubclass(cls, Configurable) and name in cls.refused:
+        return cls.refused[name]
     return f"{cls.__name__} has no parameter {name!r}{did_you_mean(name, declared_parameters(cls))}"
 
 

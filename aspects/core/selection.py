@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
-from epicycle.actors import REQUIRED, Parameter, ParameterError
+from epicycle.actors import REQUIRED, MappingParameter, Parameter, ParameterError
 
 T = TypeVar("T")
 
@@ -59,13 +59,7 @@ class ByActorParameter(SelectionParameter[Mapping[str, T]], Generic[T]):
     def convert(self, value: object) -> Mapping[str, T] | None:
         if not isinstance(value, Mapping) or not all(isinstance(pattern, str) for pattern in value):
             raise ParameterError(f"{value!r} is not a {self.describe_type()}")
-        converted: dict[str, Any] = {}
-        for pattern, each in value.items():
-            try:
-                converted[pattern] = self.item.convert(each)
-            except ParameterError as error:
-                raise ParameterError(f"{pattern}: {error}", (pattern, *error.keys), of_key=error.of_key) from None
-        return converted
+        return MappingParameter(self.item).convert(value)
 
     def patterns(self, value: Mapping[str, T]) -> tuple[str, ...]:
         return tuple(value)

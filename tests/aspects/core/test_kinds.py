@@ -8,13 +8,18 @@ import pytest
 
 from epicycle.actors import EpicycleError
 from epicycle.aspects import (
+    Aspect,
     Bias,
     ClockAspect,
+    ClockOffset,
     CrashRestart,
     ExecutionAspect,
+    LossAspect,
     MeasurementAspect,
     Medium,
     ObservationAspect,
+    PortAspect,
+    RandomLoss,
 )
 from epicycle.aspects.measurement import Alteration
 from tests.engine.engine_parts import sends, simulate
@@ -25,7 +30,10 @@ from tests.engine.engine_parts import sends, simulate
     [
         (ClockAspect, "error"),
         (ExecutionAspect, "schedule"),
+        (PortAspect, "pass_token"),
         (Medium, "pass_token"),
+        (LossAspect, "loses"),
+        (RandomLoss, "draw"),
         (ObservationAspect, "observe"),
         (Alteration, "alter"),
     ],
@@ -44,6 +52,21 @@ def test_where_aspects_stand() -> None:
         Medium: {"input", "output"},
     }
     assert set(CrashRestart.stands_at) == {"actor"}
+
+
+def test_an_aspect_is_of_a_kind() -> None:
+    with pytest.raises(TypeError) as caught:
+        type("Odd", (Aspect,), {"pass_token": lambda self, token, point: None})
+    assert str(caught.value) == "Odd has a pass_token(): derive it from PortAspect, not from Aspect"
+
+
+def test_a_clock_has_no_window() -> None:
+    with pytest.raises(EpicycleError) as caught:
+        ClockOffset(until=3)
+    assert str(caught.value) == (
+        "a clock is wrong from the beginning of a run to its end: leave out 'until', "
+        "valid parameters: offset, deviation"
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
-"""Durations: parameters that are a time or a distribution of times, and the times that firings take."""
+"""Parameters that may be distributions: laws, durations, and the times that firings take."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
 from epicycle.actors import (
@@ -19,6 +19,26 @@ from .execution import Job
 
 Duration: TypeAlias = float | Distribution
 FiringTime: TypeAlias = Duration | Mapping[str, Duration]  # by input port
+
+
+class LawParameter(Parameter[str | Distribution]):
+    """A distribution, or the name of a familiar one: ``normal``, or ``{type: Triangular, low: -1}``."""
+
+    def __init__(self, familiar: Iterable[str], default: Any = REQUIRED, *, doc: str = "") -> None:
+        super().__init__(str, default, doc=doc)
+        self.forms = (Parameter(str, choices=tuple(familiar)), Parameter(Distribution))
+
+    def describe_type(self) -> str:
+        return f"{', '.join(self.forms[0].choices)}, or distribution"
+
+    def convert(self, value: object) -> str | Distribution | None:
+        converted: str | Distribution | None = self.forms[isinstance(value, (Mapping, Configurable))].convert(value)
+        return converted
+
+
+def law(value: str | Distribution, familiar: Mapping[str, Distribution]) -> Distribution:
+    """What a ``LawParameter`` with these names says."""
+    return familiar[value] if isinstance(value, str) else value
 
 
 class DurationParameter(Parameter[Duration]):

@@ -16,14 +16,14 @@ timeout), no firing resumes them, and so no aspect can hold that up.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
-from epicycle.actors import Actor, InputPort, Tag, Wake, random_stream
+from epicycle.actors import Actor, InputPort, Tag, Wake
 
-from .core import Aspect, JoinPoint, Weaver
+from .join_point import JoinPoint, JoinPointAspect, aspect_stream
 
 
 @dataclass(eq=False)
@@ -81,25 +81,20 @@ class ActorPoint(JoinPoint):
     unit: Unit
     keeper: Keeper
 
-    @property
-    def owner(self) -> str:
+    @staticmethod
+    def _parts(port: str) -> tuple[str, str]:
         """The path of the actor."""
-        return self.port
+        return port, ""
 
 
-class Unit(JoinPoint):
+class Unit(ActorPoint):
     """What an execution aspect was aimed at, as a whole: the ``points`` of the actors that it stands at for it."""
 
-    def __init__(self, path: str, first: ActorPoint, weaver: Weaver) -> None:
-        super().__init__(first.aspect, path, weaver, lambda job: None, first.shared)
-        self.random = random_stream(weaver.seed, path, f"aspect {first.aspect} as a whole")
+    def __init__(self, path: str, first: ActorPoint) -> None:
+        super().__init__(first.aspect, path, first._context, lambda job: None, first.shared)
+        self.random = aspect_stream(first._context.seed, path, f"{first.aspect} as a whole")
         self.points: list[ActorPoint] = []
         self._readings = first._readings
-
-    @property
-    def owner(self) -> str:
-        """The path of the actor or composite."""
-        return self.port
 
     def suspend(self, keeps: Callable[[Job, ActorPoint], bool]) -> None:
         """From now on its actors do not fire.  What is forwarded to them waits; so does a job that falls due, before
@@ -124,13 +119,12 @@ class Unit(JoinPoint):
             point.keeper.restart()
 
 
-class ExecutionAspect(Aspect, ABC):
+class ExecutionAspect(JoinPointAspect[Job, ActorPoint]):
     """An aspect of an actor's firing: write ``schedule``.
 
     ``is_processor``: it stands for the one processor that an actor has, so no two of this kind fit on an actor.
     """
 
-    stands_at: ClassVar[frozenset[str]] = frozenset({"actor"})
     is_processor: ClassVar[bool] = False
 
     def begin(self, unit: Unit) -> None:
@@ -139,7 +133,3 @@ class ExecutionAspect(Aspect, ABC):
     @abstractmethod
     def schedule(self, job: Job, point: ActorPoint) -> None:
         """Decide when, or whether, a job is executed: ``point.forward(job)``, now or later or never."""
-
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        assert isinstance(point, ActorPoint)
-        self.schedule(token, point)

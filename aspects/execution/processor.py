@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from epicycle.actors import Parameter, to_nanoseconds, to_seconds
 
-from .core import JoinPoint
-from .duration import FiringTime, FiringTimeParameter, time_needed
-from .execution import ActorPoint, ExecutionAspect, Job
-from .selection import ByActorParameter
+from ..core import (
+    ActorPoint,
+    ByActorParameter,
+    ExecutionAspect,
+    FiringTime,
+    FiringTimeParameter,
+    Job,
+    Server,
+    Task,
+    time_needed,
+)
 
 FCFS, PRIORITY, EDF = "fcfs", "priority", "edf"
 
@@ -70,10 +76,9 @@ class Processor(ExecutionAspect):
         if seconds is None:
             self.pass_by(job, point)
         else:
-            task = self._task(job, point, to_nanoseconds(seconds))
-            self._core(point).arrive(task, preemptive=self.preemptive)
+            self._core(point).arrive(self._task(job, point, to_nanoseconds(seconds)), preemptive=self.preemptive)
 
-    def pass_by(self, job: Job, point: ActorPoint) -> None:  # type: ignore[override]
+    def pass_by(self, job: Job, point: ActorPoint) -> None:
         # It takes no time, but has to stay behind the earlier ones of its actor.
         core = self._core(point)
         if core.has_any(point):
@@ -81,8 +86,7 @@ class Processor(ExecutionAspect):
         else:
             point.forward(job)
 
-    def forget(self, point: JoinPoint) -> None:
-        assert isinstance(point, ActorPoint)
+    def forget(self, point: ActorPoint) -> None:
         self._core(point).remove(point)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
@@ -98,7 +102,7 @@ class Processor(ExecutionAspect):
         core: _Core = point.shared.setdefault("core", _Core())
         return core
 
-    def _task(self, job: Job, point: ActorPoint, duration: int) -> _Task:
+    def _task(self, job: Job, point: ActorPoint, duration: int) -> _Firing:
         now, limit = point.tag.time, self._of(self.deadlines, "deadlines", point)
         deadline = float("inf") if limit is None else now + to_nanoseconds(limit)
         urgency = 0.0
@@ -107,103 +111,34 @@ class Processor(ExecutionAspect):
             urgency = float("inf") if priority is None else priority
         elif self.policy == EDF:
             urgency = deadline
-        return _Task(urgency, 0, job, point, now, duration, deadline)
+        return _Firing(urgency, job, point, duration, deadline)
 
     @staticmethod
     def _of(value: Mapping[str, Any], name: str, point: ActorPoint) -> Any:
         known = point.memory.setdefault(name, {})
         if "value" not in known:
-            known["value"] = ByActorParameter.of(value, point.selected(name), point.port)
+            known["value"] = ByActorParameter.of(value, point.selected(name), point.owner)
         return known["value"]
 
 
 @dataclass(order=True)
-class _Task:
-    """A firing that needs the processor; times in ns."""
+class _Firing(Task):
+    """A firing that needs the processor."""
 
-    urgency: float
-    number: int  # which of all that have come
-    job: Job = field(compare=False)
-    point: ActorPoint = field(compare=False)
-    released: int = field(compare=False)
-    left: int = field(compare=False)  # time that it still needs
     deadline: float = field(compare=False)
 
 
-class _Core:
+class _Core(Server[_Firing]):
     """What is on a processor, and what has been; times in ns."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.done = 0  # firings
         self.responses = 0  # of all of them
         self.longest = 0
-        self._waiting: list[_Task] = []
-        self._running: _Task | None = None
-        self._begun = 0  # when the running one began, or went on
-        self._busy = 0  # of all that ran before it
-        self._come = 0
 
-    def has_any(self, point: ActorPoint) -> bool:
-        """Whether a firing of this actor is not over."""
-        return any(task.point is point for task in (*self._waiting, *([self._running] if self._running else ())))
-
-    def busy_until(self, end: int) -> int:
-        """How long it has worked before ``end``, which is not before the present."""
-        return self._busy + (end - self._begun if self._running is not None else 0)
-
-    def remove(self, point: ActorPoint) -> None:
-        """Drop the firings of an actor that will never be over, now."""
-        now = point.tag.time
-        self._waiting = [task for task in self._waiting if task.point is not point]
-        heapq.heapify(self._waiting)
-        if self._running is not None and self._running.point is point:
-            self._busy += now - self._begun
-            self._running = None
-            self._go_on(now)
-
-    def arrive(self, task: _Task, *, preemptive: bool) -> None:
-        """Take in a firing, now."""
-        now, running = task.released, self._running
-        task.number, self._come = self._come, self._come + 1
-        if running is not None and self._begun + running.left <= now:
-            self._finish((running, self._begun))  # it is over, though we have not been called yet
-            running = self._running
-        if running is not None and task.urgency < running.urgency and (preemptive or self._begun == now):
-            self._put_back(running, now)
-        heapq.heappush(self._waiting, task)
-        self._go_on(now)
-
-    def _put_back(self, task: _Task, now: int) -> None:
-        worked = now - self._begun
-        self._busy += worked
-        task.left -= worked
-        self._running = None
-        heapq.heappush(self._waiting, task)
-        if worked > 0:  # or else it had not really begun
-            task.point.act("preempted", to_seconds(task.left))
-
-    def _go_on(self, now: int) -> None:
-        """If it is idle, let it work on the most urgent firing."""
-        while self._running is None and self._waiting:
-            task = self._running = heapq.heappop(self._waiting)
-            self._begun = now
-            if task.left > 0:
-                task.point.later(to_seconds(task.left), self._finish, (task, now))
-            else:
-                self._fire(task, now)
-
-    def _finish(self, what: tuple[_Task, int]) -> None:
-        """A firing is over, unless it was preempted since it began or went on at that time."""
-        task, begun = what
-        if task is self._running and begun == self._begun:
-            now = begun + task.left
-            self._fire(task, now)
-            self._go_on(now)
-
-    def _fire(self, task: _Task, now: int) -> None:
-        self._busy += now - self._begun
-        self._running = None
-        response = now - task.released
+    def release(self, task: _Firing, now: int) -> None:
+        response = now - task.came
         self.done += 1
         self.responses += response
         self.longest = max(self.longest, response)
@@ -211,4 +146,4 @@ class _Core:
             task.point.act("delayed", to_seconds(response))
         if now > task.deadline:
             task.point.act("missed", to_seconds(now - round(task.deadline)))
-        task.point.forward(task.job)
+        task.point.forward(task.passing)

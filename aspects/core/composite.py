@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from .core import Aspect
+from .execution import ActorPoint, ExecutionAspect, Job
+from .join_point import JoinPoint
+from .port import PortAspect
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class FiringRequest(Request):
     execution_time: float = 0.0
 
 
-class CompositeAspect(Aspect):
+class CompositeAspect(PortAspect):
     """An aspect that is a model: each token is a request to a composite, and goes on when the composite answers.
 
     Events: ``requested``; ``delivered``, with the seconds since.  A request that is never answered is a token lost.
@@ -46,8 +48,11 @@ class CompositeAspect(Aspect):
 
     events: ClassVar[tuple[str, ...]] = ("requested", "delivered")
 
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        point.enter(token)
 
-class CompositeExecutionAspect(Aspect):
+
+class CompositeExecutionAspect(ExecutionAspect):
     """An aspect at actors that is a model: each firing is a request to a composite, and happens when it answers.
 
     Events: ``requested``, with the execution time; ``executed``, with the seconds since.  A request that is never
@@ -55,5 +60,7 @@ class CompositeExecutionAspect(Aspect):
     """
 
     events: ClassVar[tuple[str, ...]] = ("requested", "executed")
-    stands_at: ClassVar[frozenset[str]] = frozenset({"actor"})
     is_processor: ClassVar[bool] = True
+
+    def schedule(self, job: Job, point: ActorPoint) -> None:
+        point.enter(job)

@@ -247,8 +247,8 @@ class Careless:
     def latest(self, port: str) -> Any:
         raise NotImplementedError
 
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
-        self.log.append(Record(self.tag, event, *port.split("."), None, aspect, token))
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        self.log.append(Record(self.tag, event, owner, port, None, aspect, token))
 
     def record(self, signal: str, token: Any) -> None:
         pass

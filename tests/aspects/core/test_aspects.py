@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import binom
 
 from epicycle.actors import random_stream
-from epicycle.aspects import Aspect, CommunicationAspect, JoinPoint
+from epicycle.aspects import CommunicationAspect, JoinPoint, PortAspect
 from epicycle.runner.engine import ActorError, Results, Simulation
 from epicycle.runner.model import load_model
 from tests.engine.engine_parts import load, seen, sends, simulate
@@ -144,7 +144,7 @@ class Mark(CommunicationAspect):
         point.forward(f"{token}{point.aspect}")
 
 
-class Echo(Aspect):
+class Echo(PortAspect):
     """Forwards at once, in the next microstep, and a second later."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
@@ -153,7 +153,7 @@ class Echo(Aspect):
         point.forward(token, 1)
 
 
-class Broken(Aspect):
+class Broken(PortAspect):
     """Fails."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
@@ -256,7 +256,7 @@ def test_an_exception_in_an_aspect_names_the_aspect() -> None:
         fan(outside="bad: {type: Broken, at: 'fan[1].in'}")
     told, _, where = str(caught.value).partition("\n")
     assert told == "aspect bad failed in pass_token() at fan[1].in at (0 s, 1): LookupError: no idea"
-    assert where.startswith("   raised at tests/aspects/test_aspects.py:")
+    assert where.startswith("   raised at tests/aspects/core/test_aspects.py:")
     assert 'raise LookupError("no idea")' in where.splitlines()[1]
     assert where.endswith("m.yaml:12:11")
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from epicycle.actors import Parameter, array_parameter, to_nanoseconds, to_seconds
 
-from .core import JoinPoint
-from .duration import DurationParameter, drawn
-from .execution import ActorPoint, ExecutionAspect, Job, Unit
+from ..core import ActorPoint, DurationParameter, ExecutionAspect, Job, Unit, drawn
 
 LOST, KEPT = "lost", "kept"
 
@@ -46,8 +45,8 @@ class CrashRestart(ExecutionAspect):
     tokens = Parameter(str, LOST, choices=(LOST, KEPT), doc="what becomes of tokens that come while it is down")
 
     def begin(self, unit: Unit) -> None:
-        unit.shared.setdefault("units", []).append(_Life(unit))
-        unit.memory["life"] = unit.shared["units"][-1]
+        unit.memory["life"] = life = _Life()
+        unit.shared.setdefault("units", []).append(life)
         now = unit.tag.time
         for time in sorted(to_nanoseconds(float(each)) for each in self.times):
             if time > now:
@@ -83,9 +82,10 @@ class CrashRestart(ExecutionAspect):
         """Let it crash, if that can be now; whether it does."""
         life: _Life = unit.memory["life"]
         is_active = self.is_due(unit.tag.time) and (self.when is None or bool(unit.value_of(self.when)))
-        if life.is_down or not is_active:
+        if life.since is not None or not is_active:
             return False
-        life.crash()
+        life.crashes += 1
+        life.since = unit.tag.time
         unit.act("crashed", None)
         if self.state == LOST:
             unit.kill()
@@ -101,40 +101,24 @@ class CrashRestart(ExecutionAspect):
         return job.is_wanted
 
     def _restart(self, unit: Unit) -> None:
-        unit.act("restarted", to_seconds(unit.memory["life"].restart()))
+        life: _Life = unit.memory["life"]
+        down = life.down_until(unit.tag.time)
+        unit.act("restarted", to_seconds(down - life.down))
+        life.down, life.since = down, None
         if self.state == LOST:
             unit.restart()
         unit.resume()
         self._await_failure(unit)
 
 
+@dataclass
 class _Life:
     """How one unit has fared; times in ns."""
 
-    def __init__(self, point: JoinPoint) -> None:
-        self.crashes = 0
-        self._point = point
-        self._down = 0  # before the crash that is not repaired
-        self._since: int | None = None
-
-    @property
-    def is_down(self) -> bool:
-        """Whether it has crashed and is not repaired."""
-        return self._since is not None
-
-    def crash(self) -> None:
-        """It is down from now on."""
-        self.crashes += 1
-        self._since = self._point.tag.time
-
-    def restart(self) -> int:
-        """It works from now on; how long it was down."""
-        assert self._since is not None
-        span = self._point.tag.time - self._since
-        self._down += span
-        self._since = None
-        return span
+    crashes: int = 0
+    down: int = 0  # before the crash that is not repaired
+    since: int | None = None  # when that was
 
     def down_until(self, end: int) -> int:
         """How long it was down in all, before ``end``, which is not before the present."""
-        return self._down + (0 if self._since is None else end - self._since)
+        return self.down + (0 if self.since is None else end - self.since)

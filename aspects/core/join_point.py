@@ -1,48 +1,41 @@
-"""Aspect: what is woven around a model from outside, and the join points at which it acts.
+"""JoinPoint: a place where an aspect stands; and what the aspects that act at such places have in common.
 
 The weaving contract
 --------------------
-The engine makes one aspect object per declaration and one ``JoinPoint`` for each port that its pointcut selects.
-For every token that passes a join point it calls ``aspect.pass_token(token, point)``, which decides what goes on by
-calling ``point.forward(token)`` never, once or several times, now or (with ``delay``) later, and what is noted by
-calling ``point.act(...)``.  Doing exactly ``point.forward(token)`` leaves no trace.
+There are three kinds, by what passes an aspect: tokens at ports (``PortAspect``), firings of actors
+(``ExecutionAspect``), and the time that actors see (``ClockAspect``).  The engine makes one aspect object per
+declaration and one ``JoinPoint`` for each port or actor that its pointcut selects.  For every token or firing that
+passes a join point it calls ``pass_token`` or ``schedule``, which decides what goes on by calling ``point.forward``
+never, once or several times, now or (with ``delay``) later, and what is noted by calling ``point.act(...)``.  Doing
+exactly ``point.forward(token)`` leaves no trace.
 
 Aspects at the same port apply in the order of their declaration, the first one outermost (nearest to the sender).
 An aspect acts while it is *active*: from ``from`` until ``until`` (again every ``every``), and ``when`` a condition
-over ports holds.  At other times tokens pass it untouched, and it does not learn of them.  It may look at what ports
-have sent last (``PortsParameter``, ``reads``, ``point.latest``), and changes nothing but what passes where it is woven.
+over ports holds.  At other times what passes goes on untouched, and the aspect does not learn of it.  It may look at
+what ports have sent last (``PortsParameter``, ``reads``, ``point.latest``), and changes nothing but what passes it.
 
-Each join point has a random stream of its own, keyed by the names of aspect and port: adding, removing or re-aiming
-an aspect moves no stream of an actor, of another aspect, or of the same aspect at another port.  An aspect should
+Each join point has a random stream of its own, keyed by the names of aspect and place: adding, removing or re-aiming
+an aspect moves no stream of an actor, of another aspect, or of the same aspect at another place.  An aspect should
 draw the same number of random values whatever its strength, so that runs at different strengths can be paired.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
-from epicycle.actors import (
-    Configurable,
-    EpicycleError,
-    Parameter,
-    Stream,
-    Tag,
-    random_stream,
-    to_nanoseconds,
-    to_seconds,
-)
+from epicycle.actors import EpicycleError, Parameter, Stream, Tag, random_stream, to_nanoseconds, to_seconds
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand, value_at
 
-from .decoration import Decoration, decoration
+from .aspect import Aspect
 
+TOKEN = "token"  # what expressions over ports call the token that passes
 Reading = tuple[str, tuple[str, ...]]  # an output port, and the fields that lead to a part of its token
 Selection = Mapping[str, Sequence[str]]  # patterns, and the full paths that they select
 
 
-class Weaver(Protocol):
+class AspectContext(Protocol):
     """What the engine offers to a join point."""
 
     @property
@@ -62,8 +55,8 @@ class Weaver(Protocol):
     def latest(self, port: str) -> Any:
         """What an output port has sent last; None if it has sent nothing yet."""
 
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
-        """Write an act of an aspect into the event log."""
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        """Write an act of an aspect into the event log; ``port`` is a name, empty for an act at an actor."""
 
     def record(self, signal: str, token: Any) -> None:
         """Append a token to a signal among the results of the run."""
@@ -79,14 +72,15 @@ class JoinPoint:
     about this port between tokens; ``shared`` is one for all its ports.  ``place`` is the connection, for an aspect
     that stands on one connection to the port alone.  ``readings`` are what the aspect's expressions over ports ask for,
     ``selections`` what its parameters with patterns select.
-    ``source`` is the port that tokens come from over the connection, at an output the port itself.
+    ``source`` is the port that tokens come from over the connection, at an output the port itself; ``owner`` the actor
+    or composite whose port it is.  ``enter`` lets a token into the composite, for an aspect that is a model.
     """
 
     def __init__(
         self,
         aspect: str,
         port: str,
-        weaver: Weaver,
+        context: AspectContext,
         forward: Callable[[Any], None],
         shared: dict[Any, Any] | None = None,
         place: str = "",
@@ -96,23 +90,31 @@ class JoinPoint:
     ) -> None:
         self.aspect = aspect
         self.port = port
+        self.owner, self._name = self._parts(port)
         self.source = source or port
+        self.enter = forward
         self.counts: dict[str, int] = {}
         self.memory: dict[Any, Any] = {}
         self.shared: dict[Any, Any] = {} if shared is None else shared
         self._place = place or port
         self._first: JoinPoint = self
-        self._weaver = weaver
+        self._context = context
         self._forward = forward
         self._readings = readings or {}
         self._selections = selections or {}
+
+    @staticmethod
+    def _parts(port: str) -> tuple[str, str]:
+        """The path of the actor or composite whose port this is, and the port's name."""
+        owner, _, name = port.rpartition(".")
+        return owner, name
 
     @cached_property
     def random(self) -> Stream:
         """The random stream of the aspect at this port; many never ask for theirs."""
         if self._first is not self:
             return self._first.random
-        return random_stream(self._weaver.seed, self._place, f"aspect {self.aspect}")
+        return aspect_stream(self._context.seed, self._place, self.aspect)
 
     def share(self, first: JoinPoint) -> None:
         """Engine: the port has another connection, on which ``first`` stands: one stream, one memory."""
@@ -121,21 +123,16 @@ class JoinPoint:
     @property
     def tag(self) -> Tag:
         """The present tag."""
-        return self._weaver.tag
+        return self._context.tag
 
     @property
     def now(self) -> float:
         """The present time in seconds."""
-        return to_seconds(self._weaver.tag.time)
-
-    @property
-    def owner(self) -> str:
-        """The path of the actor or composite whose port this is."""
-        return self.port.rpartition(".")[0]
+        return to_seconds(self._context.tag.time)
 
     def latest(self, port: str) -> Any:
         """What an output port that the aspect ``reads`` has sent last; None if it has sent nothing yet."""
-        return self._weaver.latest(port)
+        return self._context.latest(port)
 
     def value_of(self, formula: PortFormula, **given: object) -> Any:
         """The present value of a parameter of the aspect that is an expression over ports and ``given`` names.
@@ -144,7 +141,7 @@ class JoinPoint:
         """
         values = []
         for port, fields in self._readings.get(formula, ()):
-            latest = self._weaver.latest(port)
+            latest = self._context.latest(port)
             if latest is None:
                 return None
             values.append(operand(value_at(latest, fields)))
@@ -159,15 +156,15 @@ class JoinPoint:
         if delay is None:
             self._forward(token)
         else:
-            self._weaver.later(to_nanoseconds(delay), self._forward, token)
+            self._context.later(to_nanoseconds(delay), self._forward, token)
 
     def hold(self, token: Any) -> Callable[[], None]:
         """What lets a token pass when it is called: ``forward`` for a token that came at another time."""
-        return self._weaver.hold(self._forward, token)
+        return self._context.hold(self._forward, token)
 
     def later(self, delay: float, call: Callable[[Any], None], what: Any) -> None:
         """Call ``call(what)`` after ``delay`` seconds (0 is the next microstep): for what is decided only then."""
-        self._weaver.later(to_nanoseconds(delay), call, what)
+        self._context.later(to_nanoseconds(delay), call, what)
 
     def count(self, event: str) -> None:
         """Count an event for the summary, and leave no trace in the log."""
@@ -179,32 +176,32 @@ class JoinPoint:
         Details are a new token or a delay in seconds; with details the logged value is a list.
         """
         self.count(event)
-        self._weaver.note(self.aspect, self.port, event, [token, *details] if details else token)
+        self._context.note(self.aspect, self.owner, self._name, event, [token, *details] if details else token)
 
     def record(self, token: Any) -> None:
         """Append a token to the signal of this join point, ``aspect@port``, among the results of the run."""
-        self._weaver.record(f"{self.aspect}@{self.port}", token)
+        self._context.record(f"{self.aspect}@{self.port}", token)
 
     def stop(self) -> None:
         """End the run when the present tag has been handled; the aspect is given as the reason."""
-        self._weaver.stop(f"aspect {self.aspect}")
+        self._context.stop(f"aspect {self.aspect}")
 
 
-class Aspect(Configurable):
-    """Base of all aspects: declare parameters in the class, write ``pass_token``.
+def aspect_stream(seed: int, place: str, aspect: str) -> Stream:
+    """The random stream of an aspect at a place: a port, a connection, an actor."""
+    return random_stream(seed, place, f"aspect {aspect}")
 
-    ``stands_at`` says which ports it can be woven around: inputs (communication), outputs (measurement), or both.
-    ``events`` names what it may note, so that summaries show a zero where nothing happened; ``reports`` names the
-    figures that it tells at the end of a run, with their units.  ``alters_parameters``: it may also stand at parameters
-    that are numbers, which it gets as tokens whenever their actors fire.  ``in_model_time``: it goes by the time of the
-    model, and not by the clocks of the composites in which it stands.
+
+Passing = TypeVar("Passing")  # a token, or a firing
+Point = TypeVar("Point", bound=JoinPoint)
+
+
+class JoinPointAspect(Aspect, Generic[Passing, Point]):
+    """What aspects of ports and of execution have in common: they act on what passes join points, while active.
+
+    ``in_model_time``: it goes by the time of the model, and not by the clocks of the composites in which it stands.
     """
 
-    reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled"})
-    stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
-    events: ClassVar[tuple[str, ...]] = ()
-    reports: ClassVar[dict[str, str]] = {}
-    alters_parameters: ClassVar[bool] = False
     in_model_time: ClassVar[bool] = False
 
     from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")
@@ -224,14 +221,6 @@ class Aspect(Configurable):
             wanted = "a time 'until' as well" if self.until is None else "at least the time from 'from' to 'until'"
             raise EpicycleError(f"every {self.every:g} s needs {wanted}")
 
-    def at(self, *ports: str, name: str = "") -> Decoration:
-        """Let it come with actors: ``@Noise(deviation=0.1).at("output")`` before a class, or called with an instance.
-
-        It then stands at these ports of every actor of the class, or of this one; an aspect of execution stands at the
-        actor itself, without ports.  The ``name`` is that of the type unless given.  Raises ``EpicycleError``.
-        """
-        return decoration(self, ports, name)
-
     def is_due(self, time: int) -> bool:
         """Whether ``from``, ``until`` and ``every`` let it act at this time (ns)."""
         start = to_nanoseconds(self.from_)
@@ -249,47 +238,9 @@ class Aspect(Configurable):
         """Patterns of the output ports that it looks at."""
         return ()
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        """Decide what becomes of a token at a join point."""
-        raise NotImplementedError(f"{type(self).__name__} has no pass_token()")
+    def pass_by(self, passing: Passing, point: Point) -> None:
+        """What becomes of what passes while the aspect is not active: it goes on, untouched."""
+        point.forward(passing)
 
-    def pass_by(self, token: Any, point: JoinPoint) -> None:
-        """What becomes of a token while the aspect is not active: it goes on, untouched."""
-        point.forward(token)
-
-    def forget(self, point: JoinPoint) -> None:
+    def forget(self, point: Point) -> None:
         """The actor at which it stands has lost its state in a crash: what it had begun will never be over."""
-
-    def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
-        """The figures that it ``reports``, from ``point.shared`` and the time (ns) at which the run ended.
-
-        None is for a figure of which there is nothing to say, such as the mean of nothing.
-        """
-        return {}
-
-
-class CommunicationAspect(Aspect):
-    """An aspect of the way to an input port."""
-
-    stands_at: ClassVar[frozenset[str]] = frozenset({"input"})
-
-
-class ObservationAspect(Aspect, ABC):
-    """An aspect that looks at what passes and never changes it: write ``observe``.
-
-    Every token goes on at once, whatever ``observe`` does with what it sees.
-    """
-
-    @abstractmethod
-    def observe(self, token: Any, point: JoinPoint) -> None:
-        """Look at a token before it goes on."""
-
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        self.observe(token, point)
-        point.forward(token)
-
-
-class MeasurementAspect(Aspect):
-    """An aspect of what leaves an output port."""
-
-    stands_at: ClassVar[frozenset[str]] = frozenset({"output"})

@@ -1,4 +1,4 @@
-"""Disturbances of execution: firings that take time, and firings that do not happen."""
+"""Firings that take time."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import ClassVar
 
 from epicycle.actors import EpicycleError, Parameter, to_nanoseconds, to_seconds
 
-from .core import JoinPoint
-from .duration import FiringTimeParameter, time_needed
-from .execution import ActorPoint, ExecutionAspect, Job
-from .measured import MeasuredTimes
+from ..core import ActorPoint, ExecutionAspect, FiringTimeParameter, Job, time_needed
+from .measured_times import MeasuredTimes
 
 WAIT, SKIP = "wait", "skip"
 
@@ -63,13 +61,13 @@ class ExecutionTime(ExecutionAspect):
             return
         if self._measured is not None:
             number = point.memory["number"] = point.memory.get("number", -1) + 1
-            seconds += self._measured.of(point.port, number)
+            seconds += self._measured.of(point.owner, number)
         self._occupy(job, point, to_nanoseconds(self.scale * seconds))
 
-    def pass_by(self, job: Job, point: ActorPoint) -> None:  # type: ignore[override]
+    def pass_by(self, job: Job, point: ActorPoint) -> None:
         self._occupy(job, point, 0)  # though it still waits for those before it
 
-    def forget(self, point: JoinPoint) -> None:
+    def forget(self, point: ActorPoint) -> None:
         point.memory.pop("free", None)
 
     def _occupy(self, job: Job, point: ActorPoint, duration: int) -> None:
@@ -85,24 +83,3 @@ class ExecutionTime(ExecutionAspect):
         delay = to_seconds(free + duration - now)
         point.act("delayed", delay)
         point.forward(job, delay)
-
-
-class SkipFiring(ExecutionAspect):
-    """Skips each firing with a fixed probability, independently: what came for it is lost.
-
-    An actor that asks for its next wake-up whenever it wakes up would sleep for ever after one that is skipped; so
-    a firing for which a wake-up is due always happens, unless ``wakes`` says that it may be skipped as well.
-    Event: ``skipped``.
-    """
-
-    events: ClassVar[tuple[str, ...]] = ("skipped",)
-
-    probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a firing is skipped")
-    wakes = Parameter(bool, False, doc="whether firings for a wake-up may be skipped, too")
-
-    def schedule(self, job: Job, point: ActorPoint) -> None:
-        skipped = point.random.random() < self.probability
-        if skipped and (self.wakes or not job.wakes):
-            point.act("skipped", None)
-        else:
-            point.forward(job)

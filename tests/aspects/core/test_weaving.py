@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError, PortFormula
-from epicycle.aspects import Aspect, Bias, JoinPoint, PacketLoss
+from epicycle.aspects import Bias, JoinPoint, PacketLoss, PortAspect
 from epicycle.runner import ActorError, ModelError
 from epicycle.runner.engine import Results
 from tests.engine.engine_parts import load, simulate
@@ -266,7 +266,7 @@ def test_conditions_on_fields() -> None:
         PortFormula("1 < 2")
 
 
-class Nosy(Aspect):
+class Nosy(PortAspect):
     """Adds up what others have sent."""
 
     stands_at = frozenset({"input"})

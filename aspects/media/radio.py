@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 from epicycle.actors import EpicycleError, Parameter, to_nanoseconds, to_seconds
 
-from .core import JoinPoint
-from .media import Medium, Message, WaitingLine
+from ..core import JoinPoint, WaitingLine
+from .medium import Medium, Message
 
 
 class RadioMedium(Medium):
@@ -81,13 +81,13 @@ class RadioMedium(Medium):
             return
         air: _Air = point.shared.setdefault("air", _Air())
         station = air.stations.setdefault(point.source.rpartition(".")[0], _Station())
-        frame = _Frame(self.priority_of(token), air.come, token, point, airtime, self, station)
-        air.come += 1
+        frame = _Frame(self.priority_of(token), token, point, airtime, self, station)
+        frame.number, air.come = air.come, air.come + 1
         if not station.is_busy:
             station.is_busy = True
             air.contend(frame)
-        elif dropped := station.line.add(frame, self.capacity, self.overflow):
-            dropped.point.act("dropped", dropped.token)
+        elif dropped := station.line.add(frame, frame.came, self.capacity, self.overflow):
+            dropped.point.act("dropped", dropped.passing)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
         air: _Air = shared.get("air", _Air())
@@ -217,14 +217,14 @@ class _Air:
         self.collisions += frame.collided
         frame.collided = frame.is_first = False
         if in_vain or spoilt:
-            point.act("collided" if in_vain else "lost", frame.token)
+            point.act("collided" if in_vain else "lost", frame.passing)
             if frame.attempt < radio.retries:
                 frame.attempt += 1
                 self.contend(frame)
                 return
-            point.act("dropped", frame.token)
-        frame.station.is_busy = bool(frame.station.line)
-        if frame.station.line:
+            point.act("dropped", frame.passing)
+        frame.station.is_busy = bool(frame.station.line.tasks)
+        if frame.station.is_busy:
             self.contend(frame.station.line.pop(now))
         if not (in_vain or spoilt):
             self.arrivals += 1
