@@ -139,6 +139,7 @@ __all__ = [
     "abridged",
     "accepts",
     "array_parameter",
+    "bounds_text",
     "convert",
     "counted",
     "counted_in_si",

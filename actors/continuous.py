@@ -87,12 +87,12 @@ class ODE(Actor):
     relative_tolerance = Parameter(
         float, 1e-10, unit="1", min=1e-13, max=0.1, doc="error per step, relative to each state"
     )
-    absolute_tolerance = Parameter(float, 1e-12, min=1e-300, doc="error per step, added to the relative one")
+    absolute_tolerance = Parameter(float, 1e-12, above=0, doc="error per step, added to the relative one")
     max_step = Parameter(
-        float, None, unit="s", min=1e-9, max=1e6,
+        float, None, unit="s", above=0, max=1e6,
         doc="longest step; if left out, 1 s, or what the tolerances allow where nothing can hide in it",
     )  # fmt: skip
-    min_interval = Parameter(float, 1e-6, unit="s", min=1e-9, doc="what crossings of one kind keep between them")
+    min_interval = Parameter(float, 1e-6, unit="s", above=0, doc="what crossings of one kind keep between them")
 
     def check(self) -> None:
         self._states = tuple(self.initial)

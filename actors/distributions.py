@@ -75,12 +75,8 @@ class Exponential(Distribution):
 class Gamma(Distribution):
     """The gamma distribution; with a whole ``shape`` the Erlang distribution."""
 
-    shape = Parameter(float, 1.0, unit="1", min=0, doc="the shape k; k = 1 is the exponential distribution")
+    shape = Parameter(float, 1.0, unit="1", above=0, doc="the shape k; k = 1 is the exponential distribution")
     mean = Parameter(float, 1.0, min=0, doc="the mean, shape times scale")
-
-    def check(self) -> None:
-        if self.shape == 0:
-            raise ParameterError("Gamma.shape: 0 is not above 0")
 
     def draw(self, random: Stream) -> float:
         return random.gamma(self.shape, self.mean / self.shape)

@@ -62,7 +62,7 @@ class Clock(_Ticking):
     start = InputPort(required=False, doc="begins a first cycle; if connected, nothing else does")
     stop = InputPort(required=False, doc="ends the ticking until the next start")
 
-    period = PortParameter(float, unit="s", min=1e-9, doc="length of a cycle, rounded to whole nanoseconds")
+    period = PortParameter(float, unit="s", above=0, doc="length of a cycle, rounded to whole nanoseconds")
     offset = Parameter(float, 0.0, unit="s", min=0, doc="time from the start to the first cycle")
     offsets = array_parameter((None,), [0.0], unit="s", min=0, doc="when each cycle ticks, in order")
 
@@ -121,7 +121,7 @@ class PoissonClock(_Ticking):
     Ptolemy: ``PoissonClock``.
     """
 
-    mean_interval = Parameter(float, 1.0, unit="s", min=1e-9, doc="mean time between two ticks")
+    mean_interval = Parameter(float, 1.0, unit="s", above=0, doc="mean time between two ticks")
     fire_at_start = Parameter(bool, True, doc="whether the first tick comes at the start")
 
     def initialize(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, overload
@@ -64,6 +64,7 @@ class Parameter(Generic[T]):
     units; the ``unit`` of a ``Configurable`` class is that of the parameters in it that have none of their own.
     ``shape`` makes it an array of floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and
     ``object``, ``(None,)`` a tuple.  ``int | float`` is a number that stays an integer if it is one.
+    Numbers are ``min`` or more, or else greater than ``above``, and ``max`` or less.
     A parameter that takes values of several kinds names one parameter for each kind as its ``forms``.
     """
 
@@ -76,6 +77,7 @@ class Parameter(Generic[T]):
         *,
         unit: str = "",
         min: float | None = None,
+        above: float | None = None,
         max: float | None = None,
         choices: Sequence[str] = (),
         shape: tuple[int | None, ...] | None = None,
@@ -86,6 +88,7 @@ class Parameter(Generic[T]):
         self.default = default
         self.unit = unit
         self.min = min
+        self.above = above
         self.max = max
         self.choices = tuple(choices)
         self.shape = shape
@@ -171,12 +174,8 @@ class Parameter(Generic[T]):
         if self.unit and self.unit != "1":
             text += f" in {self.unit}"
         if self.min is not None and self.max is not None:
-            text += f" from {_digits(self.min)} to {_digits(self.max)}"
-        elif self.min is not None:
-            text += f" >= {_digits(self.min)}"
-        elif self.max is not None:
-            text += f" <= {_digits(self.max)}"
-        return text
+            return f"{text} from {_digits(self.min)} to {_digits(self.max)}"
+        return text + bounds_text(self.min, self.above, self.max, _digits)
 
     def _scalar(self, value: object) -> object:
         if self.type is object:
@@ -231,9 +230,19 @@ class Parameter(Generic[T]):
     def _bounded(self, value: float | int) -> float | int:
         if math.isnan(value):
             raise ParameterError(f"nan is not {self._expected()}")
-        if (self.min is not None and value < self.min) or (self.max is not None and value > self.max):
+        if not self._holds(value, value):
             raise ParameterError(f"{_digits(value)} is out of bounds, expected {self._expected()}")
+        if self.above == 0 and self.unit == "s" and value < 1e-9:
+            raise ParameterError(f"{_digits(value)} s is shorter than a nanosecond, which is the shortest time")
         return value
+
+    def _holds(self, low: float, high: float) -> bool:
+        """Whether all from one number to another is within bounds."""
+        return (
+            (self.min is None or low >= self.min)
+            and (self.above is None or low > self.above)
+            and (self.max is None or high <= self.max)
+        )
 
     def _array(self, value: object) -> NDArray[np.float64]:
         assert self.shape is not None
@@ -252,8 +261,7 @@ class Parameter(Generic[T]):
             return False
         if any(isinstance(each, int) and abs(each) > _EXACT for each in value) or any(map(math.isnan, value)):
             return False
-        low, high = min(value), max(value)
-        return (self.min is None or low >= self.min) and (self.max is None or high <= self.max)
+        return self._holds(min(value), max(value))
 
     def _rows(self, value: object, shape: tuple[int | None, ...], whole: object) -> object:
         if not shape:
@@ -270,11 +278,12 @@ def array_parameter(
     *,
     unit: str = "",
     min: float | None = None,
+    above: float | None = None,
     max: float | None = None,
     doc: str = "",
 ) -> Parameter[NDArray[np.float64]]:
     """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
-    parameter: Parameter[Any] = Parameter(float, None, unit=unit, min=min, max=max, shape=shape, doc=doc)
+    parameter: Parameter[Any] = Parameter(float, None, unit=unit, min=min, above=above, max=max, shape=shape, doc=doc)
     parameter.optional = default is None
     parameter.default = default
     return parameter
@@ -400,6 +409,13 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
 def _within(cls: type, name: str, error: ParameterError) -> ParameterError:
     """The error of a parameter of something that is itself a value."""
     return ParameterError(f"{cls.__name__}.{name}: {error}", (name, *error.keys), of_key=error.of_key)
+
+
+def bounds_text(least: float | None, above: float | None, most: float | None, written: Callable[[float], str]) -> str:
+    """The bounds of a number as they stand behind it: `` >= 0``, `` > 0 and <= 1``."""
+    ends = ((">=", least), (">", above), ("<=", most))
+    told = " and ".join(f"{sign} {written(end)}" for sign, end in ends if end is not None)
+    return f" {told}" if told else ""
 
 
 def _digits(number: float) -> str:

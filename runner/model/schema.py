@@ -413,10 +413,9 @@ def _scalar(parameter: Parameter[Any]) -> Schema:
         return dict(_FLAG)
     if parameter.type in (str, Path):
         return {"type": ["string"]}
-    if parameter.type is int:
-        return _number("integer", parameter.min, parameter.max, parameter.unit)
-    if parameter.type in (float, int | float):
-        return _number("number", parameter.min, parameter.max, parameter.unit)
+    if parameter.type in (int, float, int | float):
+        found = _number("integer" if parameter.type is int else "number", parameter.min, parameter.max, parameter.unit)
+        return found if parameter.above is None else {**found, "exclusiveMinimum": as_written(parameter.above)}
     return {"type": ["array", "boolean", "number", "object", "string"]}
 
 

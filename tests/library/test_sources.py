@@ -187,7 +187,7 @@ NAMES = "Bernoulli, Choice, Constant, Exponential, Gamma, LogNormal, Normal, Ran
         ("{type: Uniform, low: 2}", "low is 2 and high is 1: low may not be above high"),
         ("{type: RandomInteger, low: 2}", "low is 2 and high is 1: low may not be above high"),
         ("{type: Triangular, mode: 2}", "mode is 2 and high is 1: mode may not be above high"),
-        ("{type: Gamma, shape: 0}", "Gamma.shape: 0 is not above 0"),
+        ("{type: Gamma, shape: 0}", "Gamma.shape: 0 is out of bounds, expected a number > 0"),
         ("{type: Choice, values: []}", "Choice.values: the list is empty, there is nothing to choose from"),
         ("{type: Choice, values: [1, 2], weights: [1]}",
          "Choice.weights: [1.0] does not give a weight to each of 2 values"),
