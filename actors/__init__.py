@@ -17,22 +17,20 @@ from .distributions import (
     Triangular,
     Uniform,
 )
-from .flow import BooleanSwitch, Merge, Repeat, Router, Select, Switch
+from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
 from .functions import Expression, Function, LookupTable
 from .logic import Comparator, LogicGate
 from .queues import Queue, Server
-from .random_source import Random
 from .replay import Replay, ReplayError
+from .resources import Machine, Station
 from .robotics import *
-from .sampling import MostRecent, Sampler, Synchronizer
-from .shop import Machine, Station
 from .sinks import Display, Histogram, Recorder, Stop, Test
-from .sources import Clock, PoissonClock, SingleEvent
+from .sources import Clock, Const, CurrentMicrostep, CurrentTime, PoissonClock, Ramp, Random, Sequence, SingleEvent
 from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
-from .triggered import Const, CurrentMicrostep, CurrentTime, Ramp, Sequence
 
 __all__ = [
+    "ABSENT",
     "MAX_DEPTH",
     "NANOSECONDS_PER_SECOND",
     "ODE",
@@ -76,6 +74,7 @@ __all__ = [
     "Inform",
     "InputPort",
     "Integrator",
+    "Latest",
     "LogNormal",
     "LogicGate",
     "LookupTable",
@@ -93,6 +92,7 @@ __all__ = [
     "OutputPort",
     "Parameter",
     "ParameterError",
+    "Pending",
     "Plan",
     "PoissonClock",
     "PortError",
@@ -156,10 +156,12 @@ __all__ = [
     "open_regular",
     "parse_unit",
     "plain",
+    "present",
     "random_stream",
     "read_regular",
     "read_table",
     "readable",
+    "rounds",
     "shaped",
     "shortened",
     "texts_parameter",

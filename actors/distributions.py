@@ -22,7 +22,7 @@ class Distribution(Configurable):
 
 
 class Constant(Distribution):
-    """Always the same value."""
+    """Always the same value; the actor that sends one is ``Const``."""
 
     value = Parameter(float, doc="the value")
 

@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, ParameterError, PortParameter, to_nanoseconds, to_seconds
+from .core import (
+    Actor,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    Pending,
+    PortParameter,
+    to_nanoseconds,
+    to_seconds,
+)
 from .distributions import Distribution
-from .pending import Pending
 
 
 class Queue(Actor):

@@ -2,6 +2,7 @@
 
 from . import elementary
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
+from .authoring import ABSENT, Latest, Pending, present, rounds
 from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
 from .laws import normal_quantile, normal_share
@@ -31,6 +32,7 @@ from .visible import abridged, readable, shortened, visible, visible_character, 
 from .words import counted
 
 __all__ = [
+    "ABSENT",
     "MAX_DEPTH",
     "NANOSECONDS_PER_SECOND",
     "REQUIRED",
@@ -40,10 +42,12 @@ __all__ = [
     "Emit",
     "EpicycleError",
     "InputPort",
+    "Latest",
     "MappingParameter",
     "OutputPort",
     "Parameter",
     "ParameterError",
+    "Pending",
     "PortError",
     "PortParameter",
     "Process",
@@ -72,10 +76,12 @@ __all__ = [
     "open_regular",
     "parse_unit",
     "plain",
+    "present",
     "random_stream",
     "read_regular",
     "read_table",
     "readable",
+    "rounds",
     "shaped",
     "shortened",
     "texts_parameter",

@@ -64,6 +64,7 @@ class Parameter(Generic[T]):
     units; the ``unit`` of a ``Configurable`` class is that of the parameters in it that have none of their own.
     ``shape`` makes it an array of floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and
     ``object``, ``(None,)`` a tuple.  ``int | float`` is a number that stays an integer if it is one.
+    A text is one of ``choices``; ``renamed`` tells the present names of former ones.
     Numbers are ``min`` or more, or else greater than ``above``, and ``max`` or less.
     A parameter that takes values of several kinds names one parameter for each kind as its ``forms``.
     """
@@ -80,6 +81,7 @@ class Parameter(Generic[T]):
         above: float | None = None,
         max: float | None = None,
         choices: Sequence[str] = (),
+        renamed: Mapping[str, str] = types.MappingProxyType({}),
         shape: tuple[int | None, ...] | None = None,
         optional: bool = False,
         doc: str = "",
@@ -91,6 +93,7 @@ class Parameter(Generic[T]):
         self.above = above
         self.max = max
         self.choices = tuple(choices)
+        self.renamed = renamed
         self.shape = shape
         self.optional = optional or default is None
         self.doc = doc
@@ -190,6 +193,8 @@ class Parameter(Generic[T]):
                 return bool(value)
         elif self.type is str:
             if isinstance(value, str):
+                if value in self.renamed:
+                    raise ParameterError(f"{value!r} is called {self.renamed[value]!r} now")
                 if self.choices and value not in self.choices:
                     raise ParameterError(f"{value!r} is not {self._expected()}{did_you_mean(value, self.choices)}")
                 return value

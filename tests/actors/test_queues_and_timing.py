@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from epicycle.runner.engine import ActorError
-from tests.library.library_parts import Feeds, behave, problem, tokens
+from tests.actors.library_parts import Feeds, behave, problem, tokens
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from scipy import stats
 
 from epicycle.actors import Actor
 from epicycle.runner.engine import ActorError
+from tests.actors.feeding import Feed
+from tests.actors.library_parts import Feeds, behave, problem, text, tokens
 from tests.engine.engine_parts import load
-from tests.library.feeding import Feed
-from tests.library.library_parts import Feeds, behave, problem, text, tokens
 
 THREE: list[list[Any]] = [[0, "a"], [1, "b"], [1, "c"]]
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from epicycle.runner.engine import ActorError
-from tests.library.library_parts import Feeds, behave, tokens
+from tests.actors.library_parts import Feeds, behave, tokens
 
 
 @pytest.mark.parametrize(

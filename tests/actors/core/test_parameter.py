@@ -68,7 +68,7 @@ def test_values(parameter: Parameter[Any], given: object, value: object) -> None
         (Parameter(float, above=0, max=9), -1, "-1 is out of bounds, expected a number > 0 and <= 9"),
         (
             Parameter(float, above=0, unit="s"),
-            "0.9 ns",
+            9e-10,
             "9e-10 s is shorter than a nanosecond, which is the shortest time",
         ),
         (array_parameter((None,), above=0), [1.0, 0.0], "0 is out of bounds, expected a list of n numbers > 0"),
@@ -78,6 +78,7 @@ def test_values(parameter: Parameter[Any], given: object, value: object) -> None
         (Parameter(bool), 1, "1 is not true or false"),
         (Parameter(str), 1, "1 is not a text"),
         (Parameter(str, choices=("slow", "fast")), "fats", "'fats' is not one of slow, fast, did you mean 'fast'?"),
+        (Parameter(str, choices=("fast",), renamed={"quick": "fast"}), "quick", "'quick' is called 'fast' now"),
         (Parameter(Path), "", "'' is not a file"),
         (Parameter(Path), "a\0b", "'a\\x00b' is not a file"),
         (MappingParameter(Parameter(float)), None, "None is not a mapping of names to number"),
