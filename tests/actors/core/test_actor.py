@@ -18,7 +18,7 @@ from epicycle.actors import (
     PortParameter,
     declared_ports,
 )
-from tests.actors.harness import Harness
+from epicycle.actors.testing import Harness
 
 
 class Gauge(Actor):
