@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .core import Configurable, Parameter, ParameterError, Stream, array_parameter, counted, token_type
-from .core.laws import cumulated, weighted
+from .core.choices import cumulated, weighted
 
 
 class Distribution(Configurable):
