@@ -7,7 +7,20 @@ from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
 from .laws import normal_quantile, normal_share
 from .mapping import MappingParameter
-from .nearest import did_you_mean, nearest
+from .messages import (
+    abridged,
+    brief,
+    counted,
+    cut,
+    did_you_mean,
+    digits,
+    nearest,
+    readable,
+    shortened,
+    visible,
+    visible_character,
+    visible_lines,
+)
 from .parameter import (
     REQUIRED,
     Configurable,
@@ -28,8 +41,6 @@ from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
-from .visible import abridged, readable, shortened, visible, visible_character, visible_lines
-from .words import counted
 
 __all__ = [
     "ABSENT",
@@ -60,12 +71,15 @@ __all__ = [
     "accepts",
     "array_parameter",
     "bounds_text",
+    "brief",
     "convert",
     "counted",
     "counted_in_si",
+    "cut",
     "declared_parameters",
     "declared_ports",
     "did_you_mean",
+    "digits",
     "elementary",
     "has_own_ports",
     "irregular",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import EpicycleError
-from .nearest import did_you_mean
+from .messages import brief, did_you_mean, digits
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
 
@@ -177,8 +177,8 @@ class Parameter(Generic[T]):
         if self.unit and self.unit != "1":
             text += f" in {self.unit}"
         if self.min is not None and self.max is not None:
-            return f"{text} from {_digits(self.min)} to {_digits(self.max)}"
-        return text + bounds_text(self.min, self.above, self.max, _digits)
+            return f"{text} from {digits(self.min)} to {digits(self.max)}"
+        return text + bounds_text(self.min, self.above, self.max, digits)
 
     def _scalar(self, value: object) -> object:
         if self.type is object:
@@ -200,7 +200,7 @@ class Parameter(Generic[T]):
                 return value
         elif isinstance(value, (int, float, np.integer, np.floating, str)) and not isinstance(value, bool):
             return self._bounded(self._number(value))
-        raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+        raise ParameterError(f"{brief(value)} is not {self._expected()}")
 
     def _number(self, value: Any) -> float | int:
         unit = self.unit or ("1" if self.type is int and isinstance(value, Quantity) else "")
@@ -208,7 +208,7 @@ class Parameter(Generic[T]):
             if isinstance(value, str):
                 found = self._read(value)
                 if found is None:
-                    raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+                    raise ParameterError(f"{brief(value)} is not {self._expected()}")
                 value = found
             elif isinstance(value, Quantity):
                 value = value.to(unit) if unit else value.si
@@ -217,11 +217,11 @@ class Parameter(Generic[T]):
         try:
             number = float(value)
         except OverflowError:
-            raise ParameterError(f"{_shown(value)} is too large, expected {self._expected()}") from None
+            raise ParameterError(f"{brief(value)} is too large, expected {self._expected()}") from None
         if self.type is float or (self.type is not int and not isinstance(value, (int, np.integer))):
             return number
         if not number.is_integer():  # nor are nan and the infinities
-            raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+            raise ParameterError(f"{brief(value)} is not {self._expected()}")
         return int(value)
 
     def _read(self, text: str) -> float | None:
@@ -236,9 +236,9 @@ class Parameter(Generic[T]):
         if math.isnan(value):
             raise ParameterError(f"nan is not {self._expected()}")
         if not self._holds(value, value):
-            raise ParameterError(f"{_digits(value)} is out of bounds, expected {self._expected()}")
+            raise ParameterError(f"{digits(value)} is out of bounds, expected {self._expected()}")
         if self.above == 0 and self.unit == "s" and value < 1e-9:
-            raise ParameterError(f"{_digits(value)} s is shorter than a nanosecond, which is the shortest time")
+            raise ParameterError(f"{digits(value)} s is shorter than a nanosecond, which is the shortest time")
         return value
 
     def _holds(self, low: float, high: float) -> bool:
@@ -273,7 +273,7 @@ class Parameter(Generic[T]):
             return self._scalar(value)
         wrong = not isinstance(value, (list, tuple, np.ndarray))
         if wrong or (shape[0] is not None and len(value) != shape[0]):  # type: ignore[arg-type]
-            raise ParameterError(f"{_shown(whole)} is not {self._expected()}")
+            raise ParameterError(f"{brief(whole)} is not {self._expected()}")
         return [self._rows(item, shape[1:], whole) for item in value]  # type: ignore[attr-defined]
 
 
@@ -395,12 +395,12 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
     known = variants(base)
     valid = ", ".join(sorted(known))
     if not isinstance(value, Mapping):
-        raise ParameterError(f"{_shown(value)} is not a mapping like {{type: ...}}, with one of {valid}")
+        raise ParameterError(f"{brief(value)} is not a mapping like {{type: ...}}, with one of {valid}")
     if "type" not in value:
-        raise ParameterError(f"{_shown(value)} has no 'type', which is one of {valid}")
+        raise ParameterError(f"{brief(value)} has no 'type', which is one of {valid}")
     name = value["type"]
     if not isinstance(name, str) or name not in known:
-        raise ParameterError(f"{_shown(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
+        raise ParameterError(f"{brief(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
     values = {key: item for key, item in value.items() if key != "type"}
     declared = declared_parameters(known[name])
     for key in [key for key in values if unit and key in declared]:
@@ -421,16 +421,3 @@ def bounds_text(least: float | None, above: float | None, most: float | None, wr
     ends = ((">=", least), (">", above), ("<=", most))
     told = " and ".join(f"{sign} {written(end)}" for sign, end in ends if end is not None)
     return f" {told}" if told else ""
-
-
-def _digits(number: float) -> str:
-    """A number as people write it: whole ones without an exponent, unless they get too long to be read."""
-    in_full = float(number).is_integer() and abs(number) < (10**20 if type(number) is int else 1e15)
-    return str(int(number)) if in_full else f"{float(number):g}"
-
-
-def _shown(value: object) -> str:
-    if value is None or isinstance(value, bool):
-        return {None: "null", True: "true", False: "false"}[value]
-    text = repr(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

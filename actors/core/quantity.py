@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -177,21 +178,19 @@ def is_too_deep(value: object) -> bool:
 
 def plain(value: object) -> object:
     """The value with every ``Quantity`` in it, at any depth, as a plain float."""
-    if isinstance(value, Quantity):
-        return float(value)
-    if isinstance(value, list):
-        return [plain(item) for item in value]
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    return value
+    return _each_quantity(float, value)
 
 
 def counted_in_si(value: object) -> object:
     """The value with every ``Quantity`` in it, at any depth, as a plain float in SI units."""
+    return _each_quantity(lambda quantity: quantity.si, value)
+
+
+def _each_quantity(change: Callable[[Quantity], float], value: object) -> object:
     if isinstance(value, Quantity):
-        return value.si
+        return change(value)
     if isinstance(value, list):
-        return [counted_in_si(item) for item in value]
+        return [_each_quantity(change, item) for item in value]
     if isinstance(value, dict):
-        return {key: counted_in_si(item) for key, item in value.items()}
+        return {key: _each_quantity(change, item) for key, item in value.items()}
     return value

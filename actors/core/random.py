@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import choices, laws
-from .nearest import did_you_mean
+from .messages import did_you_mean
 
 Size = int | Sequence[int] | None
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import lru_cache
 from typing import ParamSpec, TypeVar
 
-from ..core import Quantity, UnitError, did_you_mean
+from ..core import Quantity, UnitError, cut, did_you_mean
 from .syntax import ExpressionError, free_names, parse, targets
 from .values import (
     BINARY,
@@ -204,8 +204,7 @@ class _Evaluation:
         raise self._error(node, message)
 
     def _text(self, node: ast.expr) -> str:
-        text = self._source[node.col_offset : node.end_col_offset]
-        return text if len(text) <= 60 else text[:57] + "..."
+        return cut(self._source[node.col_offset : node.end_col_offset])
 
     def value(self, node: ast.expr) -> object:
         """Return the value of a node."""

@@ -18,7 +18,7 @@ from epicycle.actors import (
     did_you_mean,
     texts_parameter,
 )
-from epicycle.actors.core.nearest import nearest
+from epicycle.actors.core.messages import nearest
 
 LARGE = 2**53
 

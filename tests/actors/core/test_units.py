@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from epicycle.actors.core.errors import EpicycleError
 from epicycle.actors.core.units import Unit, UnitError, convert, parse_unit, quantity
-from epicycle.actors.core.words import counted
+from epicycle.actors.core.messages import counted
 
 
 @pytest.mark.parametrize(
