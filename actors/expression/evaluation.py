@@ -215,9 +215,9 @@ class _Evaluation:
             case ast.Name():
                 return self._lookup(node)
             case ast.List() | ast.Tuple():
-                return self._made(node, [self.value(item) for item in node.elts])
+                return self._weighed(node, [self.value(item) for item in node.elts])
             case ast.Dict():
-                return self._made(node, self._dict(node))
+                return self._weighed(node, self._dict(node))
             case ast.UnaryOp(op=ast.Not()):
                 return not self.value(node.operand)
             case ast.UnaryOp():
@@ -225,7 +225,7 @@ class _Evaluation:
                 return self.guard(node, UNARY[type(node.op)], operand)
             case ast.BinOp():
                 left, right = self.value(node.left), self.value(node.right)
-                return self._made(node, self.guard(node, BINARY[type(node.op)], left, right))
+                return self._weighed(node, self.guard(node, BINARY[type(node.op)], left, right))
             case ast.BoolOp():
                 return self._bool(node)
             case ast.Compare():
@@ -235,24 +235,21 @@ class _Evaluation:
             case ast.Subscript():
                 return self._subscript(node)
             case ast.Call(func=ast.Name(id=name)):
-                arguments = [self._used(item, self.value(item), name) for item in node.args]
-                return self._made(node, self.guard(node, FUNCTIONS[name], *arguments))
+                arguments = [self.value(item) for item in node.args]
+                if name != "len":  # which is known without looking
+                    for item, argument in zip(node.args, arguments, strict=True):
+                        self._weighed(item, argument)
+                return self._weighed(node, self.guard(node, FUNCTIONS[name], *arguments))
             case ast.ListComp():
                 items: list[object] = []
                 self._comprehend(node, 0, items)
-                return self._made(node, items)
+                return self._weighed(node, items)
             case _:
                 raise AssertionError(f"{type(node).__name__} passed the check")
 
-    def _made(self, node: ast.expr, value: T) -> T:
-        """Pay for a new list, dict or text, and see that it is not too large."""
+    def _weighed(self, node: ast.expr, value: T) -> T:
+        """Pay for a value by its size, when it is made or looked through, and see that it is not too large."""
         self.guard(node, self._budget.weigh, value)
-        return value
-
-    def _used(self, node: ast.expr, value: object, function: str = "") -> object:
-        """Pay for looking through all of a value; a length is known without looking."""
-        if function != "len":
-            self.guard(node, self._budget.weigh, value)
         return value
 
     def _lookup(self, node: ast.Name) -> object:
@@ -264,7 +261,7 @@ class _Evaluation:
             if name in CONSTANTS:
                 raise self._error(node, f"'{name}' is a constant and cannot be the name of something else: rename it")
             value = self._names[name]
-            return self._made(node, list(value)) if isinstance(value, tuple) else value
+            return self._weighed(node, list(value)) if isinstance(value, tuple) else value
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name in FUNCTIONS:
@@ -294,9 +291,9 @@ class _Evaluation:
         return result
 
     def _compare(self, node: ast.Compare) -> bool:
-        left = self._used(node.left, self.value(node.left))
+        left = self._weighed(node.left, self.value(node.left))
         for sign, right_node in zip(node.ops, node.comparators, strict=True):
-            right = self._used(right_node, self.value(right_node))
+            right = self._weighed(right_node, self.value(right_node))
             if not self.guard(node, COMPARE[type(sign)], left, right):
                 return False
             left = right
@@ -315,7 +312,7 @@ class _Evaluation:
         if not isinstance(whole, (list, tuple, str)):
             raise self._error(node, f"only a list or a text can be sliced, not {kind_of(whole)}")
         cut = self.guard(node, operator.getitem, whole, slice(*parts))
-        return self._made(node, list(cut) if isinstance(cut, tuple) else cut)
+        return self._weighed(node, list(cut) if isinstance(cut, tuple) else cut)
 
     def _comprehend(self, node: ast.ListComp, level: int, items: list[object]) -> None:
         if level == len(node.generators):
