@@ -158,6 +158,7 @@ __all__ = [
     "normal_share",
     "open_regular",
     "parse_unit",
+    "paths",
     "plain",
     "present",
     "random_stream",

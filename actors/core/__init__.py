@@ -1,6 +1,6 @@
 """What every actor is made of: ports, parameters, time, random streams, and the firing contract."""
 
-from . import elementary
+from . import elementary, paths
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
 from .authoring import ABSENT, Latest, Pending, present, rounds
 from .errors import EpicycleError
@@ -89,6 +89,7 @@ __all__ = [
     "normal_share",
     "open_regular",
     "parse_unit",
+    "paths",
     "plain",
     "present",
     "random_stream",
