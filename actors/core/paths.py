@@ -1,4 +1,4 @@
-"""Dotted paths such as ``robot[1].sensor.output``: plain texts, with what is asked of them; empty is the whole model."""
+"""Dotted paths such as ``robot[1].sensor.output``: texts, and what is asked of them; empty is the whole model."""
 
 from __future__ import annotations
 
