@@ -1,4 +1,4 @@
-"""What can stand in a model graph: the actor contract, sources, and the robots of the example."""
+"""What can stand in a model graph: the actor contract, the library of actors, and the robots of the example."""
 
 from .accumulation import Accumulator, Counter, Difference, Integrator
 from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Configurable, Parameter, ParameterError, Stream, array_parameter, counted, token_type
+from .core import Configurable, EpicycleError, Parameter, ParameterError, Stream, array_parameter, counted, token_type
 from .core.choices import cumulated, weighted
 
 
@@ -19,6 +19,13 @@ class Distribution(Configurable):
     def draw(self, random: Stream) -> Any:
         """A value, from the stream given."""
         raise NotImplementedError(f"{type(self).__name__} has no draw()")
+
+    def draw_time(self, random: Stream, what: str = "a time") -> float:
+        """A value that is how long something takes, in s; raises ``EpicycleError`` if it cannot be that."""
+        time = self.draw(random)
+        if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
+            raise EpicycleError(f"{time!r} drawn from {self!r} is not {what} in s, a number >= 0")
+        return float(time)
 
 
 class Constant(Distribution):

@@ -123,7 +123,4 @@ class Server(Actor):
     def _draw(self) -> float:
         if self.distribution is None:
             return self.service_time
-        time = self.distribution.draw(self.random)
-        if not isinstance(time, (int, float)) or not time >= 0:
-            raise ValueError(f"{time!r} drawn from {self.distribution!r} is not a service time in s, a number >= 0")
-        return float(time)
+        return self.distribution.draw_time(self.random, "a service time")

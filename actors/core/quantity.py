@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -11,6 +12,10 @@ from .elementary import power as power_of
 from .units import UnitError, between, is_compound, parse_unit
 
 MAX_DEPTH = 100  # of lists and mappings in each other, in files and in what expressions make of them
+
+
+def _compared(compare: Callable[[float, float], bool]) -> Callable[[Quantity, float], bool]:
+    return lambda quantity, other: compare(float(quantity), quantity._beside(other))
 
 
 class Quantity(float):
@@ -111,17 +116,10 @@ class Quantity(float):
     def __abs__(self) -> Quantity:
         return Quantity(abs(float(self)), self.unit)
 
-    def __lt__(self, other: float) -> bool:
-        return float(self) < self._beside(other)
-
-    def __le__(self, other: float) -> bool:
-        return float(self) <= self._beside(other)
-
-    def __gt__(self, other: float) -> bool:
-        return float(self) > self._beside(other)
-
-    def __ge__(self, other: float) -> bool:
-        return float(self) >= self._beside(other)
+    __lt__ = _compared(operator.lt)
+    __le__ = _compared(operator.le)
+    __gt__ = _compared(operator.gt)
+    __ge__ = _compared(operator.ge)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, (int, float)) and float(self) == self._beside(other)

@@ -72,26 +72,17 @@ def interpolate(text: str, names: Mapping[str, object], budget: Budget | None = 
 @lru_cache(maxsize=4096)  # a model asks for the same few texts once per copy of an actor
 def names_in(text: str) -> frozenset[str]:
     """Return the names that the `${...}` of a text ask for; constants and functions are left out."""
-    found: set[str] = set()
-    for offset, source in _pieces(text):
-        if offset is not None:
-            with _shifted(offset):
-                found |= free_names(parse(source), frozenset())
-    return frozenset(found - CONSTANTS.keys())
+    return frozenset().union(*(free_names(tree, frozenset()) for _, tree in _trees(text))) - CONSTANTS.keys()
 
 
 def check_names(text: str, known: Collection[str]) -> None:
     """Raise ``ExpressionError`` if the `${...}` of a text ask for a name that is not known."""
-    for offset, source in _pieces(text):
-        if offset is None:
-            continue
-        with _shifted(offset):
-            tree = parse(source)
-            strange = free_names(tree, frozenset()) - set(known) - CONSTANTS.keys() - FUNCTIONS.keys()
-            for node in ast.walk(tree):
-                if isinstance(node, ast.Name) and node.id in strange:
-                    length = (node.end_col_offset or 0) - node.col_offset
-                    raise ExpressionError(_unknown(node.id, known), node.col_offset, length)
+    for offset, tree in _trees(text):
+        strange = free_names(tree, frozenset()) - set(known) - CONSTANTS.keys() - FUNCTIONS.keys()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and node.id in strange:
+                length = (node.end_col_offset or 0) - node.col_offset
+                raise ExpressionError(_unknown(node.id, known), offset + node.col_offset, length)
 
 
 def _unknown(name: str, names: Collection[str]) -> str:
@@ -135,6 +126,14 @@ def _pieces(text: str) -> tuple[tuple[int | None, str], ...]:
     if literal:
         pieces.append((None, literal))
     return tuple(pieces)
+
+
+def _trees(text: str) -> Iterator[tuple[int, ast.expr]]:
+    """The expressions in a text, each with the offset at which it starts."""
+    for offset, source in _pieces(text):
+        if offset is not None:
+            with _shifted(offset):
+                yield offset, parse(source)
 
 
 def _end_of_expression(text: str, start: int) -> int | None:
