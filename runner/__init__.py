@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .engine import ActorError, Results, Signal, Simulation
-    from .model import Composite, Model, ModelError, load_composite, load_model
+    from .model import Composite, Model, load_composite, load_model
     from .study import StudyResults, open_study
+    from .text import ModelError
     from .trial import Trial
 
 __all__ = [

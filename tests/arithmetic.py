@@ -55,11 +55,11 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "runner/engine/statistic.py": (("sum",), WHOLE),
     "runner/engine/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/model/checks.py": (("sum",), WHOLE),
-    "runner/model/problems.py": (("sum",), WHOLE),
+    "runner/text/problems.py": (("sum",), WHOLE),
     "runner/columns.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
-    "runner/study/claims.py": (("sum",), WHOLE),
-    "runner/study/cluster.py": (("sum",), WHOLE),
+    "runner/study/judge/claims.py": (("sum",), WHOLE),
+    "runner/study/run/cluster.py": (("sum",), WHOLE),
 }
 
 

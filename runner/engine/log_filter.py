@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..model import Model, PatternError, did_you_mean, select
+from ..model import Model
+from ..text import PatternError, did_you_mean, select
 from .log import LogError
 
 _SHOWN = 12  # names in a message

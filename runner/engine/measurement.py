@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula, operand
 
+from ..catalogue import MSER5, TIME, Measure
 from ..model import Metric
-from ..model.measure import MSER5, TIME, Measure
 from ..tables import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, Interval, TimeBatches, TokenBatches, batch_interval, mser
 from .statistic import statistic_of

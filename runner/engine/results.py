@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, to_seconds
 
-from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
+from ..text import did_you_mean
 from .batches import Interval
 from .encoding import cell, leaves
 from .log import EventLog

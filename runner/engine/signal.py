@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from epicycle.actors import EpicycleError, Tag, counted, to_seconds
 
-from ..model import did_you_mean
 from ..tables import Table, as_html, as_text, pandas_module, short
+from ..text import did_you_mean
 from .encoding import field_names, leaves
 
 if TYPE_CHECKING:

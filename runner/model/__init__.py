@@ -1,19 +1,29 @@
 """From YAML text to a checked model: document, declarations, elaboration, graph."""
 
+from ..catalogue import is_path, packaged_disturbances, packaged_models, packaged_studies
+from ..text import (
+    NORMAL,
+    RAISE_IT,
+    Limits,
+    ModelError,
+    PatternError,
+    Position,
+    Problem,
+    Problems,
+    did_you_mean,
+    select,
+    told_raised,
+)
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
 from .culprit import describe, raised_at
 from .ends import CompositePort, Instance
 from .graph import Hop, ModelGraph, Wire
-from .limits import NORMAL, RAISE_IT, Limits
 from .load import load_model
 from .model import Model
-from .observation import Metric
-from .packaged import is_path, packaged_disturbances, packaged_models, packaged_studies
-from .patterns import PatternError, select
-from .problems import ModelError, Position, Problem, Problems, did_you_mean, told_raised
 from .schedule import firing_order
 from .scope import Composite
+from .watch import Metric
 from .woven import WovenAspect, extent
 
 __all__ = [

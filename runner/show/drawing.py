@@ -8,9 +8,8 @@ from epicycle.actors import EpicycleError, ParameterError, declared_parameters, 
 
 from ..engine import Results
 from ..model import Model, Position, Problems, describe, did_you_mean, raised_at, told_raised
-from ..model.configuration import place_of
-from ..model.document import Mapping, Sequence, plain
-from ..model.patterns import PatternError, select
+from ..model.settle import place_of
+from ..text import Mapping, PatternError, Sequence, plain, select
 from .canvas import plain_text
 from .figures import Figure
 

@@ -16,8 +16,8 @@ from epicycle.actors import Configurable, Parameter, array_parameter, shortened,
 from epicycle.aspects import STAMP
 
 from ..engine import Results, Signal, cell, leaves
-from ..model.patterns import select
 from ..tables import short
+from ..text import select
 
 MAX_TEXT = 200  # characters of a label
 COLOURS = ("#0b3c8c", "#d1662a", "#2f8f4e", "#8b3fa0", "#b59b00", "#00838f", "#ad1457", "#5d4037")

@@ -12,10 +12,10 @@ from rich.text import Text
 
 from epicycle.actors import Configurable, bounds_text, variants
 
-from ..model import Model
-from ..model.catalogue import Catalogue
-from ..model.measure import TAKES, Measure
-from ..model.reference import (
+from ..catalogue import (
+    TAKES,
+    Catalogue,
+    Measure,
     ParameterReference,
     PortReference,
     TypeReference,
@@ -24,6 +24,7 @@ from ..model.reference import (
     parts_of,
     shown,
 )
+from ..model import Model
 from .figures import Figure
 
 

@@ -40,7 +40,7 @@ def tokens(sends: Sends, port: str = "output") -> list[Any]:
 
 def problem(actor: str, feeds: Feeds = []) -> str:  # noqa: B006
     """The message of what is wrong with the actor."""
-    from epicycle.runner.model import ModelError
+    from epicycle.runner.text import ModelError
 
     try:
         load(text(actor, feeds), types=[Feed])

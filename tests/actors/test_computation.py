@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from epicycle.actors import Function, ParameterError
 from epicycle.actors.expression import Formula
 from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.model import ModelError
+from epicycle.runner.text import ModelError
 from tests.actors.feeding import feed, load, model_of, tokens
 
 

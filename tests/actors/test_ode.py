@@ -13,7 +13,7 @@ import scipy.integrate
 from epicycle.actors.expression import Formula, evaluate
 from epicycle.actors.integration import STEPPERS
 from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.model import ModelError
+from epicycle.runner.text import ModelError
 from tests.actors.feeding import feed, load, model_of, tokens
 
 GRAVITY = 9.81

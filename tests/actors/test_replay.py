@@ -11,7 +11,8 @@ import pytest
 from pyarrow import parquet
 
 from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.model import ModelError, load_model
+from epicycle.runner.model import load_model
+from epicycle.runner.text import ModelError
 from tests.engine.engine_parts import sends
 
 

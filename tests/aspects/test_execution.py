@@ -520,7 +520,7 @@ def test_weaving_in_python() -> None:
         model.weave("loss", PacketLoss(probability=1), at=scale)  # type: ignore[arg-type]
     assert [problem.message for problem in caught.value.problems] == ["scale is an actor, not a port"]
     model.remove("scale")
-    assert woven.actors == {}
+    assert [each.actors for each in model.aspects] == [{}]
 
 
 def test_an_error_in_an_aspect_names_it() -> None:

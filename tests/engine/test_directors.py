@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process, Tag
 from epicycle.aspects import Aspect, JoinPoint
 from epicycle.runner.engine import ActorError
-from epicycle.runner.model import Clock, ModelError
+from epicycle.runner.model import Clock
+from epicycle.runner.text import ModelError
 from tests.engine.engine_parts import Plan, load, seen, sends, simulate
 
 

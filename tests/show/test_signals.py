@@ -17,10 +17,11 @@ import pytest
 
 from epicycle.actors import Actor, OutputPort, Tag
 from epicycle.runner import Simulation, load_model
+from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.engine import Results, Signal, plain
-from epicycle.runner.model import Problems, packaged_models
 from epicycle.runner.show import figures, figures_of
 from epicycle.runner.show.folder import write_signals
+from epicycle.runner.text import Problems
 
 
 class Light(Enum):

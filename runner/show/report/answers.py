@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from epicycle.actors import counted
 
-from ...study.claims import (
+from ...language import ALWAYS
+from ...study import (
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,
@@ -15,10 +16,9 @@ from ...study.claims import (
     UNDECIDED,
     Finding,
     Judgement,
+    Recommendation,
     ranked,
 )
-from ...study.guideline import Recommendation
-from ...study.questions import ALWAYS
 from .data import Data, Names, shown
 from .html import Content, Html, table, tag, with_class
 from .numbers import estimated, rounded

@@ -8,9 +8,8 @@ from typing import Any
 
 from epicycle.actors import abridged, visible
 
-from ...study import Plan, StudyResults
-from ...study.dimensions import Factor
-from ...study.schedule import OK
+from ...language import Factor
+from ...study import OK, Plan, StudyResults
 
 MAX_LISTED = 12  # levels in a message
 MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level

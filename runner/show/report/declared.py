@@ -7,11 +7,10 @@ from contextlib import suppress
 
 from epicycle.actors import ParameterError, UnitError, declared_parameters, did_you_mean, unknown_parameter, variants
 
-from ...model import Model, ModelError, Position, Problems
-from ...model.declarations import PartText
-from ...model.document import Mapping, Node, Sequence, plain
+from ...language import PartText, in_si, split_number
+from ...model import Model
 from ...study import Plan
-from ...study.dimensions import in_si, split_number
+from ...text import Mapping, ModelError, Node, Position, Problems, Sequence, plain
 from .figure import Complaint, SignalFigure, StudyFigure
 from .of_signals import Series, SingleRun, Tracks
 from .of_table import CURVES, Distributions, Means

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
 
 from ...engine import Results
+from ...language import Dimension, Factor
 from ...model import Model
 from ...study import Plan
-from ...study.dimensions import Dimension, Factor
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 from .style import MAX_LINES, MAX_PANELS
 

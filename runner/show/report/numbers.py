@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...study.statistics import Estimate
+from ...study import Estimate
 
 
 def estimated(estimate: Estimate) -> str:

@@ -24,10 +24,9 @@ from epicycle.actors import (
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
 from ...engine import Results
-from ...model import Model, Problems
-from ...model.patterns import select
-from ...study import Plan
-from ...study.statistics import half_width
+from ...model import Model
+from ...study import Plan, half_width
+from ...text import Problems, select
 from ..drawing import draw, figures_of
 from ..figures import Figure, positions
 from .data import Condition, Data

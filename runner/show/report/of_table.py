@@ -11,9 +11,8 @@ from typing import Any
 
 from epicycle.actors import Parameter, counted, texts_parameter
 
-from ...study import Plan
-from ...study.dimensions import Factor
-from ...study.statistics import mean
+from ...language import Factor
+from ...study import Plan, mean
 from .data import Condition, Data, Names, is_numeric
 from .figure import Complaint, Layout, Panel, Roles, RunKey, StudyFigure, layout, roles, unknown
 from .style import DASHES, LIMIT, MARKERS, PALETTE, Sheet

@@ -9,10 +9,8 @@ from typing import Any
 
 from epicycle.actors import counted
 
-from ...study.claims import Judgement
-from ...study.dimensions import Factor
-from ...study.guideline import Recommendation
-from ...study.statistics import mean
+from ...language import Factor
+from ...study import Judgement, Recommendation, mean
 from . import answers
 from .data import Condition, Data, shown
 from .html import Content, Html, page, table, tag, with_class

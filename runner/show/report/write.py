@@ -12,11 +12,9 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, abridged
 
-from ...model import ModelError, Problems, describe, raised_at
-from ...study import StudyResults, plan_of_folder
-from ...study.claims import ranked
-from ...study.replays import Replay, repeat
-from ...study.store import replace_file
+from ...model import describe, raised_at
+from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
+from ...text import ModelError, Problems
 from ..drawing import FigureError
 from ..folder import MAX_NAME
 from .data import Data

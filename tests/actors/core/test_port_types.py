@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors import Actor, InputPort, Measurement, OutputPort, Vehicle, accepts, shaped, type_name
-from epicycle.runner.model.catalogue import built_in
-from epicycle.runner.model.port_types import PortTypeError, read_type, token_types
+from epicycle.runner.catalogue import PortTypeError, built_in, read_type, token_types
 
 SIZES = (1, 2, 3)
 CONCRETE = [shape for length in (0, 1, 2) for shape in product(SIZES, repeat=length)]
