@@ -158,14 +158,16 @@ class Parameter(Generic[T]):
             if self.optional:
                 return None
             raise ParameterError(f"a value is missing, expected {self._expected()}")
+        result: Any
         if isinstance(self.type, type) and issubclass(self.type, Configurable):
-            return build_variant(self.type, value, self.unit)  # type: ignore[return-value]
-        if self.shape is not None and self.type in (str, object):
-            items = [value] if self.type is str and isinstance(value, str) else self._rows(value, self.shape, value)
-            return tuple(items)  # type: ignore[arg-type, return-value]
-        if self.shape is not None:
-            return self._array(value)  # type: ignore[return-value]
-        result: Any = self._scalar(value)
+            result = build_variant(self.type, value, self.unit)
+        elif self.shape is None:
+            result = self._scalar(value)
+        elif self.type in (str, object):
+            is_single = self.type is str and isinstance(value, str)
+            result = (value,) if is_single else tuple(self._rows(value, self.shape, value))
+        else:
+            result = self._array(value)
         return result  # type: ignore[no-any-return]
 
     def _expected(self) -> str:
@@ -268,13 +270,12 @@ class Parameter(Generic[T]):
             return False
         return self._holds(min(value), max(value))
 
-    def _rows(self, value: object, shape: tuple[int | None, ...], whole: object) -> object:
+    def _rows(self, value: Any, shape: tuple[int | None, ...], whole: object) -> Any:
         if not shape:
             return self._scalar(value)
-        wrong = not isinstance(value, (list, tuple, np.ndarray))
-        if wrong or (shape[0] is not None and len(value) != shape[0]):  # type: ignore[arg-type]
+        if not isinstance(value, (list, tuple, np.ndarray)) or shape[0] not in (None, len(value)):
             raise ParameterError(f"{brief(whole)} is not {self._expected()}")
-        return [self._rows(item, shape[1:], whole) for item in value]  # type: ignore[attr-defined]
+        return [self._rows(item, shape[1:], whole) for item in value]
 
 
 def array_parameter(

@@ -4,7 +4,6 @@ Factors are exact fractions (of pi, for degrees) and become a float once, at the
 0.1 s to the last bit.
 """
 
-import difflib
 import functools
 import math
 import re
@@ -13,7 +12,7 @@ from fractions import Fraction
 from typing import Final
 
 from .errors import EpicycleError
-from .messages import brief
+from .messages import brief, nearest
 
 MAX_TEXT = 100
 _MAX_EXPONENT = 20
@@ -255,11 +254,7 @@ class _Reader:
 
 
 def _did_you_mean(name: str) -> str:
-    meant = _MEANT.get(name.casefold())
-    if meant is None:
-        by_folded = {unit.casefold(): unit for unit in reversed(_SUGGESTED)}  # of m and M, the first one
-        found = difflib.get_close_matches(name.casefold(), by_folded, n=1)
-        meant = by_folded[found[0]] if found else None
+    meant = _MEANT.get(name.casefold()) or nearest(name, _SUGGESTED)
     return "" if meant is None else f", did you mean '{meant}'?"
 
 
