@@ -1,6 +1,6 @@
 """What the laws of random numbers are computed from, exactly; and that none of their numbers ever changes.
 
-``python -m tests.core.test_laws`` prints the digests of the numbers that are drawn now.
+``python -m tests.actors.core.test_laws`` prints the digests of the numbers that are drawn now.
 """
 
 from __future__ import annotations

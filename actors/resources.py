@@ -8,7 +8,7 @@ from typing import Any
 import simpy
 from simpy.events import Event
 
-from .core import EpicycleError, InputPort, OutputPort, Parameter, Process
+from .core import InputPort, OutputPort, Parameter, Process
 from .distributions import Distribution
 
 
@@ -41,7 +41,7 @@ class Station(Process):
         with self.resource.request(priority=priority) as request:
             yield request
             self.begun.send(token)
-            yield self.wait(_duration(self, self.service_time))
+            yield self.wait(self.service_time.draw_time(self.random))
         self.output.send(token)
 
 
@@ -65,7 +65,7 @@ class Machine(Process):
         self.environment.process(self._break())
         parts = 0
         while True:
-            left = _duration(self, self.work_time)
+            left = self.work_time.draw_time(self.random)
             is_made = False
             while not is_made:
                 begin = self.now
@@ -80,7 +80,7 @@ class Machine(Process):
 
     def _break(self) -> Generator[Event, Any, None]:
         while True:
-            yield self.wait(_duration(self, self.time_to_failure))
+            yield self.wait(self.time_to_failure.draw_time(self.random))
             if self._runs:  # what is broken does not break
                 self.process.interrupt()
 
@@ -90,10 +90,3 @@ class Machine(Process):
         while (yield self.read(self.repaired)) != self.number:
             pass
         self._runs = True
-
-
-def _duration(actor: Process, distribution: Distribution) -> float:
-    time = distribution.draw(actor.random)
-    if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
-        raise EpicycleError(f"{time!r} drawn from {distribution!r} is not a time in s, a number >= 0")
-    return float(time)

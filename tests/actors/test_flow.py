@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from epicycle.runner.engine import ActorError
-from tests.library.library_parts import Feeds, behave, tokens
+from tests.actors.library_parts import Feeds, behave, problem, tokens
 
 
 @pytest.mark.parametrize(
@@ -76,3 +76,8 @@ def test_wrong_channels(actor: str, feeds: Feeds, message: str) -> None:
     with pytest.raises(ActorError) as caught:
         behave(f"{{type: {actor}}}", feeds, outputs=2)
     assert caught.value.reason == message
+
+
+def test_a_policy_by_its_former_name() -> None:
+    actor = "{type: Router, policy: in turn}"
+    assert problem(actor, [("input", [])]) == "it.policy: 'in turn' is called 'round robin' now"

@@ -14,7 +14,7 @@ from epicycle.actors.expression import Formula, evaluate
 from epicycle.actors.integration import STEPPERS
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.text import ModelError
-from tests.library.feeding import feed, load, model_of, tokens
+from tests.actors.feeding import feed, load, model_of, tokens
 
 GRAVITY = 9.81
 BALL: dict[str, Any] = {

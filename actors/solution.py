@@ -1,4 +1,4 @@
-"""Segment: the solution of an ODE from one discontinuity on, and where guard functions cross zero along it.
+"""Solution: the solution of an ODE from one discontinuity on, and where guard functions cross zero along it.
 
 The steps, and with them every digit, do not depend on when somebody looks at the solution.  Between the points at
 which a function is evaluated, anything may hide; where nobody has said how long a step may be, interval arithmetic
@@ -59,7 +59,7 @@ class Equations:
     bounds: Callable[[float, float, Sequence[Bounds]], list[Bounds]]
 
 
-class Segment:
+class Solution:
     """A solution that starts at time 0 and is extended as far as it is asked for, or searched to the first crossing.
 
     Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.

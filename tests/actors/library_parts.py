@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from tests.actors.feeding import Feed
 from tests.engine.engine_parts import load, simulate
-from tests.library.feeding import Feed
 
 Sends = list[tuple[float, int, str, Any]]
 Feeds = list[tuple[str, list[list[Any]]]]

@@ -10,9 +10,9 @@ from scipy import stats
 
 from epicycle.actors import Actor
 from epicycle.runner.engine import ActorError
+from tests.actors.feeding import Feed
+from tests.actors.library_parts import Feeds, behave, problem, text, tokens
 from tests.engine.engine_parts import load
-from tests.library.feeding import Feed
-from tests.library.library_parts import Feeds, behave, problem, text, tokens
 
 THREE: list[list[Any]] = [[0, "a"], [1, "b"], [1, "c"]]
 
@@ -187,7 +187,7 @@ NAMES = "Bernoulli, Choice, Constant, Exponential, Gamma, LogNormal, Normal, Ran
         ("{type: Uniform, low: 2}", "low is 2 and high is 1: low may not be above high"),
         ("{type: RandomInteger, low: 2}", "low is 2 and high is 1: low may not be above high"),
         ("{type: Triangular, mode: 2}", "mode is 2 and high is 1: mode may not be above high"),
-        ("{type: Gamma, shape: 0}", "Gamma.shape: 0 is not above 0"),
+        ("{type: Gamma, shape: 0}", "Gamma.shape: 0 is out of bounds, expected a number > 0"),
         ("{type: Choice, values: []}", "Choice.values: the list is empty, there is nothing to choose from"),
         ("{type: Choice, values: [1, 2], weights: [1]}",
          "Choice.weights: [1.0] does not give a weight to each of 2 values"),

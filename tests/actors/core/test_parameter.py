@@ -18,7 +18,7 @@ from epicycle.actors import (
     did_you_mean,
     texts_parameter,
 )
-from epicycle.actors.core.nearest import nearest
+from epicycle.actors.core.messages import nearest
 
 LARGE = 2**53
 
@@ -64,12 +64,21 @@ def test_values(parameter: Parameter[Any], given: object, value: object) -> None
         (Parameter(float, min=0.0), -1e-9, "-1e-09 is out of bounds, expected a number >= 0"),
         (Parameter(float, max=2.0, unit="s"), "2001 ms", "2.001 is out of bounds, expected a number in s <= 2"),
         (Parameter(float, min=-1.0, max=1.0), 1.5, "1.5 is out of bounds, expected a number from -1 to 1"),
+        (Parameter(float, above=0), 0, "0 is out of bounds, expected a number > 0"),
+        (Parameter(float, above=0, max=9), -1, "-1 is out of bounds, expected a number > 0 and <= 9"),
+        (
+            Parameter(float, above=0, unit="s"),
+            9e-10,
+            "9e-10 s is shorter than a nanosecond, which is the shortest time",
+        ),
+        (array_parameter((None,), above=0), [1.0, 0.0], "0 is out of bounds, expected a list of n numbers > 0"),
         (Parameter(int), 2.5, "2.5 is not an integer"),
         (Parameter(int), float("inf"), "inf is not an integer"),
         (Parameter(int), "3 m", "'3 m' is not an integer"),
         (Parameter(bool), 1, "1 is not true or false"),
         (Parameter(str), 1, "1 is not a text"),
         (Parameter(str, choices=("slow", "fast")), "fats", "'fats' is not one of slow, fast, did you mean 'fast'?"),
+        (Parameter(str, choices=("fast",), renamed={"quick": "fast"}), "quick", "'quick' is called 'fast' now"),
         (Parameter(Path), "", "'' is not a file"),
         (Parameter(Path), "a\0b", "'a\\x00b' is not a file"),
         (MappingParameter(Parameter(float)), None, "None is not a mapping of names to number"),

@@ -20,7 +20,7 @@ from epicycle.actors import Function, ParameterError
 from epicycle.actors.expression import Formula
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.text import ModelError
-from tests.library.feeding import feed, load, model_of, tokens
+from tests.actors.feeding import feed, load, model_of, tokens
 
 
 def seconds(*values: Any) -> list[tuple[float, Any]]:

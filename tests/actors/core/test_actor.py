@@ -7,8 +7,18 @@ from typing import Any
 
 import pytest
 
-from epicycle.actors import Actor, Clock, InputPort, OutputPort, PortError, PortParameter
-from tests.actors.harness import Harness
+from epicycle.actors import (
+    Actor,
+    Clock,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    PortError,
+    PortParameter,
+    declared_ports,
+)
+from epicycle.actors.testing import Harness
 
 
 class Gauge(Actor):
@@ -127,3 +137,45 @@ def test_own_ports_beside_those_of_the_class(monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(PortError) as caught:
         Twice("a")
     assert str(caught.value) == "there would be two ports called 'put'"
+
+
+class Band(Actor):
+    """Says whether a token lies between two levels."""
+
+    input = InputPort()
+    output = OutputPort()
+    low = Parameter(float, 0.0)
+    high = Parameter(float, 1.0)
+
+    def check(self) -> None:
+        if self.low > self.high:
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+        self.output.type = bool
+
+
+def test_check_sees_parameters_and_ports_of_an_instance() -> None:
+    band = Band("band", low=0.5)
+    assert (band.input.type, band.output.type, Band("b").outputs["output"].type) == (Any, bool, bool)
+    assert declared_ports(Band)["output"].type is Any  # of the class, as it was
+    with pytest.raises(ParameterError) as caught:
+        Band("band", low=2.0)
+    assert str(caught.value) == "low is 2 and high is 1: low may not be above high"
+
+
+def test_what_has_no_input_beside_parameters_is_a_source() -> None:
+    class Source(Actor):
+        output = OutputPort(float)
+        rate = PortParameter(float, 1.0)
+
+    class Filter(Source):
+        input = InputPort(float, required=False)
+
+    class Oscillator(Filter):
+        is_source = True
+
+    kinds = (Source, Filter, Oscillator, Odd, Band)
+    assert (
+        [each.is_source for each in kinds]
+        == [each("a").is_source for each in kinds]
+        == [True, False, True, False, False]
+    )

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors.core.errors import EpicycleError
+from epicycle.actors.core.messages import counted
 from epicycle.actors.core.units import Unit, UnitError, convert, parse_unit, quantity
-from epicycle.actors.core.words import counted
 
 
 @pytest.mark.parametrize(

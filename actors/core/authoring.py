@@ -1,4 +1,4 @@
-"""What actors share that combine several inputs: which tokens of a tag belong together.
+"""What authors of actors need again and again: tokens that belong together, and work that waits for its time.
 
 The k-th tokens of all channels form the k-th round, so that with one token per channel and tag there is one round.
 This is what Ptolemy does, where an actor takes one token per channel and is fired again for the rest.
@@ -6,12 +6,16 @@ This is what Ptolemy does, where an actor takes one token per channel and is fir
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator, Sequence
-from itertools import zip_longest
-from typing import Any
+from itertools import count, zip_longest
+from typing import Any, Generic, TypeVar
 
-from .core import InputPort
+from .actor import Actor, Wake
+from .ports import InputPort
+from .tag import Tag
 
+T = TypeVar("T")
 ABSENT: Any = type("_Absent", (), {"__repr__": lambda self: "absent"})()
 
 
@@ -51,3 +55,28 @@ class Latest:
                     self._tokens[port.name] = token
             if len(self._tokens) == len(self._ports):
                 yield dict(self._tokens)
+
+
+class Pending(Generic[T]):
+    """Values that wait for their time: ``put`` them in ``fire``, and take those whose time has come with ``due``."""
+
+    def __init__(self, actor: Actor) -> None:
+        self._actor = actor
+        # The number keeps the order of entry among equals, and values are never compared.
+        self._heap: list[tuple[Tag, int, Wake, T]] = []
+        self._number = count()
+
+    def __len__(self) -> int:
+        return len(self._heap)
+
+    def put(self, value: T, delay: float) -> None:
+        """Keep a value for ``delay`` seconds; 0 is the next microstep."""
+        wake = self._actor.wake_in(delay)
+        heapq.heappush(self._heap, (wake.tag, next(self._number), wake, value))
+
+    def due(self) -> list[T]:
+        """Take the values whose time is the present tag, in the order in which they were put."""
+        values = []
+        while self._heap and self._heap[0][2].due:
+            values.append(heapq.heappop(self._heap)[3])
+        return values
