@@ -41,9 +41,9 @@ COMPILING = 120.0  # s, at most
 TESTS = (
     "tests/actors", "tests/api", "tests/aspects", "tests/cli/test_output.py", "tests/conformance", "tests/core",
     "tests/engine", "tests/library",
-    "tests/model", "tests/numerics", "tests/test_models.py", "tests/test_reference.py",
+    "tests/model", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
-TESTS_OF_KERNELS = ("tests/numerics", "tests/core", "tests/actors")
+TESTS_OF_KERNELS = ("tests/core", "tests/actors")
 LONGEST = {True: 6.0, False: 4.0}  # s; a test that takes longer, compiled or not, is not asked
 STAGES = ((25, 1.5), (100, 3.0), (300, 5.0))  # so many tests, of so many seconds together; each the next ones
 
