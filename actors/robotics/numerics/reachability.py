@@ -9,18 +9,10 @@ import numpy as np
 from .compiled import inner, kernel
 from .horizon import trajectory
 from .typing import Array
-from .ukf import constant_velocity, predict, sigma_points
+from .ukf import constant_velocity, mapped, predict, sigma_points, turned
 
 OLDEST = 100_000.0  # periods
 _SAME = 1e-6  # periods: a difference between times that is due to rounding
-
-
-def tube_radius(initial: float, growth: float, step_length: float, steps: int) -> Array:
-    """sigma_r of eq. (3) at steps 1..N: ``initial + growth * step_length * s``.
-
-    ``step_length`` is 1 where tau counts steps (the default reading) and the period where it counts seconds.
-    """
-    return np.array([initial + growth * step_length * s for s in range(1, steps + 1)])
 
 
 @inner
@@ -98,11 +90,8 @@ def peer_tubes(
                 vx += period * plans[i, 6 + 2 * k]
                 vy += period * plans[i, 7 + 2 * k]
             if k >= age:
-                positions[i, k - age, 0], positions[i, k - age, 1] = px, py
-                if ahead < 0.0:
-                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * before_x, py + ahead * before_y
-                elif ahead > 0.0:
-                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * vx, py + ahead * vy
+                speed_x, speed_y = (before_x, before_y) if ahead < 0.0 else (vx, vy)
+                positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * speed_x, py + ahead * speed_y
         lost = max(0, age - 1)
         for s in range(steps):
             distances[i, s] = safe_distance + margin * (radius[s] + growth * lost)
@@ -117,28 +106,11 @@ def propagate(
 
     C <- A C A^T + Q; with Q = 0 only the present uncertainty is carried forward.
     """
-    size = mean.shape[0]
     means, covariances = np.empty((steps, 2)), np.empty((steps, 3))
-    now, spread = mean.copy(), covariance.copy()
-    moved, half = np.empty(size), np.empty((size, size))
     for s in range(steps):
-        for i in range(size):
-            moved[i] = 0.0
-            for j in range(size):
-                half[i, j] = 0.0
-            for k in range(size):
-                if transition[i, k] != 0.0:
-                    moved[i] += transition[i, k] * now[k]
-                    for j in range(size):
-                        half[i, j] += transition[i, k] * spread[k, j]
-        for i in range(size):
-            now[i] = moved[i]
-            for j in range(size):
-                spread[i, j] = process_noise[i, j]
-                for k in range(size):
-                    spread[i, j] += half[i, k] * transition[j, k]
-        means[s, 0], means[s, 1] = now[0], now[1]
-        covariances[s, 0], covariances[s, 1], covariances[s, 2] = spread[0, 0], spread[0, 1], spread[1, 1]
+        mean, covariance = mapped(transition, mean), turned(transition, covariance, process_noise)
+        means[s, 0], means[s, 1] = mean[0], mean[1]
+        covariances[s, 0], covariances[s, 1], covariances[s, 2] = covariance[0, 0], covariance[0, 1], covariance[1, 1]
     return means, covariances
 
 

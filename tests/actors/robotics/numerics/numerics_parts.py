@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Callable
 
+import numba
 import numpy as np
 import pytest
 
@@ -12,6 +13,10 @@ definitions = importlib.import_module(PREFIX + "definitions")
 horizon = importlib.import_module(PREFIX + "horizon")
 reachability = importlib.import_module(PREFIX + "reachability")
 ukf = importlib.import_module(PREFIX + "ukf")
+
+# Called by kernels only; numba looks them up as globals.
+informed = importlib.import_module(PREFIX + "mutual_information").informed
+new_points = importlib.import_module(PREFIX + "mutual_information").new_points
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -26,6 +31,13 @@ def check_derivatives(function: Callable[[float, float], Six], x: float, y: floa
     assert [gx, gy] == pytest.approx([by_x[0], by_y[0]], abs=scale)
     assert [hxx, hxy, hyy] == pytest.approx([by_x[1], by_x[2], by_y[2]], abs=scale)
     assert by_x[2] == pytest.approx(by_y[1], abs=scale)
+
+
+@numba.njit
+def negative_information(
+    x: float, y: float, points: np.ndarray, weights: np.ndarray, others_distance: np.ndarray, variance: float
+) -> Six:
+    return informed(new_points(points, weights, others_distance), x, y, variance)
 
 
 def spread(random: np.random.Generator, size: int) -> np.ndarray:

@@ -5,7 +5,7 @@ import importlib
 import numpy as np
 import pytest
 
-from tests.actors.robotics.numerics.numerics_parts import PREFIX, Six, check_derivatives, spread
+from tests.actors.robotics.numerics.numerics_parts import PREFIX, Six, check_derivatives, negative_information, spread
 
 definitions = importlib.import_module(PREFIX + "definitions")
 information = importlib.import_module(PREFIX + "mutual_information")
@@ -51,14 +51,14 @@ def test_derivatives_of_mutual_information(random: np.random.Generator, kappa: f
         def negative(
             x: float, y: float, p: np.ndarray = points, w: np.ndarray = weights, d: np.ndarray = distance
         ) -> Six:
-            return information.negative_information(x, y, p, w, d, 2.0)
+            return negative_information(x, y, p, w, d, 2.0)
 
         check_derivatives(negative, *own, tolerance=1e-5)
 
 
 def test_information_on_top_of_a_sigma_point_is_finite() -> None:
     points, weights = np.array([[1.0, 2.0], [3.0, 2.0], [0.0, 5.0]]), np.array([0.5, 0.25, 0.25])
-    found = information.negative_information(1.0, 2.0, points, weights, np.zeros((3, 3)), 2.0)
+    found = negative_information(1.0, 2.0, points, weights, np.zeros((3, 3)), 2.0)
     expected = definitions.mutual_information(points[0], points, weights, 2.0, np.zeros((3, 3)))
     assert found[0] == pytest.approx(-expected)
     assert np.isfinite(found).all()
