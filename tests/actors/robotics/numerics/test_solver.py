@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.actors.scenario import play
+from tests.actors.robotics.scenario import play
 
 barrier = importlib.import_module("epicycle.actors.robotics.numerics.barrier")
 definitions = importlib.import_module("epicycle.actors.robotics.numerics.definitions")
