@@ -131,8 +131,8 @@ class RobustController(TargetModel, Actor):
         self.solver.prepare()
         compile_kernels()
         # Kept, as an import takes 1 us whenever it is met.
-        self._new_problem, self._standing_plan = horizon.HorizonProblem, reachability.standing_plan
-        self._expected_target, self._peer_tubes = reachability.expected_target, reachability.peer_tubes
+        self._standing_plan, self._peer_tubes = reachability.standing_plan, reachability.peer_tubes
+        self._expected_target, self._new_problem = reachability.expected_target, horizon.HorizonProblem
         self._name = self.robot_name or enclosing(self.path)
         tau = 1.0 if self.tube_time == STEPS else self.period
         # The kernels count steps from t.  From t + period on there is one more of them, and tau is 0 at the first.
@@ -141,7 +141,10 @@ class RobustController(TargetModel, Actor):
         self._radius = definitions.sigma_r(
             self.tube_initial - ahead * self.tube_growth * tau, self.tube_growth * tau, np.arange(1.0, self._steps + 1)
         )
-        self._process_noise = self.process_noise
+        self._room = self.period, self._radius, self.tube_growth, self.safe_distance, self.margin
+        self._model = self.process_noise, self.covariance_noise, self.kappa, self.period
+        # Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N and their weights, without a target.
+        self._nobody = *(np.empty((0, self._steps, columns)) for columns in (2, 3)), np.empty((0, 2)), np.empty(0)
         self._applied = np.zeros(2)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(2), np.zeros(2), np.zeros((self._steps, 2)))
         self._peers = _Peers(self.peers_at_start)
@@ -199,20 +202,14 @@ class RobustController(TargetModel, Actor):
         velocity, speed = np.array([vx, vy]), hypot(vx, vy)
         standing = self._standing
         tube_centre, tube_radius, starts = self._standing_plan(
-            standing.position,
-            standing.velocity,
-            standing.controls,
-            now - standing.made_at,
-            self._radius,
-            velocity,
-            speed,
-            self.max_acceleration,
-            period,
+            *standing[1:], now - standing.made_at, self._radius, velocity, speed, self.max_acceleration, period
         )
-        target_mean, target_covariance, points, weights = self._target_ahead(now)
-        peer_mean, peer_distance = self._peer_tubes(
-            self._peers.table(), now, period, self._radius, self.tube_growth, self.safe_distance, self.margin
-        )
+        target, expected = self._target, self._nobody
+        if target is not None:
+            elapsed = now - target.time
+            expected = self._expected_target(target.mean, target.covariance, *self._model, elapsed, self._steps)
+        target_mean, target_covariance, points, weights = expected
+        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room)
         posed = self._new_problem(
             period=period,
             position=position,
@@ -229,19 +226,3 @@ class RobustController(TargetModel, Actor):
             peer_distance=peer_distance,
         )
         return self.objective.pose(posed, points, weights), starts
-
-    def _target_ahead(self, now: float) -> tuple[Array, Array, Array, Array]:
-        """Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N, weights; K is 0 or 1."""
-        target, steps = self._target, self._steps
-        if target is None:
-            return np.empty((0, steps, 2)), np.empty((0, steps, 3)), np.empty((0, 2)), np.empty(0)
-        return self._expected_target(
-            target.mean,
-            target.covariance,
-            self._process_noise,
-            self.covariance_noise,
-            self.kappa,
-            self.period,
-            now - target.time,
-            steps,
-        )

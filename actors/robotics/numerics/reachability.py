@@ -23,16 +23,9 @@ def _age(elapsed: float, period: float, oldest: float) -> int:
 
 @kernel
 def standing_plan(
-    position: Array,
-    velocity: Array,
-    controls: Array,
-    elapsed: float,
-    radius: Array,
-    moving: Array,
-    speed: float,
-    max_acceleration: float,
-    period: float,
-) -> tuple[Array, Array, Array]:
+    position: Array, velocity: Array, controls: Array, elapsed: float, radius: Array, moving: Array, speed: float,
+    max_acceleration: float, period: float,
+) -> tuple[Array, Array, Array]:  # fmt: skip
     """What a plan from ``position`` and ``velocity`` with ``controls`` (N, 2) is good for, ``elapsed`` seconds later.
 
     f3: centres (N, 2) and radii (N,) of the tube around it, which binds where the plan reaches, with the ``radius``
@@ -132,15 +125,9 @@ def _after(mean: Array, covariance: Array, noise: Array, periods: float, period:
 
 @kernel
 def expected_target(
-    mean: Array,
-    covariance: Array,
-    noise: Array,
-    is_widened: bool,
-    kappa: float,
-    period: float,
-    elapsed: float,
+    mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float, elapsed: float,
     steps: int,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
     """What f4 and eq. (5) need of a target with constant velocity, from an estimate ``elapsed`` seconds before now.
 
     Means (1, N, 2) and covariances (1, N, 3) at steps 1..N from now on; the positions (M, 2) of its sigma points at

@@ -32,16 +32,8 @@ def keep_away(x: float, y: float, cx: float, cy: float, distance: float) -> Term
 
 @kernel
 def keep_away_uncertain(
-    x: float,
-    y: float,
-    cx: float,
-    cy: float,
-    cxx: float,
-    cxy: float,
-    cyy: float,
-    distance: float,
-    margin: float,
-) -> Term:
+    x: float, y: float, cx: float, cy: float, cxx: float, cxy: float, cyy: float, distance: float, margin: float,
+) -> Term:  # fmt: skip
     """f4 + alpha * sigma_4 of eqs. (2) and (4): the margin is the deviation along the line of sight.
 
     In polar coordinates around the obstacle, h(r, a) = distance - r + margin * sigma(a), where

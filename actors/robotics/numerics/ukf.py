@@ -224,14 +224,9 @@ def _finite(mean: Array, covariance: Array) -> bool:
 
 @kernel
 def predict_and_fuse(
-    mean: Array,
-    covariance: Array,
-    transition: Array,
-    process_noise: Array,
-    kappa: float,
-    measurements: Array,
+    mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
     averaged: bool,
-) -> tuple[Array, Array, bool]:
+) -> tuple[Array, Array, bool]:  # fmt: skip
     """``predict``, then ``update`` with measurements (m, 7), and whether anything was fused.
 
     All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  Where
