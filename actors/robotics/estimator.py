@@ -188,19 +188,13 @@ class UnscentedEstimator(_Estimator):
         super().initialize()
         self._move_and_fuse = ukf.predict_and_fuse  # kept, as an import takes 1 us whenever it is met
         self._model = lru_cache(8)(lambda elapsed: (ukf.constant_velocity(elapsed), self._noise_over(elapsed)))
-        self._mean = np.array(self.prior_mean)
-        self._covariance = np.diag(self.prior_variance)
+        self._averaged = self.noise_direction == EXPECTED
+        self._mean, self._covariance = np.array(self.prior_mean), np.diag(self.prior_variance)
 
     def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
-        transition, noise = self._model(elapsed)  # nearly always the same
+        model, rows = self._model(elapsed), self._rows(measurements)  # the model is nearly always the same
         self._mean, self._covariance, fused = self._move_and_fuse(
-            self._mean,
-            self._covariance,
-            transition,
-            noise,
-            self.kappa,
-            self._rows(measurements),
-            self.noise_direction == EXPECTED,
+            self._mean, self._covariance, *model, self.kappa, rows, self._averaged
         )
         return fused
 

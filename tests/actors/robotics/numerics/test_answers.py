@@ -1,7 +1,7 @@
 """The solver's answers to some problems, to eight digits, with the Newton steps that they take.
 
 Whether an answer is right, ``test_solver.py`` asks of another solver; here nothing may move unnoticed, the way to the
-answer included.  ``python -m tests.numerics.test_answers`` writes the answers of today.
+answer included.  ``python -m tests.actors.robotics.numerics.test_answers`` writes the answers of today.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 PREFIX = "epicycle.actors.robotics.numerics."
-constraints = importlib.import_module(PREFIX + "constraints")
+definitions = importlib.import_module(PREFIX + "definitions")
 barrier = importlib.import_module(PREFIX + "barrier")
 horizon = importlib.import_module(PREFIX + "horizon")
 information = importlib.import_module(PREFIX + "mutual_information")
@@ -174,7 +174,7 @@ def test_ipopt_says_the_same(name: str) -> None:
     assert theirs.violation == pytest.approx(ours["violation"], abs=2e-5)
     assert theirs.objective == pytest.approx(ours["objective"], rel=2e-5, abs=2e-6)
     assert np.hypot(*theirs.controls.T).max() <= problem.max_acceleration
-    worst = max(0.0, float(constraints.violations(problem, theirs.controls).max()))
+    worst = max(0.0, float(definitions.violations(problem, theirs.controls).max()))
     assert theirs.violation == pytest.approx(worst, abs=1e-6)
     assert theirs.iterations > 5
 
@@ -183,7 +183,7 @@ def test_ipopt_stops_a_runaway_as_far_as_it_can() -> None:
     ipopt = importlib.import_module("epicycle.actors.robotics.casadi_solver")
     problem = posed(**PROBLEMS["much too fast"])
     theirs = ipopt.solve(problem, starts())
-    assert theirs.violation == pytest.approx(float(constraints.violations(problem, theirs.controls).max()))
+    assert theirs.violation == pytest.approx(float(definitions.violations(problem, theirs.controls).max()))
     assert np.isfinite(theirs.controls).all()
 
 

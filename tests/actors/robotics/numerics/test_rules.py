@@ -11,10 +11,10 @@ import pytest
 from scipy.optimize import minimize
 
 from epicycle.actors import Barrier, Inform, ParameterError
-from tests.numerics.test_answers import PROBLEMS, STEPS, posed, starts
+from tests.actors.robotics.numerics.test_answers import PROBLEMS, STEPS, posed, starts
 
 barrier = importlib.import_module("epicycle.actors.robotics.numerics.barrier")
-constraints = importlib.import_module("epicycle.actors.robotics.numerics.constraints")
+definitions = importlib.import_module("epicycle.actors.robotics.numerics.definitions")
 horizon = importlib.import_module("epicycle.actors.robotics.numerics.horizon")
 
 FEASIBLE = ("nothing in the way", "at full speed", "an obstacle ahead", "two peers", "a tube", "a tube that ends")
@@ -66,7 +66,7 @@ def test_the_last_free_control_is_held(name: str, free: int) -> None:
     assert np.hypot(*found.controls.T).max() <= problem.max_acceleration
     assert np.hypot(*velocities(problem, found.controls).T).max() <= problem.max_speed
     if found.violation == 0.0:
-        assert max(0.0, constraints.violations(problem, found.controls).max()) <= 1e-6
+        assert max(0.0, definitions.violations(problem, found.controls).max()) <= 1e-6
         assert found.objective >= solved(name).objective - 1e-4 * abs(found.objective)
 
 
@@ -102,7 +102,7 @@ def test_what_answers_an_infeasible_problem(name: str) -> None:
     problem = posed(**PROBLEMS[name])
 
     def squared(found: Any) -> float:
-        return float((np.maximum(constraints.violations(problem, found.controls), 0.0) ** 2).sum())
+        return float((np.maximum(definitions.violations(problem, found.controls), 0.0) ** 2).sum())
 
     progress, least, brake = (solved(name, infeasible=each) for each in ("progress", "least_violation", "brake"))
     assert min(progress.violation, least.violation) > 0.0

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tests.numerics.robustness import BOUND, KINDS, run
+from tests.actors.robotics.numerics.robustness import BOUND, KINDS, run
 
 
 @pytest.mark.parametrize(("count", "seed"), [(2_000, 2), pytest.param(100_000, 1, marks=pytest.mark.slow)])

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.actors.scenario import play
+from tests.actors.robotics.scenario import play
 
 barrier = importlib.import_module("epicycle.actors.robotics.numerics.barrier")
-constraints = importlib.import_module("epicycle.actors.robotics.numerics.constraints")
+definitions = importlib.import_module("epicycle.actors.robotics.numerics.definitions")
 horizon = importlib.import_module("epicycle.actors.robotics.numerics.horizon")
 
 RUNS = ((0, 30.0, 0.0, 1), (2, 30.0, 0.0, 2), (3, 10.0, 0.25, 3), (4, 5.0, 0.5, 4))
@@ -42,11 +42,11 @@ def records() -> list[Any]:
 
 
 def violation(problem: Any, controls: np.ndarray) -> float:
-    return float(np.sqrt((np.maximum(constraints.violations(problem, controls), 0.0) ** 2).sum()))
+    return float(np.sqrt((np.maximum(definitions.violations(problem, controls), 0.0) ** 2).sum()))
 
 
 def worst(problem: Any, controls: np.ndarray) -> float:
-    return max(0.0, float(constraints.violations(problem, controls).max()))
+    return max(0.0, float(definitions.violations(problem, controls).max()))
 
 
 def compare(problem: Any, start: np.ndarray, ours: Any) -> tuple[str, str]:

@@ -26,7 +26,7 @@ from epicycle.actors import (
 )
 from epicycle.actors.robotics.numerics import warm_up
 from epicycle.actors.testing import Harness
-from tests.actors.scenario import _Recorder, play
+from tests.actors.robotics.scenario import _Recorder, play
 
 COMPILING = "compiling the numeric kernels (once, about 20 s) ..."
 

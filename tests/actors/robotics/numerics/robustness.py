@@ -1,4 +1,6 @@
-"""Throws problems at the solver that no scenario poses: `python -m tests.numerics.robustness [--count N] [--gap G]`.
+"""Throws problems at the solver that no scenario poses, as ``make robust`` does.
+
+    python -m tests.actors.robotics.numerics.robustness [--count N] [--gap G]
 
 Starts inside an obstacle or a peer, at no distance at all, tubes that contradict each other or the obstacle,
 covariances over twenty orders of magnitude, up to 64 peers, vehicles that are too fast, and numbers from upstream
