@@ -37,14 +37,10 @@ class Recorder(Actor):
         int, None, min=0, doc="how many of the latest tokens are kept; all if left out"
     )
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def initialize(self) -> None:
         self.tags: list[Tag] = []
         self.tokens: list[Any] = []
         self.seen = 0
-
-    def initialize(self) -> None:
-        self.tags, self.tokens, self.seen = [], [], 0
 
     def fire(self) -> None:
         tokens = self.input.tokens
@@ -106,7 +102,6 @@ class Histogram(Actor):
         if not -math.inf < self.low < self.high < math.inf:
             raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must be below high")
         self.edges: NDArray[np.float64] = np.linspace(self.low, self.high, self.bins + 1)
-        self.initialize()
 
     def initialize(self) -> None:
         self.counts: NDArray[np.int64] = np.zeros(self.bins, dtype=np.int64)

@@ -293,6 +293,8 @@ class Configurable:
 
     # Names that the YAML uses beside parameters, which no parameter may take.
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
+    # Attributes that its copies, for a run or a snapshot, have in common with it.
+    copies_share: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, **values: object) -> None:
         declared = declared_parameters(type(self))
