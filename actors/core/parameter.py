@@ -333,6 +333,8 @@ class Configurable:
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
     # What is said of names that one might take for parameters, and are none.
     refused: ClassVar[Mapping[str, str]] = {}
+    # Attributes that its copies, for a run or a snapshot, have in common with it.
+    copies_share: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, **values: object) -> None:
         self._configure(values)
