@@ -70,7 +70,7 @@ class ODE(Actor):
 
     is_source: ClassVar[bool] = True
 
-    trigger: InputPort[Any] = InputPort(Any, required=False, doc="asks for the states")
+    trigger = InputPort(required=False, doc="asks for the states")
 
     initial = MappingParameter(Parameter(float), doc="the states and their values at the start")
     derivatives = MappingParameter(FormulaParameter(), doc="how fast each state changes, per s")
@@ -94,8 +94,7 @@ class ODE(Actor):
     )  # fmt: skip
     min_interval = Parameter(float, 1e-6, unit="s", min=1e-9, doc="what crossings of one kind keep between them")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self._states = tuple(self.initial)
         self._guards: list[Guard] = []
         if not self._states:
@@ -123,7 +122,7 @@ class ODE(Actor):
                 if name in self.crossings:
                     raise ParameterError(f"{formula} asks for {name!r}, which is a crossing and has no value")
                 if name not in ("time", *ports):
-                    ports[name] = InputPort(Any, doc="an input, held from token to token")
+                    ports[name] = InputPort(doc="an input, held from token to token")
         return ports
 
     # -- the run --------------------------------------------------------------------------------------------------

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Configurable, Parameter, ParameterError, Stream, array_parameter, counted
+from .core import Configurable, Parameter, ParameterError, Stream, array_parameter, counted, token_type
 from .core.laws import cumulated, weighted
-from .tokens import token_type
 
 
 class Distribution(Configurable):
@@ -37,8 +36,7 @@ class Uniform(Distribution):
     low = Parameter(float, 0.0, doc="the least number")
     high = Parameter(float, 1.0, doc="the bound above, not drawn itself")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         _check_order("low", self.low, "high", self.high)
 
     def draw(self, random: Stream) -> float:
@@ -80,8 +78,7 @@ class Gamma(Distribution):
     shape = Parameter(float, 1.0, unit="1", min=0, doc="the shape k; k = 1 is the exponential distribution")
     mean = Parameter(float, 1.0, min=0, doc="the mean, shape times scale")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if self.shape == 0:
             raise ParameterError("Gamma.shape: 0 is not above 0")
 
@@ -96,8 +93,7 @@ class Triangular(Distribution):
     mode = Parameter(float, 0.5, doc="the likeliest number")
     high = Parameter(float, 1.0, doc="the greatest number")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         _check_order("low", self.low, "mode", self.mode)
         _check_order("mode", self.mode, "high", self.high)
 
@@ -124,8 +120,7 @@ class RandomInteger(Distribution):
     low = Parameter(int, 0, doc="the least integer")
     high = Parameter(int, 1, doc="the greatest integer")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         _check_order("low", self.low, "high", self.high)
 
     def draw(self, random: Stream) -> int:
@@ -140,8 +135,7 @@ class Choice(Distribution):
         (None,), None, unit="1", min=0, doc="how likely each is, relative to the others; all alike if left out"
     )
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if not self.values:
             raise ParameterError("Choice.values: the list is empty, there is nothing to choose from")
         self.token_type = token_type(self.values)

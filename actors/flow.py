@@ -15,8 +15,8 @@ class Merge(Actor):
     ``discard`` the others are lost.  Ptolemy: ``Merge``.
     """
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="the streams")
-    output: OutputPort[Any] = OutputPort(Any, doc="one token at a time")
+    input = InputPort(multi=True, doc="the streams")
+    output = OutputPort(doc="one token at a time")
 
     discard = Parameter(bool, False, doc="whether all but the first token of a tag are lost")
 
@@ -43,8 +43,8 @@ class Router(Actor):
     Ptolemy: ``Distributor``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
-    output: OutputPort[Any] = OutputPort(Any, multi=True, doc="a channel for each connection, in their order")
+    input = InputPort(doc="what is handed on")
+    output = OutputPort(multi=True, doc="a channel for each connection, in their order")
 
     policy = Parameter(str, "in turn", choices=("in turn", "random"), doc="how the channel is chosen")
 
@@ -67,9 +67,9 @@ class Switch(Actor):
     Ptolemy: ``Switch``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
+    input = InputPort(doc="what is handed on")
     control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
-    output: OutputPort[Any] = OutputPort(Any, multi=True, doc="a channel for each connection, in their order")
+    output = OutputPort(multi=True, doc="a channel for each connection, in their order")
 
     def initialize(self) -> None:
         self._channel = 0
@@ -87,10 +87,10 @@ class BooleanSwitch(Actor):
     Ptolemy: ``BooleanSwitch``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
+    input = InputPort(doc="what is handed on")
     control = InputPort(bool, doc="where to; false until a token comes")
-    true_output: OutputPort[Any] = OutputPort(Any, doc="the tokens that come while control is true")
-    false_output: OutputPort[Any] = OutputPort(Any, doc="the tokens that come while control is false")
+    true_output = OutputPort(doc="the tokens that come while control is true")
+    false_output = OutputPort(doc="the tokens that come while control is false")
 
     def initialize(self) -> None:
         self._control = False
@@ -108,9 +108,9 @@ class Select(Actor):
     Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1); its ``Select`` keeps the others.
     """
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="a channel for each connection, in their order")
+    input = InputPort(multi=True, doc="a channel for each connection, in their order")
     control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
-    output: OutputPort[Any] = OutputPort(Any, doc="the tokens of the channel chosen")
+    output = OutputPort(doc="the tokens of the channel chosen")
 
     def initialize(self) -> None:
         self._channel = 0
@@ -128,8 +128,8 @@ class Repeat(Actor):
     Ptolemy: ``Repeat``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is repeated")
-    output: OutputPort[Any] = OutputPort(Any, doc="each token, as often as told")
+    input = InputPort(doc="what is repeated")
+    output = OutputPort(doc="each token, as often as told")
 
     times = PortParameter(int, 2, min=0, doc="how often each token is sent")
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from .core import Actor, InputPort, OutputPort, Parameter
 from .distributions import Distribution
 
@@ -14,13 +12,12 @@ class Random(Actor):
     Ptolemy: ``Gaussian``, ``Uniform``, ``ColtExponential``, ``Bernoulli``, ``DiscreteRandomSource`` and others.
     """
 
-    trigger: InputPort[Any] = InputPort(Any, doc="when to send")
-    output: OutputPort[Any] = OutputPort(Any, doc="the token drawn")
+    trigger = InputPort(doc="when to send")
+    output = OutputPort(doc="the token drawn")
 
     distribution: Parameter[Distribution] = Parameter(Distribution, doc="what is drawn from")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self.output.type = self.distribution.token_type
 
     def fire(self) -> None:

@@ -6,7 +6,7 @@ import difflib
 import math
 from bisect import bisect_left
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from .core import (
     Actor,
@@ -32,16 +32,13 @@ class Replay(Actor):
     lies in or below the folder of the YAML file that names it.
     """
 
-    is_source: ClassVar[bool] = True
-
-    output: OutputPort[Any] = OutputPort(Any, doc="the value of a row, or a mapping of its values")
+    output = OutputPort(doc="the value of a row, or a mapping of its values")
 
     file = Parameter(Path, doc="a .csv file with a header line, or a .parquet file")
     time = Parameter(str, "time", doc="the column of times, in s, ascending from 0 on")
     columns: Parameter[Any] = texts_parameter(None, doc="the columns to send; all but the time if left out")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if self.file.suffix.lower() not in (".csv", ".parquet"):
             raise ParameterError(f"file: {self.file.name!r} ends neither in .csv nor in .parquet")
 

@@ -15,8 +15,8 @@ from .core import Actor, InputPort, OutputPort, Parameter, PortError
 class _ByChannel(Actor):
     """What these actors share: an input and an output with channels that belong together."""
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="the streams")
-    output: OutputPort[Any] = OutputPort(Any, multi=True, doc="channel by channel what the input gets")
+    input = InputPort(multi=True, doc="the streams")
+    output = OutputPort(multi=True, doc="channel by channel what the input gets")
 
     def initialize(self) -> None:
         wanted, found = self.input.width, self.output.width
@@ -39,7 +39,7 @@ class Sampler(_ByChannel):
     Ptolemy: ``Sampler``.
     """
 
-    trigger: InputPort[Any] = InputPort(Any, doc="when to hand on")
+    trigger = InputPort(doc="when to hand on")
 
     def fire(self) -> None:
         if self.trigger.present:
@@ -55,7 +55,7 @@ class MostRecent(_ByChannel):
     Ptolemy: ``MostRecent``.
     """
 
-    trigger: InputPort[Any] = InputPort(Any, doc="when to send")
+    trigger = InputPort(doc="when to send")
 
     initial: Parameter[Any] = Parameter(object, None, doc="what is sent for a channel before its first token")
 

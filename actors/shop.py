@@ -19,10 +19,10 @@ class Station(Process):
     ``Server`` does the same without priorities and without SimPy.
     """
 
-    input: InputPort[Any] = InputPort(Any, required=False, doc="what is to be served")
-    urgent: InputPort[Any] = InputPort(Any, required=False, doc="what is to be served before those that wait at input")
-    begun: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="each token when its service begins")
-    output: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="each token when its service is over")
+    input = InputPort(required=False, doc="what is to be served")
+    urgent = InputPort(required=False, doc="what is to be served before those that wait at input")
+    begun = OutputPort(depends_on=(), doc="each token when its service begins")
+    output = OutputPort(depends_on=(), doc="each token when its service is over")
 
     places = Parameter(int, 1, min=1, doc="how many are served at a time")
     service_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long a service takes")

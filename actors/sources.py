@@ -15,24 +15,21 @@ from .core import (
     Wake,
     array_parameter,
     to_nanoseconds,
+    token_type,
 )
-from .tokens import token_type
 
 
 class _Ticking(Actor):
     """What clocks share: a counted series of tokens up to a stop time."""
 
-    is_source: ClassVar[bool] = True
-
-    output: OutputPort[Any] = OutputPort(Any, doc="the values in turn; without values the number of the tick, from 0")
+    output = OutputPort(doc="the values in turn; without values the number of the tick, from 0")
 
     values: Parameter[Any] = Parameter(object, None, shape=(None,), doc="what the ticks send, over and over")
     stop_time: Parameter[float | None] = Parameter(
         float, None, unit="s", min=0, doc="the time after which there are no more ticks"
     )
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if self.values is not None and not self.values:
             raise ParameterError("values: the list is empty, there is nothing to send")
         self.output.type = int if self.values is None else token_type(self.values)
@@ -60,20 +57,22 @@ class Clock(_Ticking):
     Ptolemy: ``DiscreteClock``, ``Clock``.
     """
 
-    start: InputPort[Any] = InputPort(Any, required=False, doc="begins a first cycle; if connected, nothing else does")
-    stop: InputPort[Any] = InputPort(Any, required=False, doc="ends the ticking until the next start")
+    is_source: ClassVar[bool] = True
+
+    start = InputPort(required=False, doc="begins a first cycle; if connected, nothing else does")
+    stop = InputPort(required=False, doc="ends the ticking until the next start")
 
     period = PortParameter(float, unit="s", min=1e-9, doc="length of a cycle, rounded to whole nanoseconds")
     offset = Parameter(float, 0.0, unit="s", min=0, doc="time from the start to the first cycle")
     offsets = array_parameter((None,), [0.0], unit="s", min=0, doc="when each cycle ticks, in order")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
+        super().check()
         if not self.offsets.size or any(self.offsets[1:] < self.offsets[:-1]):
             raise ParameterError(f"offsets: {self.offsets.tolist()} is not an ascending list of times")
-        self._check(self.period)
+        self._check_period(self.period)
 
-    def _check(self, period: float) -> None:
+    def _check_period(self, period: float) -> None:
         if self.offsets[-1] >= period:
             raise ParameterError(f"offsets: {self.offsets[-1]:g} s is not within the period of {period:g} s")
 
@@ -110,7 +109,7 @@ class Clock(_Ticking):
             self._send(self._tick)
             self._tick += 1
             if self._tick % len(self._offsets) == 0:
-                self._check(self.period)
+                self._check_period(self.period)
                 # Counted in integers, so that no rounding adds up over a long run.
                 self._cycle += to_nanoseconds(self.period)
             self._wake = self._wake_at(self._next)
@@ -144,15 +143,12 @@ class SingleEvent(Actor):
     Ptolemy: ``SingleEvent``.
     """
 
-    is_source: ClassVar[bool] = True
-
-    output: OutputPort[Any] = OutputPort(Any, doc="the value")
+    output = OutputPort(doc="the value")
 
     time = Parameter(float, 0.0, unit="s", min=0, doc="when it is sent")
     value: Parameter[Any] = Parameter(object, True, doc="what is sent")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self.output.type = token_type([self.value])
 
     def initialize(self) -> None:

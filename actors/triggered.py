@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from .core import Actor, InputPort, OutputPort, Parameter, PortParameter
-from .tokens import token_type
+from .core import Actor, InputPort, OutputPort, Parameter, PortParameter, token_type
 
 
 class Const(Actor):
@@ -16,13 +15,12 @@ class Const(Actor):
 
     is_source: ClassVar[bool] = True
 
-    trigger: InputPort[Any] = InputPort(Any, required=False, doc="when to send; once at the start if not connected")
-    output: OutputPort[Any] = OutputPort(Any, doc="the value")
+    trigger = InputPort(required=False, doc="when to send; once at the start if not connected")
+    output = OutputPort(doc="the value")
 
     value: Parameter[Any] = Parameter(object, 1, doc="what is sent")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self.output.type = token_type([self.value])
 
     def initialize(self) -> None:
@@ -40,7 +38,7 @@ class Ramp(Actor):
     The numbers are integers if ``init`` and ``step`` are.  Ptolemy: ``Ramp``.
     """
 
-    trigger: InputPort[Any] = InputPort(Any, doc="when to send")
+    trigger = InputPort(doc="when to send")
     output = OutputPort(float, doc="the number")
 
     init: Parameter[float] = Parameter(int | float, 0, doc="the first number")
@@ -62,15 +60,14 @@ class Sequence(Actor):
     token of ``enable`` is a trigger.  Ptolemy: ``Sequence``.
     """
 
-    trigger: InputPort[Any] = InputPort(Any, required=False, doc="when to send")
+    trigger = InputPort(required=False, doc="when to send")
     enable = InputPort(bool, required=False, doc="whether to send")
-    output: OutputPort[Any] = OutputPort(Any, doc="the values in turn")
+    output = OutputPort(doc="the values in turn")
 
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is sent")
     repeat = Parameter(bool, False, doc="whether to begin again after the last value")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self.output.type = token_type(self.values)
 
     def initialize(self) -> None:
@@ -98,7 +95,7 @@ class CurrentTime(Actor):
     Ptolemy: ``CurrentTime``.
     """
 
-    trigger: InputPort[Any] = InputPort(Any, doc="when to send")
+    trigger = InputPort(doc="when to send")
     output = OutputPort(float, doc="the time in s")
 
     def fire(self) -> None:
@@ -112,7 +109,7 @@ class CurrentMicrostep(Actor):
     Ptolemy: ``CurrentMicrostep``.
     """
 
-    trigger: InputPort[Any] = InputPort(Any, doc="when to send")
+    trigger = InputPort(doc="when to send")
     output = OutputPort(int, doc="the microstep, from 1")
 
     def fire(self) -> None:

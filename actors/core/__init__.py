@@ -19,7 +19,8 @@ from .parameter import (
     variants,
 )
 from .port_parameter import PortParameter
-from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
+from .port_types import accepts, shaped, token_type, type_name
+from .ports import Emit, InputPort, OutputPort, PortError
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
@@ -78,6 +79,7 @@ __all__ = [
     "texts_parameter",
     "to_nanoseconds",
     "to_seconds",
+    "token_type",
     "type_name",
     "unknown_parameter",
     "variants",

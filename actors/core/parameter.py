@@ -295,6 +295,16 @@ class Configurable:
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
 
     def __init__(self, **values: object) -> None:
+        self._configure(values)
+        self.check()
+
+    def check(self) -> None:
+        """Called when each parameter is valid by itself; raises ``ParameterError`` where they do not go together.
+
+        What follows from them may be set here: the type of a port for example.
+        """
+
+    def _configure(self, values: Mapping[str, object]) -> None:
         declared = declared_parameters(type(self))
         for name in values:
             if name not in declared:

@@ -3,7 +3,6 @@
 from .declarations import (
     CompositeText,
     ConnectionText,
-    DeclarationReader,
     MetricText,
     ModelText,
     ParameterText,
@@ -15,6 +14,7 @@ from .dimensions import Dimension, Factor, Level, Listed, Ranged, in_si, split_n
 from .disturbance import Disturbance, add_disturbances, add_parameters, load_disturbance, load_disturbances
 from .files import find_library, find_model, included_composites, read_model
 from .inheritance import inherit
+from .models import DeclarationReader
 from .questions import ALWAYS, FALLS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection
 from .schema import json_schema, schema_text
 from .settings import Setting, Settings, change_aspect, parse_setting, put_aspect, read_overrides, settings_in, without

@@ -7,19 +7,47 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..catalogue import find, packaged_disturbances
-from ..text import Mapping, Node, Problems, Scalar, read
-from .declarations import DISTURBANCE_KEYS, CompositeText, DeclarationReader, ModelText
-from .settings import Setting, put_aspect, settings_in
+from ..text import Mapping, Node, NodeReader, Problems, read
+from .declarations import CompositeText, ModelText
+from .fields import NAMED, Construct, Key
+from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, parts
+from .settings import Setting, put_aspect, settings_like
 from .usage import check_own_usage
 
 
-@dataclass
+@dataclass(frozen=True)
 class Disturbance:
     """A file of aspects, with parameters and classes of their own and values for parameters of the model."""
 
     text: CompositeText
     composites: dict[str, CompositeText] = field(default_factory=dict)
-    settings: list[Setting] = field(default_factory=list)
+    settings: tuple[Setting, ...] = ()
+
+
+# Its aspects may take over the ports of those whose places they take.
+DISTURBANCE = Construct(
+    "Aspects in a file of their own, to be added to a model.",
+    {
+        "disturbance": Key(
+            NAMED,
+            "The name of the disturbance.",
+            "the disturbance's name",
+            missing=(
+                "the disturbance has no name",
+                "begin the file with a line like 'disturbance: my_disturbance'",
+            ),
+            name="name",
+        ),
+        "doc": DOC,
+        "set": Key(
+            settings_like("observer[*].sensor.max_range: 5 m"),
+            "Values for parameters of the model: 'path: value', as for --set.",
+        ),
+        "parameters": PARAMETERS,
+        "composites": COMPOSITES,
+        "aspects": Key(parts("aspect", "added_aspect"), ASPECTS.doc),
+    },
+)
 
 
 def find_disturbance(name: str, problems: Problems) -> Path | None:
@@ -43,46 +71,17 @@ def _declared(node: Node, problems: Problems) -> Disturbance | None:
             "a disturbance begins with a line like 'disturbance: my_disturbance'",
         )
         return None
-    reader = DeclarationReader(problems)
-    entries = reader.entries(node, "the disturbance", DISTURBANCE_KEYS)
+    reader = NodeReader(problems)
+    entries = DISTURBANCE.entries(reader, node, "the disturbance")
     if entries is None:
         return None
     before = len(problems)
-    text = CompositeText("disturbance", node.position)
-    if "disturbance" in entries:
-        text.name = reader.name(entries["disturbance"].value, "the disturbance's name") or text.name
-    else:
-        problems.add(
-            "the disturbance has no name",
-            node.position,
-            "begin the file with a line like 'disturbance: my_disturbance'",
-        )
-    if "doc" in entries:
-        text.doc = reader.text(entries["doc"].value, "doc") or ""
-    settings = _settings(entries["set"].value, problems) if "set" in entries else []
-    for key, entry in reader.named(entries, "parameters"):
-        text.parameters[key] = reader.parameter(key, entry)
-    for key, entry in reader.named(entries, "aspects"):
-        if (part := reader.part(key, entry, "aspect")) is not None:
-            text.aspects[key] = part
-    classes = ModelText(text)
-    reader.library({key: entry for key, entry in entries.items() if key == "composites"}, classes)
+    said = DISTURBANCE.values(reader, entries, "the disturbance", node.position)
+    composites, settings = said.pop("composites", {}), said.pop("set", ())
+    text = CompositeText(said.pop("name", "disturbance"), node.position, **said)
     if len(problems) == before:
         check_own_usage(text, problems)
-    return Disturbance(text, classes.composites, settings)
-
-
-def _settings(node: Node, problems: Problems) -> list[Setting]:
-    """Values for parameters of the model, as ``--set`` gives them."""
-    if isinstance(node, Mapping):
-        return settings_in(node, problems)
-    if not (isinstance(node, Scalar) and node.value is None):
-        problems.add(
-            "set is not a mapping from parameters to values",
-            node.position,
-            "write lines like 'observer[*].sensor.max_range: 5 m'",
-        )
-    return []
+    return Disturbance(text, composites, settings)
 
 
 def load_disturbances(

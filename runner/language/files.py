@@ -8,7 +8,8 @@ from epicycle.actors import irregular
 
 from ..catalogue import find, model_folders, packaged_models
 from ..text import Mapping, Problems, did_you_mean, read
-from .declarations import CompositeText, DeclarationReader, ModelText
+from .declarations import CompositeText, ModelText
+from .models import DeclarationReader
 
 MAX_INCLUDES = 200
 

@@ -113,29 +113,31 @@ class _Heir:
         """The whole class."""
         base, text = self.base, self.text
         removed = {name: part.position for name, part in text.actors.items() if part.removes}
+        parameters = dict(base.parameters)
+        for name, parameter in text.parameters.items():
+            old = base.parameters.get(name)
+            given = {key: getattr(parameter, key) for key in parameter.given}
+            parameters[name] = parameter if old is None else replace(old, position=parameter.position, **given)
+        kept = [each for old in base.connections for each in self._kept(old, removed)]
         result = replace(
             text,
             doc=text.doc or base.doc,
-            parameters=dict(base.parameters),
+            parameters=parameters,
+            inputs=self._ports("input"),
+            outputs=self._ports("output"),
             director=base.director if text.director is None else text.director,
             actors=self._parts("actor", base.actors, text.actors),
             aspects=self._parts("aspect", self._still_aimed(removed), text.aspects),
+            connections=(*kept, *(each for each in text.connections if not each.removes)),
             is_wired=text.is_wired and base.is_wired,
             removed={**{name: at for name, at in base.removed.items() if name not in text.actors}, **removed},
             spoilt=text.spoilt or base.spoilt,
         )
-        for name, parameter in text.parameters.items():
-            old = base.parameters.get(name)
-            given = {key: getattr(parameter, key) for key in parameter.given}
-            result.parameters[name] = parameter if old is None else replace(old, position=parameter.position, **given)
-        result.inputs, result.outputs = self._ports("input"), self._ports("output")
         for name, part in result.actors.items():
             is_port = name in result.inputs or name in result.outputs
             # If both are new, it was told when the class was read.
             if is_port and (name in text.actors) != (name in text.inputs or name in text.outputs):
                 self._problem(f"{name!r} is the name of an actor and of a port", part.position, "rename one")
-        kept = [each for old in base.connections for each in self._kept(old, removed)]
-        result.connections = kept + [each for each in text.connections if not each.removes]
         self._check_removals()
         return result
 
@@ -191,7 +193,7 @@ class _Heir:
         """The base's aspects without the pointcuts at removed actors, and without those that lose all of them."""
         aspects = {}
         for name, part in self.base.aspects.items():
-            at = [pointcut for pointcut in part.at if _head(pointcut) not in removed]
+            at = tuple(pointcut for pointcut in part.at if _head(pointcut) not in removed)
             if at or not part.at or name in self.text.aspects:
                 aspects[name] = replace(part, at=at)
         return aspects
@@ -200,14 +202,14 @@ class _Heir:
         """What is left of a connection of the base's, in parts if only some of its pairs are taken away."""
         cut = {pair for each in self.text.connections if each.removes for pair in _pairs(each)}
         left = [
-            replace(connection, sources=[source], destinations=destinations)
+            replace(connection, sources=(source,), destinations=destinations)
             for source in connection.sources
             if (
-                destinations := [
+                destinations := tuple(
                     end
                     for end in connection.destinations
                     if (source.text, end.text) not in cut and _head(source) not in removed and _head(end) not in removed
-                ]
+                )
             )
         ]
         return [connection] if sum(map(len, map(_pairs, left))) == len(_pairs(connection)) else left

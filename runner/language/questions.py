@@ -7,16 +7,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from epicycle.actors import Parameter, ParameterError
 from epicycle.actors.expression import ExpressionError, Formula
 
 from ..catalogue import find, is_path, packaged_studies, unreadable
 from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence, Text, did_you_mean, inside, parse
 from ..text import Mapping as MappingNode
-from .declarations import CLAIM_KEYS, GUIDELINE_KEYS
 from .dimensions import Dimension, Factor, as_factor
+from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, names_of, node_as, number, ref
 
 if TYPE_CHECKING:
     from .study import Study
@@ -210,21 +209,20 @@ class QuestionReader(NodeReader):
 
     def claims(self, node: Node) -> tuple[Claim, ...]:
         """A mapping from names to claims."""
-        named = self.named({"claims": Entry(Scalar("", "", True, node.position), node)}, "claims")
-        found = (self.claim(name, entry) for name, entry in named)
+        found = (self.claim(name, entry) for name, entry in self.named(node, "claims"))
         return tuple(claim for claim in found if claim is not None)
 
     def claim(self, name: str, entry: Entry) -> Claim | None:
         """One claim: one of the forms, and what belongs to it."""
         before = len(self.problems)
         what, position = f"claim {name}", entry.key.position
-        entries = self.entries(entry.value, what, CLAIM_KEYS)
+        entries = CLAIM.entries(self, entry.value, what)
         if entries is None:
             return None
         forms = [form for form in FORMS if form in entries]
         if len(forms) != 1:
-            said = f"says {' and '.join(forms)} at once" if forms else "claims nothing"
-            self.problems.add(f"{what} {said}", position, f"give one of {', '.join(FORMS)}")
+            reason = f"says {' and '.join(forms)} at once" if forms else "claims nothing"
+            self.problems.add(f"{what} {reason}", position, f"give one of {', '.join(FORMS)}")
             return None
         form = forms[0]
         for key in entries.keys() - {"doc", form, *FORMS[form]}:
@@ -237,10 +235,9 @@ class QuestionReader(NodeReader):
             self.problems.add(f"{what} has no {key!r}", position, f"add {example!r} or the like")
         if len(self.problems) > before:
             return None
-        doc = (self.text(entries["doc"].value, "doc") or "") if "doc" in entries else ""
+        said = CLAIM.values(self, entries, what, position)
         where = self.selection(entries, "where", what)
-        share = self.number(entries, "share", what, 1.0, 0.5, 1.0)
-        condition, metrics = "", self.texts(entries[form].value, what)
+        condition, metrics = "", list(said.get(form, ())) if form != ALWAYS else []
         if form == ALWAYS:
             condition, metrics = self.condition(entries[form].value, what)
         elif not metrics and len(self.problems) == before:
@@ -257,7 +254,20 @@ class QuestionReader(NodeReader):
         per = self.trend(entries, "per", what)
         if len(self.problems) > before:
             return None
-        claim = Claim(name, form, tuple(metrics), position, doc, condition, at, than, over, per, where, share)
+        claim = Claim(
+            name,
+            form,
+            tuple(metrics),
+            position,
+            said.get("doc", ""),
+            condition,
+            at,
+            than,
+            over,
+            per,
+            where,
+            said.get("share", 1.0),
+        )
         self.compares(claim, position)
         return claim if len(self.problems) == before else None
 
@@ -380,7 +390,7 @@ class QuestionReader(NodeReader):
     def guideline(self, entry: Entry) -> Guideline | None:
         """``{choose: servers, least: mean_wait, tolerance: 0.5}``."""
         before = len(self.problems)
-        entries = self.entries(entry.value, "guideline", GUIDELINE_KEYS)
+        entries = GUIDELINE.entries(self, entry.value, "guideline")
         if entries is None:
             return None
         aims = [key for key in ("least", "greatest") if key in entries]
@@ -391,27 +401,13 @@ class QuestionReader(NodeReader):
                 "write {choose: servers, least: mean_wait}",
             )
             return None
-        name = self.text(entries["choose"].value, "choose")
-        metric = self.text(entries[aims[0]].value, aims[0])
-        at = entries["choose"].value.position
+        said = GUIDELINE.values(self, entries, "guideline", entry.key.position)
+        name, at = said.get("choose"), entries["choose"].value.position
         if name and self.is_factor(name, at, "guideline") and len(levels_of(self.dimensions, name)) < 2:
             self.problems.add(f"guideline: there is one level of {name} alone, and nothing to choose", at)
-        tolerance = self.number(entries, "tolerance", "guideline", 0.0, 0.0, None)
-        if len(self.problems) > before or name is None or metric is None:
+        if len(self.problems) > before:
             return None
-        return Guideline(name, Text(metric, entries[aims[0]].value.position), aims[0] == "greatest", tolerance)
-
-    def number(self, entries: Mapping[str, Entry], key: str, what: str, default: float, low: float, high: Any) -> float:
-        """A number within bounds."""
-        if key not in entries:
-            return default
-        node = entries[key].value
-        try:
-            value = Parameter(float, min=low, max=high).convert(node.value if isinstance(node, Scalar) else "a list")
-        except ParameterError as error:
-            self.problems.add(f"{what}: {key}: {error}", node.position)
-            return default
-        return default if value is None or not math.isfinite(value) else float(value)
+        return Guideline(said["choose"], said[aims[0]], aims[0] == "greatest", said.get("tolerance", 0.0))
 
 
 def _level(value: Factor) -> str:
@@ -424,3 +420,58 @@ def _shown(selection: Selection) -> str:
         shown = [_level(each) for each in levels]
         parts.append(f"{factor}={shown[0]}" if len(shown) == 1 else f"{factor}={', '.join(shown[:-1])} or {shown[-1]}")
     return " and ".join(parts)
+
+
+_METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})
+_LEVELS = node_as(
+    {
+        "type": "object",
+        "minProperties": 1,
+        "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]},
+    }
+)
+_FACTOR = node_as({"type": "string"})
+_TREND = "Metrics whose mean, or slope per unit of another factor, {} over the levels of a factor."
+CLAIM = Construct(
+    "A hypothesis on the results.",
+    {
+        "doc": Key(TEXT, "What is claimed, in words."),
+        LESS: Key(_METRICS, "Metrics whose mean is less at some levels than at others.", "{what}"),
+        GREATER: Key(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
+        RISES: Key(_METRICS, _TREND.format(RISES), "{what}"),
+        FALLS: Key(_METRICS, _TREND.format(FALLS), "{what}"),
+        ALWAYS: Key(node_as({"type": "string"}), "A condition on the metrics that holds in every run."),
+        "at": Key(_LEVELS, "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'."),
+        "than": Key(_LEVELS, "What they are compared with (default: all other levels, so that these are the best)."),
+        "over": Key(_FACTOR, "The factor over which something rises or falls."),
+        "per": Key(_FACTOR, "What rises or falls is the slope over this factor."),
+        "where": Key(_LEVELS, "The levels to which the claim is confined (default: all)."),
+        "share": Key(
+            number(float, 0.5, 1.0),
+            "In how many of the comparisons, or runs, it is to hold (default: 1, in all).",
+            "{what}: share",
+        ),
+    },
+    type="object",
+    oneOf=[{"required": [form, *(key for key in takes if key in ("at", "over"))]} for form, takes in FORMS.items()],
+)
+GUIDELINE = Construct(
+    "",
+    {
+        "choose": Key(
+            TEXT.described({"type": "string"}),
+            "The factor whose best level is wanted, for every combination of the others.",
+        ),
+        "least": Key(AT.described(ref("name")), "The metric that is to be least."),
+        "greatest": Key(AT.described(ref("name")), "The metric that is to be greatest."),
+        "tolerance": Key(
+            number(float, 0.0),
+            "How much worse than the best is good enough (default: 0).",
+            "guideline: tolerance",
+        ),
+    },
+    type="object",
+    required=["choose"],
+    oneOf=[{"required": ["least"]}, {"required": ["greatest"]}],
+)
+CLAIMS = node_as({"anyOf": [names_of(ref("claim")), {"type": "string"}]})

@@ -10,12 +10,14 @@ from pathlib import Path
 
 from ..text import (
     NAME,
+    NAMES_HAVE,
     NORMAL,
     Comparisons,
     Entry,
     Limits,
     Mapping,
     Node,
+    NodeReader,
     PatternError,
     Position,
     Problems,
@@ -24,6 +26,7 @@ from ..text import (
     Text,
     check_pattern,
     did_you_mean,
+    is_empty,
     matches,
     names_asked,
     names_of,
@@ -32,6 +35,7 @@ from ..text import (
     split,
 )
 from .declarations import ModelText, PartText, PointcutText
+from .fields import Shape
 
 
 @dataclass
@@ -101,6 +105,20 @@ def read_overrides(path: Path, problems: Problems) -> list[Setting]:
         )
         return []
     return settings_in(node, problems)
+
+
+def settings_like(example: str) -> Shape:
+    """A mapping from paths or patterns to values; an example of a line is for those who write something else."""
+
+    def read_settings(reader: NodeReader, node: Node, what: str) -> tuple[Setting, ...]:
+        if isinstance(node, Mapping):
+            return tuple(settings_in(node, reader.problems))
+        if not is_empty(node):
+            message = f"{what} is not a mapping from parameters to values"
+            reader.problems.add(message, node.position, f"write lines like {example!r}")
+        return ()
+
+    return Shape({"type": ["object", "null"]}, read_settings)
 
 
 def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
@@ -193,7 +211,7 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
         return
     name = name.strip()
     values: dict[str, Entry] = {}
-    at: list[PointcutText] | None = None
+    at: tuple[PointcutText, ...] | None = None
     for part, (_, end) in zip(parts[1:], places[1:], strict=True):
         key, equals, value = part.partition("=")
         key = key.strip()
@@ -209,10 +227,10 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
             return
         values[key] = Entry(Scalar(key, key, True, position), _within(node, option))
     if not NAME.match(name):
-        problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+        problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
         return
     enabled = values.pop("enabled").value if "enabled" in values else None
-    put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or [], enabled))
+    put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or (), enabled))
 
 
 def put_aspect(text: ModelText, part: PartText) -> None:
@@ -227,7 +245,7 @@ def put_aspect(text: ModelText, part: PartText) -> None:
     text.root.aspects[part.name] = part
 
 
-def _pointcuts(value: str, option: str, offset: int) -> list[PointcutText]:
+def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]:
     """``port`` or ``[port, port]``, read without YAML, to which ``[observer[*].plan]`` would be a broken list."""
     if value.startswith("[") and value.endswith("]"):
         value, offset = value[1:-1], offset + 1
@@ -236,4 +254,4 @@ def _pointcuts(value: str, option: str, offset: int) -> list[PointcutText]:
         text = value[start:end].strip(" '\"")
         column = offset + start + value[start:end].find(text) + 1
         found.append(PointcutText.of(Text(text, Position("command line", 1, column, max(1, len(text)), option))))
-    return found
+    return tuple(found)

@@ -1,34 +1,23 @@
-"""What a study file says: read with positions, all that is misshapen told at once."""
+"""What a study file says: the keys of a study, and what reads them, all that is misshapen told at once."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..catalogue import find, is_path, packaged_disturbances, packaged_models, packaged_studies, unreadable
-from ..text import (
-    MAX_SEED,
-    Entry,
-    Mapping,
-    Node,
-    NodeReader,
-    Position,
-    Problems,
-    Scalar,
-    did_you_mean,
-    is_empty,
-    parse,
-    read,
-)
-from .declarations import STUDY_KEYS, STUDY_METRIC_KEYS, UNTIL_KEYS, DeclarationReader, PartText
+from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Problems, Scalar, did_you_mean, parse, read
+from .declarations import PartText
 from .dimensions import Dimension, Level, Listed
 from .disturbance import find_disturbance
-from .questions import QuestionReader, Questions, without
-from .settings import Setting, parse_setting, settings_in
+from .fields import FLAG, LABEL, NAMED, TEXT, Construct, Key, Shape, names_of, node_as, number, one_or_more, ref
+from .models import parts
+from .questions import CLAIMS, GUIDELINE, QuestionReader, Questions, without
+from .settings import Setting, parse_setting, settings_like
 from .study_metric import StudyMetric, checked_metric
-from .variation import DimensionReader
+from .variation import DIMENSIONS
 
 LARGE = 10_000_000  # bytes of a file
 MAX_REPLICATIONS = 10**9
@@ -36,18 +25,18 @@ MAX_STUDY_SEED = MAX_SEED - MAX_REPLICATIONS
 RESERVED = ("run", "condition", "replication", "seed", "status", "events", "digest", "error", "wall_time", "replay")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Until:
     """Replications go on, ``batch`` by batch, until the 95 % interval of a metric's mean is narrow enough."""
 
     metric: str
-    half_width: float
-    batch: int
-    at_most: int
     position: Position
+    half_width: float = 1.0
+    batch: int = 10
+    at_most: int = 1000
 
 
-@dataclass
+@dataclass(frozen=True)
 class Study:
     """A model, the conditions under which it is run, and what is kept of each run; as its file says, not yet tried."""
 
@@ -56,13 +45,13 @@ class Study:
     text: str
     model: str  # a path, or the name of a packaged model
     doc: str = ""
-    fixed: list[Setting] = field(default_factory=list)
-    dimensions: list[Dimension] = field(default_factory=list)
+    fixed: tuple[Setting, ...] = ()
+    dimensions: tuple[Dimension, ...] = ()
     replications: int = 1
     seed: int = 0
     paired: bool = True
     until: Until | None = None
-    metrics: list[StudyMetric] | None = None  # None: all of the model
+    metrics: tuple[StudyMetric, ...] | None = None  # None: all of the model
     figures: dict[str, PartText] | None = None  # None: those that suit the table
     questions: Questions = field(default_factory=Questions)
     changes: tuple[str, ...] = ()  # --set, as given
@@ -143,20 +132,23 @@ def _made(
     study = reader.study(node, text)
     problems.raise_if_any()
     assert study is not None, "what is no study is a problem"
-    if replications is not None:
-        study.replications = replications
-    if seed is not None:
-        study.seed = seed
-    study.changes, study.types = changes, types
+    fixed = list(study.fixed)
     for change in changes:
         setting = parse_setting(change, problems)
         if setting is None:
             continue
         if setting.path in study.factors:
             problems.add(f"--set {change}: {setting.path} is what the study varies", None, "change it in the study")
-        study.fixed.append(setting)
+        fixed.append(setting)
     problems.raise_if_any()
-    return study
+    return replace(
+        study,
+        replications=study.replications if replications is None else replications,
+        seed=study.seed if seed is None else seed,
+        fixed=tuple(fixed),
+        changes=changes,
+        types=types,
+    )
 
 
 class _StudyReader(NodeReader):
@@ -186,51 +178,19 @@ class _StudyReader(NodeReader):
                 f"{self.path} is no study", node.position, "a study begins with a line like 'study: my_study'"
             )
             return None
-        entries = self.entries(node, "the study", STUDY_KEYS)
+        entries = STUDY.entries(self, node, "the study")
         if entries is None:
             return None
-        study = Study("study", self.path, text, "")
-        for key, example in (("study", "study: my_study"), ("model", "model: mm1")):
-            if key not in entries:
-                self.problems.add(
-                    "the study has no name" if key == "study" else "the study does not say which model it runs",
-                    node.position,
-                    f"add a line like '{example}'",
-                )
-        if "study" in entries:
-            study.name = self.name(entries["study"].value, "the study's name") or study.name
-        if "model" in entries:
-            study.model = self.model(entries["model"].value)
-        if "doc" in entries:
-            study.doc = self.text(entries["doc"].value, "doc") or ""
-        if "set" in entries and isinstance(entries["set"].value, Mapping):
-            study.fixed = settings_in(entries["set"].value, self.problems)
-        elif "set" in entries and not is_empty(entries["set"].value):
-            self.problems.add(
-                "set is not a mapping from parameters to values",
-                entries["set"].value.position,
-                "write lines like 'observer[*].sensor.range: 5 m'",
-            )
-        study.replications = self.number(entries, "replications", int, 1, 1, MAX_REPLICATIONS)
-        study.seed = self.number(entries, "seed", int, 0, 0, MAX_STUDY_SEED)
-        study.paired = self.flag(entries, "paired", True)
-        if "vary" in entries:
-            study.dimensions = DimensionReader(self.problems).vary(entries["vary"].value)
-        if "disturb" in entries:
-            study.dimensions += self.disturb(entries["disturb"])
-        if "metrics" in entries:
-            study.metrics = self.metrics(entries["metrics"].value)
-        if "until" in entries:
-            study.until = self.until(entries["until"].value, study)
-        if "figures" in entries:
-            reader = DeclarationReader(self.problems)
-            parts = (reader.part(name, entry, "figure") for name, entry in self.named(entries, "figures"))
-            study.figures = {part.name: part for part in parts if part is not None}
+        said = STUDY.values(self, entries, "the study", node.position)
+        said.pop("claims", None), said.pop("guideline", None)  # which are read when all else is known
+        said["dimensions"] = (*said.get("dimensions", ()), *said.pop("disturb", ()))
+        study = Study(said.pop("name", "study"), self.path, text, said.pop("model", ""), **said)
         before = len(self.problems)
         self.columns(study)
-        if len(self.problems) == before:
-            study.questions = QuestionReader(self.problems, study, self.factors_of).questions(entries, self.lender)
-        return study
+        if len(self.problems) > before:
+            return study
+        reader = QuestionReader(self.problems, study, self.factors_of)
+        return replace(study, questions=reader.questions(entries, self.lender))
 
     def factors_of(self, node: Node, path: Path, problems: Problems) -> dict[str, str]:
         """What another study varies, whose claims this one judges."""
@@ -240,19 +200,9 @@ class _StudyReader(NodeReader):
 
     # -- values ---------------------------------------------------------------------------------------------------
 
-    def flag(self, entries: dict[str, Entry], key: str, default: bool) -> bool:
-        """True or false."""
-        if key not in entries:
-            return default
-        node = entries[key].value
-        if isinstance(node, Scalar) and isinstance(node.value, bool):
-            return node.value
-        self.problems.add(f"{key} is neither true nor false", node.position)
-        return default
-
-    def model(self, node: Node) -> str:
+    def model(self, node: Node, what: str) -> str:
         """A packaged model's name, or a file's name as seen from the study's folder."""
-        name = self.text(node, "the model") or ""
+        name = self.text(node, what) or ""
         if is_path(name):
             file = self.path.parent / name
             reason = unreadable(file) if self.asks_for_files else ""
@@ -271,13 +221,12 @@ class _StudyReader(NodeReader):
             )
         return name
 
-    def disturb(self, entry: Entry) -> list[Dimension]:
+    def disturb(self, node: Node, what: str) -> list[Dimension]:
         """Variants by name, ``{none: [], wifi: wifi_burst}``, or a list in which each is a variant of its own."""
-        node = entry.value
         if isinstance(node, Mapping):
             variants = {name: self.texts(each.value, "a disturbance") for name, each in node.entries.items()}
         else:
-            texts = self.texts(node, "disturb")
+            texts = self.texts(node, what)
             variants = {Path(text.text).stem: [text] for text in texts}
         levels = []
         for variant, texts in variants.items():
@@ -298,60 +247,50 @@ class _StudyReader(NodeReader):
                     )
                 names.append(name)
             levels.append(Level((), {"disturb": variant}, tuple(names)))
-        return [Listed("disturb", entry.key.position, {"disturb": "text"}, levels)] if levels else []
+        return [Listed(what, node.position, {"disturb": "text"}, levels)] if levels else []
 
     # -- what is kept ---------------------------------------------------------------------------------------------
 
-    def metrics(self, node: Node) -> list[StudyMetric]:
+    def metrics(self, node: Node, what: str) -> tuple[StudyMetric, ...]:
         """A list of names, or a mapping from names to expressions."""
-        found = []
+        found: list[StudyMetric | None] = []
         if isinstance(node, Mapping):
-            for name, entry in self.named({"metrics": Entry(Scalar("", "", True, node.position), node)}, "metrics"):
-                if (metric := self.metric(name, entry)) is not None:
-                    found.append(metric)
-            return found
-        for item in self.items(node, "metrics") or ():
-            metric_name = self.name(item, "the metric")
-            if metric_name is None or not isinstance(item, Scalar):
-                continue
-            if (metric := checked_metric(metric_name, item, self.problems)) is not None:
-                found.append(metric)
-        return found
+            found += [self.metric(name, entry) for name, entry in self.named(node, what)]
+        else:
+            for item in self.items(node, what) or ():
+                if (name := self.name(item, "the metric")) is not None and isinstance(item, Scalar):
+                    found.append(checked_metric(name, item, self.problems))
+        return tuple(each for each in found if each is not None)
 
     def metric(self, name: str, entry: Entry) -> StudyMetric | None:
         """An expression, or ``{value: expression, unit: s, to: min, doc: ...}``."""
         if isinstance(entry.value, Scalar):
             return checked_metric(name, entry.value, self.problems)
-        if not isinstance(entry.value, Mapping):
-            self.problems.add(f"metric {name!r} is not an expression", entry.value.position)
-            return None
-        inner = self.entries(entry.value, f"metric {name!r}", STUDY_METRIC_KEYS) or {}
-        if "value" not in inner or is_empty(inner["value"].value):
-            self.problems.add(f"metric {name!r} has no value", entry.key.position, "add 'value: ...', an expression")
-            return None
-        value = inner.pop("value").value
-        said = {key: text for key, each in inner.items() if (text := self.text(each.value, key)) is not None}
-        places = {key: each.value.position for key, each in inner.items()}
-        if not isinstance(value, Scalar):
-            self.problems.add(f"metric {name!r} is not an expression", value.position)
-            return None
-        return checked_metric(name, value, self.problems, said, places)
+        value: Node | None = entry.value
+        what, said, places = f"metric {name!r}", {}, {}
+        if isinstance(entry.value, Mapping):
+            entries = METRIC.entries(self, entry.value, what) or {}
+            said = METRIC.values(self, entries, what, entry.key.position)
+            places = {key: each.value.position for key, each in entries.items()}
+            value = said.pop("value", None)
+        if isinstance(value, Scalar):
+            return checked_metric(name, value, self.problems, said, places)
+        if value is not None:
+            self.problems.add(f"{what} is not an expression", value.position)
+        return None
 
-    def until(self, node: Node, study: Study) -> Until | None:
+    def until(self, node: Node, what: str) -> Until | None:
         """``{metric: mean_wait, half_width: 0.1, batch: 10, at_most: 1000}``."""
-        entries = self.entries(node, "until", UNTIL_KEYS) or {}
-        for key in ("metric", "half_width"):
-            if key not in entries:
-                self.problems.add(
-                    f"until has no {key!r}", node.position, "write {metric: mean_wait, half_width: 0.1, at_most: 1000}"
-                )
+        entries = UNTIL.entries(self, node, what) or {}
+        said = UNTIL.values(self, entries, what, node.position)
         if not {"metric", "half_width"} <= entries.keys():
             return None
-        metric = self.text(entries["metric"].value, "metric") or ""
-        half_width = self.number(entries, "half_width", float, 1.0, 0.0, None)
-        batch = self.number(entries, "batch", int, 10, 2, MAX_REPLICATIONS)
-        at_most = self.number(entries, "at_most", int, max(1000, batch), batch, MAX_REPLICATIONS)
-        return Until(metric, half_width, batch, at_most, entries["metric"].value.position)
+        least = said.get("batch", 10)
+        at_most = None
+        if (given := said.pop("at_most", None)) is not None:  # no less than a batch
+            at_most = number(int, least, MAX_REPLICATIONS).read(self, given, "at_most")
+        metric, at = said.pop("metric", ""), entries["metric"].value.position
+        return Until(metric, at, **said, at_most=at_most or max(1000, least))
 
     def columns(self, study: Study) -> None:
         """Every column of the table has a name of its own."""
@@ -371,3 +310,100 @@ class _StudyReader(NodeReader):
                     "give it another name: metrics: {name: expression}",
                 )
             seen[metric.name] = metric.node.position
+
+
+_HAS_NO = (
+    "{what} has no {key!r}",
+    "write {{metric: mean_wait, half_width: 0.1, at_most: 1000}}",
+)
+UNTIL = Construct(
+    "",
+    {
+        "metric": Key(TEXT.described(ref("name")), "The metric whose mean is wanted.", missing=_HAS_NO),
+        "half_width": Key(
+            number(float, 0.0), "Half the width of its 95 % interval that is narrow enough.", missing=_HAS_NO
+        ),
+        "batch": Key(number(int, 2, MAX_REPLICATIONS), "How many replications are made at a time (default: 10)."),
+        "at_most": Key(
+            node_as(number(int, 2, MAX_REPLICATIONS).schema), "The most replications of a condition (default: 1000)."
+        ),
+    },
+    type="object",
+    required=["metric", "half_width"],
+)
+METRIC = Construct(
+    "A number that is kept of each run.",
+    {
+        "value": Key(
+            node_as(LABEL),
+            "The expression, over metrics of the model and what else a run tells.",
+            missing=("{what} has no value", "add 'value: ...', an expression"),
+        ),
+        "unit": Key(TEXT, "What it counts in; a metric of the model has its own."),
+        "to": Key(TEXT, "The unit in which the table holds it (default: the same)."),
+        "doc": Key(TEXT, "What it is."),
+    },
+    type="object",
+    required=["value"],
+)
+_METRICS = {
+    "anyOf": [
+        names_of({"anyOf": [LABEL, METRIC.schema]}),
+        {"type": "array", "items": ref("name")},
+    ]
+}
+_DISTURB = {"anyOf": [{"type": "object", "additionalProperties": one_or_more({"type": "string"})}, ref("texts")]}
+STUDY = Construct(
+    "A model under many conditions.",
+    {
+        "study": Key(
+            NAMED,
+            "The name of the study.",
+            "the study's name",
+            missing=("the study has no name", "add a line like 'study: my_study'"),
+            name="name",
+        ),
+        "doc": Key(TEXT, "What it is to find out."),
+        "model": Key(
+            Shape({"type": "string"}, _StudyReader.model),
+            "A packaged model, or the path of a file as seen from this one.",
+            "the model",
+            missing=("the study does not say which model it runs", "add a line like 'model: mm1'"),
+        ),
+        "set": Key(
+            settings_like("observer[*].sensor.range: 5 m"),
+            "Values for parameters of the model in all runs: 'path: value'.",
+            name="fixed",
+        ),
+        "vary": Key(
+            DIMENSIONS,
+            "What is varied; every value goes together with every one of the others.",
+            name="dimensions",
+        ),
+        "disturb": Key(
+            Shape(_DISTURB, _StudyReader.disturb),
+            "Disturbances as one more dimension: 'name: [disturbance, ...]', or a list of single ones.",
+        ),
+        "replications": Key(number(int, 1, MAX_REPLICATIONS), "How many runs each condition has (default: 1)."),
+        "seed": Key(number(int, 0, MAX_STUDY_SEED), "The seed of the first replication (default: 0)."),
+        "paired": Key(FLAG, "Whether a replication has the same seed in all conditions (default: true)."),
+        "until": Key(
+            Shape(UNTIL.schema, _StudyReader.until),
+            "How many replications each condition gets, in place of a fixed number.",
+        ),
+        "metrics": Key(
+            Shape(_METRICS, _StudyReader.metrics),
+            "What is kept of each run: names of the model's metrics, or 'name: expression', or "
+            "'name: {value, unit, ...}'.",
+        ),
+        "claims": Key(CLAIMS, "Hypotheses on the results, by name; or the study whose claims are judged here, too."),
+        "guideline": Key(
+            node_as(GUIDELINE.schema), "Which level of a factor to choose, for every combination of the others."
+        ),
+        "figures": Key(
+            parts("figure", "study_figure"),
+            "What the report shows: 'name: {type, ...}' (default: means and distributions of all metrics).",
+        ),
+    },
+    required=["model"],
+)

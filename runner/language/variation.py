@@ -7,8 +7,8 @@ from decimal import Decimal
 from epicycle.actors import UnitError, parse_unit, random_stream
 
 from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Sequence, is_empty
-from .declarations import HYPERCUBE_KEYS, RANGE_KEYS
 from .dimensions import Dimension, Level, Listed, Ranged, as_factor, in_si, kind_of, number_node, split_number
+from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, number, ref
 from .settings import Setting, is_pattern, settings_in
 
 MAX_LEVELS = 10**12  # of a range
@@ -18,15 +18,15 @@ MAX_SAMPLES = 100_000  # of a Latin hypercube, which is made as a whole
 class DimensionReader(NodeReader):
     """Reads what stands below ``vary``; whatever is misshapen is added to ``problems`` and left out."""
 
-    def vary(self, node: Node) -> list[Dimension]:
+    def vary(self, node: Node, what: str) -> tuple[Dimension, ...]:
         """An ordered mapping of dimensions."""
         if is_empty(node):
-            return []
+            return ()
         if not isinstance(node, Mapping):
-            self.problems.add("vary is not a mapping", node.position, "write lines like 'load: [0.5, 0.75, 0.9]'")
-            return []
+            self.problems.add(f"{what} is not a mapping", node.position, "write lines like 'load: [0.5, 0.75, 0.9]'")
+            return ()
         found = (self.dimension(name, entry) for name, entry in node.entries.items())
-        return [dimension for dimension in found if dimension is not None]
+        return tuple(dimension for dimension in found if dimension is not None)
 
     def dimension(self, name: str, entry: Entry) -> Dimension | None:
         """A list, a range, or a mapping with the key zip, cases or latin_hypercube."""
@@ -38,7 +38,7 @@ class DimensionReader(NodeReader):
             for form, reader in (("zip", self.zipped), ("cases", self.cases), ("latin_hypercube", self.hypercube)):
                 if form in keys and len(keys) == 1:
                     return reader(name, position, node.entries[form].value)
-            if keys & set(RANGE_KEYS):
+            if keys & RANGE.keys.keys():
                 return self.ranged(name, position, node)
         self.problems.add(
             f"{name!r} does not say what values it takes",
@@ -108,10 +108,10 @@ class DimensionReader(NodeReader):
         """``{from: 0, to: 0.5, step: 0.1}``; the end counts if a step falls on it."""
         before = len(self.problems)
         is_pattern(name, position, self.problems)
-        entries = self.entries(node, f"the range of {name!r}", RANGE_KEYS) or {}
+        entries = RANGE.entries(self, node, f"the range of {name!r}") or {}
         numbers: dict[str, Decimal] = {}
         units: dict[str, None] = {}
-        for key in RANGE_KEYS:
+        for key in RANGE.keys:
             if key not in entries:
                 self.problems.add(f"the range of {name!r} has no {key!r}", node.position)
             elif (number := self.quantity(entries[key].value, f"{key} of {name!r}")) is not None:
@@ -119,7 +119,7 @@ class DimensionReader(NodeReader):
                 units[number[1]] = None
         if len(self.problems) > before:
             return None
-        start, end, step = (numbers[key] for key in RANGE_KEYS)
+        start, end, step = (numbers[key] for key in RANGE.keys)
         at = entries["step"].value.position
         if len(units) > 1:
             self.problems.add(f"the range of {name!r} has more than one unit", node.position, "write the same for all")
@@ -163,7 +163,7 @@ class DimensionReader(NodeReader):
     def hypercube(self, name: str, position: Position, node: Node) -> Dimension | None:
         """Points that fill a box evenly: of ``size`` slices of each range, each is met by one point."""
         before = len(self.problems)
-        entries = self.entries(node, f"latin_hypercube of {name!r}", HYPERCUBE_KEYS) or {}
+        entries = HYPERCUBE.entries(self, node, f"latin_hypercube of {name!r}") or {}
         if "size" not in entries or "ranges" not in entries:
             self.problems.add(
                 f"latin_hypercube of {name!r} needs 'size' and 'ranges'",
@@ -171,8 +171,8 @@ class DimensionReader(NodeReader):
                 "write {size: 20, seed: 1, ranges: {load: [0.1, 0.9]}}",
             )
             return None
-        size = self.number(entries, "size", int, 1, 1, MAX_SAMPLES)
-        seed = self.number(entries, "seed", int, 0, 0, MAX_SEED)
+        said = HYPERCUBE.values(self, entries, "", position)
+        size, seed = said.get("size", 1), said.get("seed", 0)
         box = entries["ranges"].value
         if not isinstance(box, Mapping) or not box.entries:
             self.problems.add(f"ranges of {name!r} is not a mapping from parameters to [low, high]", box.position)
@@ -203,3 +203,76 @@ class DimensionReader(NodeReader):
                 values[path] = in_si(value, unit)
             levels.append(Level(tuple(settings), dict(values)))
         return Listed(name, position, dict.fromkeys(bounds, "float"), levels)
+
+
+_QUANTITY = node_as(QUANTITY_SCHEMA)
+RANGE = Construct(
+    "Values at equal distances.",
+    {
+        "from": Key(_QUANTITY, "The first value."),
+        "to": Key(_QUANTITY, "The last value, if a step falls on it."),
+        "step": Key(_QUANTITY, "The distance between two values."),
+    },
+    type="object",
+    required=["from", "to", "step"],
+)
+HYPERCUBE = Construct(
+    "",
+    {
+        "size": Key(number(int, 1, MAX_SAMPLES), "The number of points."),
+        "seed": Key(number(int, 0, MAX_SEED), "What the points are drawn from (default: 0)."),
+        "ranges": Key(
+            node_as(
+                {
+                    "type": "object",
+                    "additionalProperties": {
+                        "type": "array",
+                        "items": QUANTITY_SCHEMA,
+                        "minItems": 2,
+                        "maxItems": 2,
+                    },
+                }
+            ),
+            "'path: [low, high]' for each parameter.",
+        ),
+    },
+    required=["size", "ranges"],
+)
+DIMENSIONS = Shape(
+    {"type": ["object", "null"], "additionalProperties": ref("dimension")},
+    lambda reader, node, what: DimensionReader(reader.problems).vary(node, what),
+)
+
+
+def dimension_schema() -> Schema:
+    """What editors know of one of the forms in which a study says what values something takes."""
+    some = {"type": "object", "minProperties": 1}
+    forms = (
+        (
+            "zip",
+            {**some, "additionalProperties": {"type": "array", "minItems": 1}},
+            "Parameters that go together: 'path: [value, ...]', all of one length.",
+        ),
+        (
+            "cases",
+            {**some, "additionalProperties": {"type": ["object", "null"]}},
+            "Named sets of values: 'name: {path: value}'.",
+        ),
+        ("latin_hypercube", HYPERCUBE.schema, "Points that fill a box evenly."),
+    )
+    return {
+        "description": "The values of a parameter, or of several that go together.",
+        "anyOf": [
+            {"type": "array", "minItems": 1},
+            RANGE.schema,
+            *(
+                {
+                    "type": "object",
+                    "properties": {key: {**schema, "description": description}},
+                    "required": [key],
+                    "additionalProperties": False,
+                }
+                for key, schema, description in forms
+            ),
+        ],
+    }

@@ -28,7 +28,7 @@ from .problems import (
     told_raised,
     visible,
 )
-from .reading import NAME, SURE, NodeReader, Text, inside, is_empty, split, within
+from .reading import NAME, NAMES_HAVE, SURE, NodeReader, Text, inside, is_empty, split, within
 from .site import call_site, entries_of, node_of
 
 __all__ = [
@@ -37,6 +37,7 @@ __all__ = [
     "MAX_PROBLEMS",
     "MAX_SEED",
     "NAME",
+    "NAMES_HAVE",
     "NORMAL",
     "RAISE_IT",
     "SURE",

@@ -5,18 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
-
-from epicycle.actors import Parameter, ParameterError
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import Position, Problems, did_you_mean, nearest
 
 SURE = 0.75  # how like a key must be to the one that it is taken for
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+NAMES_HAVE = "use letters, digits and _, no digit first"
 
 
-@dataclass
+@dataclass(frozen=True, slots=True)
 class Text:
     """A piece of text and where it stands."""
 
@@ -53,35 +51,19 @@ class NodeReader:
                     known.setdefault(meant, entry)
         return known
 
-    def number(self, entries: dict[str, Entry], key: str, kind: Any, default: Any, low: Any, high: Any) -> Any:
-        """A number within bounds."""
-        if key not in entries:
-            return default
-        node = entries[key].value
-        try:
-            return Parameter(kind, min=low, max=high).convert(node.value if isinstance(node, Scalar) else "a list")
-        except ParameterError as error:
-            self.problems.add(f"{key}: {error}", node.position)
-            return default
-
-    def named(self, entries: dict[str, Entry], key: str) -> list[tuple[str, Entry]]:
+    def named(self, node: Node, what: str) -> list[tuple[str, Entry]]:
         """The entries of a mapping from names to things."""
-        if key not in entries:
-            return []
-        node = entries[key].value
         if is_empty(node):
             return []
         if not isinstance(node, Mapping):
-            self.problems.add(f"{key} is not a mapping from names", node.position)
+            self.problems.add(f"{what} is not a mapping from names", node.position)
             return []
         found = []
         for name, entry in node.entries.items():
             if NAME.match(name):
                 found.append((name, entry))
             else:
-                self.problems.add(
-                    f"{name!r} is not a name", entry.key.position, "use letters, digits and _, no digit first"
-                )
+                self.problems.add(f"{name!r} is not a name", entry.key.position, NAMES_HAVE)
         return found
 
     def items(self, node: Node, what: str) -> tuple[Node, ...] | None:
@@ -112,9 +94,7 @@ class NodeReader:
     def name(self, node: Node, what: str) -> str | None:
         text = self.text(node, what)
         if text is not None and not NAME.match(text):
-            self.problems.add(
-                f"{what} {text!r} is not a name", node.position, "use letters, digits and _, no digit first"
-            )
+            self.problems.add(f"{what} {text!r} is not a name", node.position, NAMES_HAVE)
             return None
         return text
 

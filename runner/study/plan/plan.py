@@ -104,8 +104,8 @@ class Plan:
                 if more := {name: digest for name, digest in found.items() if sources.get(name) != digest}:
                     extra[number][index] = more
         problems.raise_if_any()
-        metrics = study.metrics
-        if metrics is None:
+        metrics = list(study.metrics or ())
+        if study.metrics is None:
             metrics = [StudyMetric(metric.name, metric.name) for metric in read.models[0].metrics]
         for metric in metrics:
             check_metric(metric, read.models, problems)

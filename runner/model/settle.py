@@ -1,17 +1,26 @@
-"""The values of parameters: what is set from outside goes before what is given, and this before the default."""
+"""Settling parameters: what is set from outside goes before what is given, and this before the default."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
+from typing import Any
 
-from epicycle.actors import Configurable, EpicycleError, ParameterError, declared_parameters, unknown_parameter
+from epicycle.actors import (
+    Configurable,
+    EpicycleError,
+    Parameter,
+    ParameterError,
+    declared_parameters,
+    to_nanoseconds,
+    unknown_parameter,
+)
 
-from ..language import CompositeText, Setting, Settings, Values
+from ..language import CompositeText, PartText, Setting, Settings, Values
 from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, TooManyError, data_file, did_you_mean, nearest
 from .culprit import describe, raised_at
-from .graph import ModelGraph
+from .draft import Draft
 
 _INDEX = re.compile(r"\[(\d+|\*)\]")
 # What people may try to set, and how it is done.
@@ -25,17 +34,16 @@ _NO_PARAMETERS = {
 }
 
 
-class Configurator:
+class Settler:
     """Finds the values of all parameters of a model, and what is wrong with them."""
 
-    def __init__(self, settings: Settings, problems: Problems) -> None:
+    def __init__(self, settings: Settings, problems: Problems, values: Values | None = None) -> None:
         self.settings = settings
         self.problems = problems
-        self.graph = ModelGraph()
-        self.values = Values(problems)
-        self.settable: dict[str, None] = {}
+        self.values = values or Values(problems)
+        self._settable: dict[str, None] = {}
 
-    def _parameters(
+    def parameters(
         self,
         path: str,
         composite: CompositeText,
@@ -81,7 +89,7 @@ class Configurator:
 
     def _setting(self, full: str) -> Setting | None:
         """The setting for a parameter, if there is one."""
-        self.settable[full] = None
+        self._settable[full] = None
         try:
             return self.settings.find(full)
         except TooManyError as error:
@@ -89,21 +97,18 @@ class Configurator:
             self.problems.raise_if_any()
             raise AssertionError("too many paths are a problem") from None
 
-    def _set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
+    def set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
         """The parameters of something that is made already which are set from outside, with their new values."""
         changed: dict[str, object] = {}
         for name, parameter in declared_parameters(type(part)).items():
             setting = self._setting(f"{path}.{name}")
-            value = None if setting is None else self.values.of(setting.node, self.values.outside, f"{path}.{name}")
-            if setting is None or value is self.values.missing:
-                continue
-            try:
-                changed[name] = parameter.convert(value)
-            except ParameterError as error:
-                self.problems.add(f"{path}.{name}: {error}", place_of(setting.node, error.keys, of_key=error.of_key))
+            if setting is not None:
+                label = f"{path}.{name}"
+                value = converted(self.values, setting.node, self.values.outside, label, "", parameter.convert)
+                changed |= {} if value is self.values.missing else {name: value}
         return changed
 
-    def _configuration(
+    def configuration(
         self,
         label: str,
         cls: type,
@@ -153,10 +158,18 @@ class Configurator:
                     f"{label}.{name}: {error}", place_of(node, error.keys, of_key=error.of_key), scope=composite
                 )
             except Exception as error:  # of a class of a user's
-                self._blame(f"{label}.{name}", error, node.position, composite)
+                self.blame(f"{label}.{name}", error, node.position, composite)
         return result if complete and len(self.problems) == before else None
 
-    def _blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
+    def is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
+        """Whether an aspect is to act; one of which that is not known is."""
+        if part.enabled is None:
+            return True
+        convert = Parameter(bool).convert
+        found = converted(self.values, part.enabled, names, f"aspect {name}.enabled", scope, convert)
+        return found is self.values.missing or bool(found)
+
+    def blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
         """Tell what the code of a class has against its values, or how it failed."""
         if isinstance(error, EpicycleError):
             self.problems.add(f"{label}: {error}", position, scope=scope)
@@ -166,11 +179,14 @@ class Configurator:
             f"{label}: {told or describe(error)}", position, scope=scope, raised=raised_at(error), cause=error
         )
 
+    def check_unused(self, draft: Draft) -> None:
+        """Add a problem for every setting that no parameter took, unless it is meant for an array that is empty now."""
+        for setting in self.settings.unused():
+            if not draft.excuses(setting.path):
+                self._add_unused(setting)
+
     def _add_unused(self, setting: Setting) -> None:
-        """A setting that no parameter took, unless it is meant for an array that is empty now."""
-        if self.graph.is_excused(setting.path):
-            return
-        known = list(dict.fromkeys(_in_terms_of(setting.path, path) for path in self.settable))
+        known = list(dict.fromkeys(_in_terms_of(setting.path, path) for path in self._settable))
         owner, _, last = setting.path.rpartition(".")
         beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
         if last in _NO_PARAMETERS and last not in beside:
@@ -193,6 +209,39 @@ def _in_terms_of(pattern: str, path: str) -> str:
         if bracket and (wanted == name or wanted.endswith("[*]")):
             parts[place] = f"{name}[*]"
     return ".".join(parts)
+
+
+def nanoseconds(duration: object) -> int:
+    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
+    seconds: Any = Parameter(float, unit="s", min=0.0).convert(duration)
+    return to_nanoseconds(seconds or 0.0)
+
+
+def local_nanoseconds(start: object) -> int:
+    """The same for the start of a composite's local time, which may be negative."""
+    return to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
+
+
+def drift(value: object) -> float:
+    """How fast local time goes; raises ``ParameterError``."""
+    found: Any = Parameter(float, unit="1", min=1e-6, max=1e6).convert(value)
+    return 1.0 if found is None else float(found)
+
+
+def converted(
+    values: Values, node: Node, names: dict[str, object], label: str, scope: str, convert: Callable[[Any], Any]
+) -> Any:
+    """A value as ``convert`` makes it; ``missing``, and a problem, if that cannot be."""
+    value = values.of(node, names, label, scope)
+    if value is not values.missing:
+        try:
+            return convert(value)
+        except ParameterError as error:
+            place = place_of(node, error.keys, of_key=error.of_key)
+            values.problems.add(f"{label}: {error}", place, scope=scope)
+        except ValueError as error:
+            values.problems.add(f"{label}: {error}", node.position, scope=scope)
+    return values.missing
 
 
 def place_of(node: Node, keys: tuple[str, ...], *, of_key: bool) -> Position:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, to_nanoseconds, type_name
+from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, type_name
 
 from ..catalogue import Measure
 from ..language import DeclarationReader, MetricText, ModelText, Values
@@ -24,14 +24,14 @@ from ..text import (
     did_you_mean,
     plain,
 )
-
-if TYPE_CHECKING:
-    from .model import Model
+from .draft import Draft
+from .graph import is_within
+from .settle import converted, nanoseconds
 
 # Larger seeds could not be told apart in the int64 columns of result files.
 
 
-@dataclass
+@dataclass(frozen=True)
 class Metric:
     """A number taken from what some ports send together."""
 
@@ -39,49 +39,62 @@ class Metric:
     ports: list[str]
     measure: Measure
 
+    def without(self, path: str) -> Metric:
+        """The metric when a part of the model is taken out that it watched, too."""
+        return replace(self, ports=[port for port in self.ports if not is_within(port, path)])
+
     @property
     def unit(self) -> str:
         """What it counts in."""
         return self.measure.to or self.measure.own_unit
 
 
-class Observation:
-    """Lets a model be watched: ``read`` does what its file says, the others what a program asks for."""
+@dataclass
+class Watched:
+    """What is said about a run of a model: when it ends, and what is kept of it."""
 
-    def __init__(self, model: Model, values: Values, problems: Problems) -> None:
-        self.model = model
-        self.graph = model.graph
+    stop_time: int | None = None  # ns
+    seed: int = 0
+    recorded: list[str] = field(default_factory=list)
+    stop_ports: list[str] = field(default_factory=list)
+    metrics: list[Metric] = field(default_factory=list)
+    stop_position: Position | None = None  # of what was said of ``stop_ports`` last
+
+
+class Watching:
+    """Finds what is to be watched: ``read`` what a file says, the others what a program asks for."""
+
+    def __init__(self, draft: Draft, values: Values, problems: Problems, recorded: Collection[str] = ()) -> None:
+        self.found = Watched()
+        self.draft = draft
+        self.graph = draft.graph
         self.values = values
         self.problems = problems
         ports = self.graph.ports.nodes(data="direction")
         outputs = (path for path, direction in ports if direction == "output")
         self._outputs = PathIndex(outputs, self.graph.limits)
-        self._recorded = set(model.recorded)
+        self._recorded = set(recorded)
         self._watched = 0
 
-    def read(self, text: ModelText, names: dict[str, object]) -> None:
+    def read(self, text: ModelText, names: dict[str, object]) -> Watched:
         """Everything that the model file says about it."""
         reader = DeclarationReader(self.problems)
         for key, entry in text.run.items():
-            if key == "record":
-                for each in _different(reader.texts(entry.value, key)):
-                    self.record(each)
-            elif key == "stop_when":
-                for each in _different(reader.texts(entry.value, key)):
-                    self.stop_when(each)
-            else:
-                value = self.values.of(entry.value, names, key)
-                if value is self.values.missing:
-                    continue
-                try:
-                    if key == "stop":
-                        self.model.stop_time = nanoseconds(value)
-                    else:
-                        self.model.seed = checked_seed(value)
-                except (ParameterError, ValueError) as error:
-                    self.problems.add(f"{key}: {error}", entry.value.position)
+            if key in ("record", "stop_when"):
+                watch = self.record if key == "record" else self.stop_when
+                seen: set[str] = set()  # each once: a pattern may select all of a model
+                for each in reader.texts(entry.value, key):
+                    if each.text not in seen:
+                        seen.add(each.text)
+                        watch(each)
+                continue
+            convert = nanoseconds if key == "stop" else checked_seed
+            value = converted(self.values, entry.value, names, key, "", convert)
+            if value is not self.values.missing:
+                setattr(self.found, "stop_time" if key == "stop" else "seed", value)
         for metric in text.metrics:
             self._read_metric(metric, names)
+        return self.found
 
     def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
         """A metric as the file gives it."""
@@ -98,15 +111,15 @@ class Observation:
 
     def record(self, text: Text) -> None:
         """Keep what the ports behind a pattern send."""
-        found = [path for path in self._select(text, "record") if path not in self._recorded]
+        found = [path for path in self.select(text, "record") if path not in self._recorded]
         self._recorded.update(found)
-        self.model.recorded += found
+        self.found.recorded += found
 
     def stop_when(self, text: Text) -> None:
         """End the run when a port behind the pattern sends something true."""
-        self.graph.positions["stop_when"] = text.position
-        for path in self._select(text, "stop_when"):
-            self.model.stop_ports.append(path)
+        self.found.stop_position = text.position
+        for path in self.select(text, "stop_when"):
+            self.found.stop_ports.append(path)
             for port in self.graph.source_of(path):
                 if not accepts(float | bool, port.type):
                     self.problems.add(
@@ -129,14 +142,13 @@ class Observation:
         measure = self._measure(what, options, position, places or {})
         if measure is None:
             return
-        self.graph.positions[what] = position
-        paths = self._select(of, what)
+        paths = self.select(of, what)
         self._watched += len(paths)
         limit = self.graph.limits.watched
         if self._watched > limit:
             self.problems.add(f"{what}: metrics are taken from more than {limit:,} ports", position, RAISE_IT)
             self.problems.raise_if_any()
-        self.model.metrics.append(Metric(name, paths, measure))
+        self.found.metrics.append(Metric(name, paths, measure))
         if measure.kind.of == "any":
             return
         wanted: Any = float | bool if measure.kind.of == "numbers" else float | bool | str
@@ -172,7 +184,7 @@ class Observation:
             self.problems.add(f"{what}: {problem}", places.get(option, position), *([advice] if advice else []))
         return measure
 
-    def _select(self, text: Text, what: str) -> list[str]:
+    def select(self, text: Text, what: str) -> list[str]:
         """The output ports that a pattern selects, composites' included."""
         try:
             found = self._outputs.select(text.text)
@@ -183,7 +195,7 @@ class Observation:
             self.problems.add(f"{what}: {error}", text.position, RAISE_IT)
             self.problems.raise_if_any()
             raise AssertionError("too many paths are a problem") from None
-        if found or self.graph.is_excused(text.text):
+        if found or self.draft.excuses(text.text):
             return found
         guess = self._outputs.did_you_mean(text.text)
         if text.text in self.graph.ports.nodes:
@@ -199,23 +211,9 @@ class Observation:
         return []
 
 
-def _different(texts: list[Text]) -> list[Text]:
-    """The texts, each once: a pattern may select all of a model."""
-    found: dict[str, Text] = {}
-    for each in texts:
-        found.setdefault(each.text, each)
-    return list(found.values())
-
-
 def _words(node: Node) -> object:
     """A text, which may look like something else: ``unit: 1``."""
     return node.text if isinstance(node, Scalar) and node.value is not None else plain(node)
-
-
-def nanoseconds(duration: object) -> int:
-    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
-    seconds: Any = Parameter(float, unit="s", min=0.0).convert(duration)
-    return to_nanoseconds(seconds)
 
 
 def checked_seed(value: object) -> int:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 
-from epicycle.actors import Actor, Parameter, ParameterError, counted, declared_ports, has_own_ports, to_nanoseconds
+from epicycle.actors import Actor, counted, declared_ports, has_own_ports
 
 from ..language import CompositeText, ConnectionText, Values
-from ..text import RAISE_IT, Problems, Scalar, Text, did_you_mean, within
+from ..text import RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, within
+from .draft import Draft
 from .graph import ModelGraph
 from .indices import BadIndexError, resolve
+from .settle import converted, nanoseconds
 
 _ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
 
 
-@dataclass
+@dataclass(frozen=True)
 class End:
     """The ports behind one end of a connection, and how they are spoken of."""
 
@@ -30,94 +33,113 @@ class End:
 class Child:
     """A name inside a composite: the instances behind it; ``count`` is None if how many is not known."""
 
+    kind: str  # the name of its type
     paths: list[str]
     array: bool
-    composite: CompositeText | None
-    actor_type: type[Actor] | None
     count: int | None
-    actors: list[Actor] = field(default_factory=list)  # the instances that could be made
-
-    @property
-    def kind(self) -> str:
-        """The name of its type."""
-        if self.composite is not None:
-            return self.composite.name
-        return self.actor_type.__name__ if self.actor_type is not None else ""
+    inputs: list[str] = field(default_factory=list)
+    outputs: list[str] = field(default_factory=list)
+    is_known: bool = True  # whether there are no other ports: an instance that could not be made may have had some
 
     def ports(self, direction: str) -> list[str]:
         """The names of its ports of one direction."""
-        if self.composite is not None:
-            return list(self.composite.inputs if direction == "input" else self.composite.outputs)
-        if self.actor_type is None:
-            return []
-        if has_own_ports(self.actor_type):
-            ports = [each.inputs if direction == "input" else each.outputs for each in self.actors]
-            return list(dict.fromkeys(name for each in ports for name in each))
-        return [name for name, port in declared_ports(self.actor_type).items() if port.direction == direction]
+        return self.inputs if direction == "input" else self.outputs
 
-    @property
-    def ports_are_known(self) -> bool:
-        """Whether there are no ports but those that ``ports`` tells; an instance not made may have had others."""
-        return self.actor_type is None or not has_own_ports(self.actor_type) or len(self.actors) == self.count != 0
+
+def child_of_actors(
+    actor_type: type[Actor], paths: list[str], array: bool, count: int | None, graph: ModelGraph
+) -> Child:
+    """Actors of one name, some of which perhaps could not be made."""
+    child = Child(actor_type.__name__, paths, array, count)
+    if has_own_ports(actor_type):
+        actors = [graph.actors[path] for path in paths if path in graph.actors]
+        child.inputs = list(dict.fromkeys(name for actor in actors for name in actor.inputs))
+        child.outputs = list(dict.fromkeys(name for actor in actors for name in actor.outputs))
+        child.is_known = len(actors) == count != 0
+    else:
+        for name, port in declared_ports(actor_type).items():
+            child.ports(port.direction).append(name)
+    return child
+
+
+@dataclass(frozen=True)
+class Inside:
+    """The inside of a composite as its connections see it."""
+
+    path: str
+    name: str
+    inputs: Collection[str]
+    outputs: Collection[str]
+    names: Collection[str]  # of all actors
+    children: Mapping[str, Child]  # those of which anything is known
+    text: CompositeText | None = None  # as a file declares it
+
+
+@dataclass(frozen=True)
+class Link:
+    """A connection that is yet to be made."""
+
+    source: str
+    destination: str
+    delay: int | None  # ns
+    position: Position
+
+
+@dataclass(frozen=True)
+class Links:
+    """What a connection stands for; ``is_whole`` is false if a part of it could not be understood."""
+
+    found: list[Link]
+    is_whole: bool
+
+    def make(self, draft: Draft) -> None:
+        """Connect the ports."""
+        for link in self.found:
+            draft.graph.connect(link.source, link.destination, link.delay, link.position)
+        draft.is_wired = draft.is_wired and self.is_whole
 
 
 class Wiring:
-    """Connects the inside of one instance of a composite."""
+    """Finds the ports that a connection inside of one composite means."""
 
-    def __init__(
-        self,
-        path: str,
-        composite: CompositeText,
-        children: dict[str, Child],
-        graph: ModelGraph,
-        values: Values,
-        problems: Problems,
-    ) -> None:
-        self.path = path
-        self.composite = composite
-        self.children = children
+    def __init__(self, inside: Inside, graph: ModelGraph, values: Values, problems: Problems) -> None:
+        self.inside = inside
+        self.path = inside.path
         self.graph = graph
         self.values = values
         self.problems = problems
 
-    def connect(self, connection: ConnectionText, names: dict[str, object]) -> None:
+    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> Links:
         """Every source to every destination; where both stand for several, the first to the first and so on."""
         delay = self._delay(connection, names)
         sources = [self._endpoint(text, "output", names) for text in connection.sources]
         targets = [self._endpoint(text, "input", names) for text in connection.destinations]
-        for source in sources:
-            for target in targets:
-                if source is None or target is None:
-                    self.graph.is_wired = False
-                    continue
-                in_pairs = source.several and target.several and not connection.to_all
-                count = len(source.ports) * (1 if in_pairs else len(target.ports))
-                limit = self.graph.limits.connections
-                if self.graph.connections + count > limit:
-                    self.graph.is_wired = False
-                    self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)
-                    return
-                for one, other in self._pairs(source, target, in_pairs, connection.to_all):
-                    self.graph.connect(one, other, delay, source.text.position)
-
-    def _pairs(self, source: End, target: End, in_pairs: bool, to_all: bool) -> Iterator[tuple[str, str]]:
-        if not in_pairs:
+        links: list[Link] = []
+        is_whole = None not in sources and None not in targets
+        limit = self.graph.limits.connections
+        for source, target in product(filter(None, sources), filter(None, targets)):
+            in_pairs = source.several and target.several and not connection.to_all
+            count = len(source.ports) * (1 if in_pairs else len(target.ports))
+            if self.graph.connections + len(links) + count > limit:
+                self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)
+                return Links(links, False)
+            if in_pairs and len(source.ports) != len(target.ports):
+                is_whole = False
+                self._problem(
+                    f"{self._label(source.text)} stands for {_ports(source)}, {self._label(target.text)} for "
+                    f"{_ports(target)}",
+                    target.text,
+                    "with several on both sides, '->' connects the first to the first and so on, so both need as many",
+                    "to connect all to all, write '=>'",
+                )
+                continue
+            pairs = zip(source.ports, target.ports, strict=True) if in_pairs else product(source.ports, target.ports)
             # What all of a group say to all is not for themselves; '->' still connects each to itself.
-            spare_self = to_all and not source.own and not target.own
-            for one in source.ports:
-                owner = one.rpartition(".")[0] if spare_self else None
-                yield from ((one, other) for other in target.ports if other.rpartition(".")[0] != owner)
-        elif len(source.ports) == len(target.ports):
-            yield from zip(source.ports, target.ports, strict=True)
-        else:
-            self.graph.is_wired = False
-            self._problem(
-                f"{self._label(source.text)} stands for {_ports(source)}, {self._label(target.text)} for "
-                f"{_ports(target)}",
-                target.text,
-                "with several on both sides, '->' connects the first to the first and so on, so both need as many",
-                "to connect all to all, write '=>'",
-            )
+            spare_self = connection.to_all and not source.own and not target.own
+            for one, other in pairs:
+                if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
+                    links.append(Link(one, other, delay, source.text.position))
+        return Links(links, is_whole)
 
     def _label(self, text: Text) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
@@ -129,15 +151,8 @@ class Wiring:
         if connection.delay is None:
             return None
         label = f"{self._label(connection.sources[0])} -> {self._label(connection.destinations[0])}: delay"
-        value = self.values.of(connection.delay, names, label, self.path)
-        if value is self.values.missing:
-            return None
-        try:
-            seconds = Parameter(float, unit="s", min=0.0).convert(value)
-            return to_nanoseconds(seconds if seconds is not None else 0.0)
-        except (ParameterError, ValueError) as error:
-            self.problems.add(f"{label}: {error}", connection.delay.position, scope=self.path)
-            return None
+        delay = converted(self.values, connection.delay, names, label, self.path, nanoseconds)
+        return None if delay is self.values.missing else delay
 
     def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | None:
         """The port paths behind one end of a connection, as seen from inside the composite."""
@@ -153,14 +168,15 @@ class Wiring:
         if name is None:
             own = self._own(port, wanted, text)
             return None if own is None else End(text, own, own=True)
-        child = self.children.get(name)
+        inside = self.inside
+        child = inside.children.get(name)
         if child is None:
-            if name not in self.composite.actors:  # otherwise its own problem is told already
-                gone = self.composite.removed.get(name)
+            if name not in inside.names:  # otherwise its own problem is told already
+                gone = None if inside.text is None else inside.text.removed.get(name)
                 self._problem(
-                    f"{self.composite.name} has no actor {name!r}{did_you_mean(name, list(self.composite.actors))}",
+                    f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}",
                     text,
-                    f"valid actors: {', '.join(self.composite.actors) or 'none'}",
+                    f"valid actors: {', '.join(inside.names) or 'none'}",
                     *((f"it is removed at {gone.file}:{gone.line}:{gone.column}",) if gone is not None else ()),
                 )
             return None
@@ -171,25 +187,25 @@ class Wiring:
         paths, several = found
         ports = [f"{instance}.{port}" for instance in paths]
         if missing := [path for path in ports if path not in self.graph.ports]:
-            if child.ports_are_known:  # instances of one entry may differ in the ports of their own
+            if child.is_known:  # instances of one entry may differ in the ports of their own
                 self._problem(f"{child.kind} has no {wanted} port {missing[0]}, but others of its array have", text)
             return None
         return End(text, ports, several)
 
     def _own(self, port: str, wanted: str, text: Text) -> list[str] | None:
         # Seen from inside, an own input is where tokens come from, an own output where they go.
-        inputs, outputs = self.composite.inputs, self.composite.outputs
+        inputs, outputs = self.inside.inputs, self.inside.outputs
         own, other = (inputs, outputs) if wanted == "output" else (outputs, inputs)
         if port in own and self.path:
             return [f"{self.path}.{port}"]
-        where = self.composite.name
+        where = self.inside.name
         kind, ends = ("input", "from") if wanted == "output" else ("output", "to")
         hints = [f"own {kind} ports: {', '.join(own) or 'none'}"]
         if port in other:
             message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {where}: inside of it, tokens "
             message += "go there, none come from it" if ends == "from" else "come from it, none go there"
-        elif port in self.children:
-            child = self.children[port]
+        elif port in self.inside.children:
+            child = self.inside.children[port]
             message = f"{self._label(text)} is an actor, not a port"
             index = "[*]" if child.array else ""
             hints = [f"{wanted} ports: {', '.join(f'{port}{index}.{each}' for each in child.ports(wanted)) or 'none'}"]
@@ -244,7 +260,7 @@ class Wiring:
         valid = child.ports(wanted)
         if port in valid:
             return True
-        if not child.ports_are_known:
+        if not child.is_known:
             return child.count == 0  # or else why it could not be made is told
         if port in child.ports("input" if wanted == "output" else "output"):
             direction, ends = ("an input", "come from it") if wanted == "output" else ("an output", "go to it")
@@ -252,8 +268,8 @@ class Wiring:
         else:
             message = f"{path}: {child.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
         hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
-        if self.composite.extends is not None:  # its type may be said far from the connection
-            at = self.composite.actors[name].type.position
+        if self.inside.text is not None and self.inside.text.extends is not None:
+            at = self.inside.text.actors[name].type.position  # which may be far from the connection
             hints.append(f"{path} is a {child.kind} since {at.file}:{at.line}:{at.column}")
         self._problem(message, text, *hints)
         return False
