@@ -352,7 +352,7 @@ class _Builder:
                 value = _resolve(text)
         except ValueError as error:
             self._problems.add(str(error), position)
-            self._problems.spoil(position)
+            position = dataclasses.replace(position, told=True)
         return Scalar(value, text, is_plain, position)
 
     def _tagged(self, tag: str, text: str, position: Position) -> Value:
