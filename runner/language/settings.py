@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..text import (
+    COMMAND_LINE,
     NAME,
     NAMES_HAVE,
     NORMAL,
@@ -22,7 +23,6 @@ from ..text import (
     Position,
     Problems,
     Scalar,
-    Sequence,
     Text,
     check_pattern,
     did_you_mean,
@@ -143,7 +143,7 @@ def is_pattern(path: str, position: Position, problems: Problems) -> bool:
 def parse_setting(text: str, problems: Problems) -> Setting | None:
     """``path=value``, where value is a YAML value such as ``3``, ``5 m`` or ``[0, 1]``."""
     option = f"--set {text}"
-    position = Position("command line", 1, 7, max(1, len(text)), option)
+    position = _in_option(option, 6)
     path, equals, value = text.partition("=")
     path = path.strip()
     if not equals or not path:
@@ -155,34 +155,18 @@ def parse_setting(text: str, problems: Problems) -> Setting | None:
     return None if node is None else Setting(path, node, position)
 
 
+def _in_option(option: str, start: int, length: int | None = None) -> Position:
+    """A place on the command line: what stands in an option from ``start`` on."""
+    return Position(COMMAND_LINE, 1, start + 1, max(1, len(option) - start if length is None else length), option)
+
+
 def _value(text: str, option: str, offset: int, problems: Problems) -> Node | None:
     """The YAML value that stands in an option from ``offset`` on."""
     if not text.strip():
-        return Scalar(None, "", True, Position("command line", 1, 1, len(option), option))
+        return Scalar(None, "", True, _in_option(option, 0))
     if len(option.splitlines()) > 1:  # lines and columns are those of the value, then
-        return parse(text, "command line", problems)
-    found = Problems()
-    node = parse(" " * offset + text, "command line", found)
-    for problem in found.found:
-        position = None if problem.position is None else replace(problem.position, source=option)
-        problems.add(problem.message, position, *problem.help)
-    return None if node is None else _within(node, option)
-
-
-def _within(node: Node, option: str) -> Node:
-    """The node with the option as the line in which it stands."""
-    position = replace(node.position, source=option)
-    if isinstance(node, Sequence):
-        return Sequence(tuple(_within(item, option) for item in node.items), position)
-    if isinstance(node, Mapping):
-        entries = {
-            key: Entry(
-                replace(entry.key, position=replace(entry.key.position, source=option)), _within(entry.value, option)
-            )
-            for key, entry in node.entries.items()
-        }
-        return Mapping(entries, position)
-    return replace(node, position=position)
+        return parse(text, COMMAND_LINE, problems)
+    return parse(" " * offset + text, COMMAND_LINE, problems, option)
 
 
 def without(text: ModelText, name: str, problems: Problems) -> None:
@@ -191,7 +175,7 @@ def without(text: ModelText, name: str, problems: Problems) -> None:
         option = f"--without {name}"
         problems.add(
             f"the model has no aspect {name!r}{did_you_mean(name, list(text.root.aspects))}",
-            Position("command line", 1, 11, max(1, len(name)), option),
+            _in_option(option, 10),
             f"its aspects: {', '.join(text.root.aspects) or 'none'}",
         )
 
@@ -202,7 +186,7 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
     What an aspect that is replaced leaves to the new one, ``put_aspect`` says.
     """
     option = f"--aspect {change}"
-    position = Position("command line", 1, 10, max(1, len(change)), option)
+    position = _in_option(option, 9)
     name, equals, rest = change.partition("=")
     places = split(rest, ",")
     parts = [rest[start:end].strip() for start, end in places]
@@ -222,10 +206,10 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
         if key == "at":
             at = _pointcuts(value, option, stop - len(value))
             continue
-        node = _value(value, option[:stop], stop - len(value), problems)
+        node = _value(value, option, stop - len(value), problems)
         if node is None:
             return
-        values[key] = Entry(Scalar(key, key, True, position), _within(node, option))
+        values[key] = Entry(Scalar(key, key, True, position), node)
     if not NAME.match(name):
         problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
         return
@@ -252,6 +236,6 @@ def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]
     found = []
     for start, end in split(value, ","):
         text = value[start:end].strip(" '\"")
-        column = offset + start + value[start:end].find(text) + 1
-        found.append(PointcutText.of(Text(text, Position("command line", 1, column, max(1, len(text)), option))))
+        at = offset + start + value[start:end].find(text)
+        found.append(PointcutText.of(Text(text, _in_option(option, at, len(text)))))
     return tuple(found)
