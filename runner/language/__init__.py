@@ -1,5 +1,6 @@
 """What a file says: models, composites, disturbances, studies and what is set from outside, as declared constructs."""
 
+from .claims import ALWAYS, FALLS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection
 from .declarations import (
     CompositeText,
     ConnectionText,
@@ -15,8 +16,7 @@ from .disturbance import Disturbance, add_disturbances, add_parameters, load_dis
 from .files import find_library, find_model, included_composites, read_model
 from .inheritance import inherit
 from .models import DeclarationReader
-from .questions import ALWAYS, FALLS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection
-from .schema import json_schema, schema_text
+from .schema import CONSTRUCTS, json_schema, schema_text
 from .settings import Setting, Settings, change_aspect, parse_setting, put_aspect, read_overrides, settings_in, without
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, find_study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
@@ -26,6 +26,7 @@ from .values import Values
 __all__ = [
     "ALWAYS",
     "ASPECTS",
+    "CONSTRUCTS",
     "FALLS",
     "GREATER",
     "LESS",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from epicycle.actors import irregular
 
-from ..catalogue import find, model_folders, packaged_models
-from ..text import Mapping, Problems, did_you_mean, read
+from ..catalogue import find, is_path, model_folders, packaged_models, packaged_ones, unreadable
+from ..text import Mapping, Problems, Text, did_you_mean, read
 from .declarations import CompositeText, ModelText
 from .models import DeclarationReader
 
@@ -17,6 +18,33 @@ MAX_INCLUDES = 200
 def find_model(name: str, problems: Problems) -> Path | None:
     """The file of a model: a path if it looks like one, otherwise a packaged model's name."""
     return find(name, "model", packaged_models, problems)
+
+
+def named_file(
+    said: Text,
+    folder: Path,
+    kind: str,
+    packaged: Callable[[], dict[str, Path]],
+    problems: Problems,
+    who: str = "",
+) -> Path | None:
+    """The file that a name in a file means: as seen from its folder, or packaged; None, and a problem, if it cannot be.
+
+    ``who`` begins the message.
+    """
+    known = packaged()
+    path = folder / said.text if is_path(said.text) else known.get(said.text)
+    if (reason := unreadable(path)) == "":
+        return path
+    if reason is not None:
+        problems.add(f"{who}the {kind} {said.text!r} {reason}", said.position)
+        return None
+    problems.add(
+        f"{who}there is no {kind} {said.text!r}{did_you_mean(said.text, list(known))}",
+        said.position,
+        packaged_ones(kind, known),
+    )
+    return None
 
 
 def find_library(path: Path) -> Path:
