@@ -40,8 +40,8 @@ COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
     "tests/actors", "tests/api", "tests/aspects", "tests/cli/test_output.py", "tests/conformance", "tests/core",
-    "tests/engine", "tests/library",
-    "tests/model", "tests/numerics", "tests/test_models.py", "tests/test_reference.py",
+    "tests/catalogue", "tests/engine", "tests/language", "tests/library",
+    "tests/model", "tests/numerics", "tests/test_models.py", "tests/test_reference.py", "tests/text",
 )  # fmt: skip
 TESTS_OF_KERNELS = ("tests/numerics", "tests/core", "tests/actors")
 LONGEST = {True: 6.0, False: 4.0}  # s; a test that takes longer, compiled or not, is not asked
