@@ -38,18 +38,13 @@ from .declarations import ModelText, PartText, PointcutText
 from .fields import Shape
 
 
-@dataclass
+@dataclass(frozen=True)
 class Setting:
     """A value for every parameter whose path matches a pattern."""
 
     path: str
     node: Node
     position: Position
-    used: bool = False
-
-    def matches(self, full: str) -> bool:
-        """Whether the setting is for the parameter at this path."""
-        return matches(self.path, full)
 
 
 class Settings:
@@ -57,6 +52,7 @@ class Settings:
 
     def __init__(self, settings: Iterable[Setting] = (), limits: Limits = NORMAL) -> None:
         self._all = list(settings)
+        self._used: set[int] = set()
         # An overrides file may name thousands of paths: only patterns are tried one after the other, and of these only
         # those that ask for a name that the path has, the one that fewest paths will have.
         self._exact: dict[str, list[int]] = {}
@@ -76,9 +72,8 @@ class Settings:
         if self._patterns:
             likely = [number for name in ("", *names_of(full)) for number in self._patterns.get(name, ())]
             self._comparisons.spend(len(likely))
-            found = found + [number for number in likely if self._all[number].matches(full)]
-        for number in found:
-            self._all[number].used = True
+            found = found + [number for number in likely if matches(self._all[number].path, full)]
+        self._used.update(found)
         return self._all[max(found)] if found else None
 
     @property
@@ -89,7 +84,7 @@ class Settings:
 
     def unused(self) -> list[Setting]:
         """Those that no parameter has taken."""
-        return [setting for setting in self._all if not setting.used]
+        return [setting for number, setting in enumerate(self._all) if number not in self._used]
 
 
 def read_overrides(path: Path, problems: Problems) -> list[Setting]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from ..catalogue import installed
@@ -86,7 +85,7 @@ def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:
 
 def _settings(given: Iterable[str | Setting] | Mapping[str, object], problems: Problems) -> list[Setting]:
     if not isinstance(given, Mapping):
-        read = (parse_setting(each, problems) if isinstance(each, str) else replace(each) for each in given)
+        read = (parse_setting(each, problems) if isinstance(each, str) else each for each in given)
         return [setting for setting in read if setting is not None]
     node = node_of(given, call_site())
     assert isinstance(node, MappingNode)

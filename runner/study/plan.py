@@ -6,7 +6,7 @@ import hashlib
 import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
 from pathlib import Path
@@ -295,9 +295,7 @@ def _together(study: Study, levels: list[Level]) -> tuple[tuple[Setting, ...], t
 
 def _load(study: Study, settings: tuple[Setting, ...], disturb: tuple[str, ...]) -> Model:
     types = [each for file in study.types for each in types_of_file(file)]
-    return load_model(
-        study.model, set=[replace(setting, used=False) for setting in settings], disturb=disturb, types=types
-    )
+    return load_model(study.model, set=settings, disturb=disturb, types=types)
 
 
 @dataclass

@@ -25,6 +25,10 @@ class Position:
     source: str
     told: bool = False  # what is wrong there has been told: what else might be said would be a consequence
 
+    def __str__(self) -> str:
+        """``file:line:column``, to say in a message where something else stands."""
+        return f"{self.file}:{self.line}:{self.column}"
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
