@@ -53,13 +53,13 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "aspects/crash.py": (("sum",), WHOLE),
     "aspects/tokens.py": (("sum",), WHOLE),
     "runner/engine/statistic.py": (("sum",), WHOLE),
-    "runner/engine/encoding.py": (("sum",), "only asks whether a sum is NaN"),
+    "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/model/checks.py": (("sum",), WHOLE),
-    "runner/text/problems.py": (("sum",), WHOLE),
-    "runner/columns.py": (("numpy.cumsum",), WHOLE),
+    "runner/model/problems.py": (("sum",), WHOLE),
+    "runner/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
-    "runner/study/claims.py": (("sum",), WHOLE),
-    "runner/study/cluster.py": (("sum",), WHOLE),
+    "runner/study/judge/claims.py": (("sum",), WHOLE),
+    "runner/study/run/cluster.py": (("sum",), WHOLE),
 }
 
 

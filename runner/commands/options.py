@@ -86,12 +86,14 @@ def own_types(options: argparse.Namespace) -> list[type]:
     return [each for file in options.types for each in types_of_file(Path(file))]
 
 
-def seed(text: str) -> int:
-    """A seed: a whole number from 0 on."""
-    number = int(text) if text.isdecimal() else -1
-    if not 0 <= number < 2**64:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to 2**64 - 1")
-    return number
+def seed(text: str, last: int | None = None) -> int:
+    """A seed: a whole number from 0 on, and up to ``last`` where others follow it."""
+    from ..text import MAX_SEED
+
+    last = MAX_SEED if last is None else last
+    if not text.isdecimal() or len(text) > 20 or int(text) > last:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {last}")
+    return int(text)
 
 
 def positive(text: str) -> int:

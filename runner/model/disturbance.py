@@ -7,18 +7,12 @@ from collections.abc import Mapping as AnyMapping
 from typing import TYPE_CHECKING
 
 from ..catalogue import installed
-from ..language import (
-    CompositeText,
-    ModelText,
-    ParameterText,
-    Settings,
-    add_parameters,
-    inherit,
-    load_disturbance,
-    settings_in,
-)
+from ..language import CompositeText, ParameterText, Settings, add_parameters, inherit, load_disturbance, settings_in
 from ..text import Mapping, Position, Problems, node_of
-from .elaborate import Elaborator
+from .draft import Draft
+from .settle import Settler
+from .unfold import Known, Unfolded, Unfolding
+from .weave_all import weave_all
 from .woven import WovenAspect
 
 if TYPE_CHECKING:
@@ -27,8 +21,8 @@ if TYPE_CHECKING:
 
 def disturb(
     model: Model, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
-) -> list[WovenAspect]:
-    """Weave the aspects of a disturbance around a model that is made; raises ``ModelError``."""
+) -> tuple[Draft, list[WovenAspect]]:
+    """The model's draft with the aspects of a disturbance, and these; raises ``ModelError``."""
     problems = Problems()
     disturbance = load_disturbance(name, problems)
     problems.raise_if_any()
@@ -52,9 +46,13 @@ def disturb(
             problems.add(f"there is an aspect {part.name!r} already", part.position, "unweave it before")
     problems.raise_if_any()
     node = node_of(values, position)
-    settings = Settings(settings_in(node, problems) if isinstance(node, Mapping) else [])
+    settler = Settler(Settings(settings_in(node, problems) if isinstance(node, Mapping) else []), problems)
     catalogue = installed().with_types(types)
     composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
-    found = Elaborator(ModelText(root), composites, settings, problems, catalogue, broken).woven(model.graph)
+    known = Known(composites, catalogue, broken)
+    made = Unfolded(model.draft.copy(), model.graph.limits.actors)
+    Unfolding(known, settler, made).body("", root, settler.parameters("", root, {}, {}, None))
+    found = weave_all(made, known, settler)
+    settler.check_unused(made.draft)
     problems.raise_if_any()
-    return found
+    return made.draft, found

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from epicycle.actors import counted_in_si, plain
+
 from ..catalogue import installed
 from ..collection import without_collection
 from ..language import (
+    ModelText,
     Setting,
     Settings,
+    Values,
     add_disturbances,
     change_aspect,
     check_usage,
@@ -24,9 +28,16 @@ from ..language import (
 )
 from ..text import NORMAL, Limits, Problems, call_site, node_of
 from ..text import Mapping as MappingNode
-from .elaborate import Elaborator
-from .model import Model
-from .trial import try_classes
+from .checks import check
+from .draft import Draft
+from .graph import ModelGraph
+from .model import Figure, Model
+from .settle import Settler
+from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .untried import try_classes
+from .watch import Watching
+from .weave_all import weave_all
+from .woven import check_processors
 
 
 def load_model(
@@ -54,29 +65,79 @@ def load_model(
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += _settings(set, problems)
     with without_collection():
+        # What the files say.
         text, path, reader = read_model(str(name), problems)
         declared = included_composites(text, path, reader, problems)
         catalogue = installed().with_types(types)
         disturbances = load_disturbances(map(str, _several(disturb)), declared, problems)
         composites, broken = inherit(declared, catalogue.actors, problems, limits)
         check_usage(text, declared, composites, catalogue.actors, problems)
-        # What disturbances set comes first, for the last one wins.
+        # What is changed from outside; what disturbances set comes first, for the last one wins.
         settings = add_disturbances(text, disturbances, problems) + settings
         for change in without_aspects:
             without(text, change, problems)
         for change in aspects:
             change_aspect(text, change, problems)
-        elaborator = Elaborator(text, composites, Settings(settings, limits), problems, catalogue, broken, limits)
-        model = elaborator.model()
-        try_classes(composites, elaborator, broken)
+        # What comes of it.
+        known = Known(composites, catalogue, broken)
+        settler = Settler(Settings(settings, limits), problems)
+        model = build(text, known, settler, limits)
         if model.figures:
-            from ..show import figures_of  # here, for what is shown stands on what is run, and this on models
+            from ..show import figures_of  # here, for what is shown stands on what is run
 
             figures_of(model, problems)
         problems.raise_if_any()
         model.warnings = problems.warnings
         model.is_checked = True
         return model
+
+
+def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Model:
+    """The model that declarations stand for, in passes; it is good only if there are no problems then."""
+    problems, values, root = settler.problems, settler.values, text.root
+    model = Model(root.name, doc=root.doc)
+    _check_names(known, problems)
+    values.of_model = root.parameters
+    names = settler.parameters("", root, {}, {}, None)
+    made = Unfolded(Draft(ModelGraph(limits)), limits.actors)
+    try:
+        Unfolding(known, settler, made).body("", root, names)
+    except TooLargeError:
+        pass
+    else:
+        woven = weave_all(made, known, settler)
+        settler.check_unused(made.draft)
+        check(made.draft, problems)
+        check_processors(woven, made.draft.graph, problems)
+        model.adopt(made.draft, woven, Watching(made.draft, values, problems).read(text, names))
+        model.parameters = {name: _shown(value, root.parameters[name].unit) for name, value in names.items()}
+        model.declared = {name: (text.unit, text.doc) for name, text in root.parameters.items()}
+        model.figures = _figures(text, values, names)
+    try_classes(known, made.classes, values, limits, problems)
+    return model
+
+
+def _check_names(known: Known, problems: Problems) -> None:
+    for name in sorted(known.composites.keys() & known.catalogue.actors.keys()):
+        problems.add(
+            f"composite {name!r} has the name of an actor type", known.composites[name].position, "give it another name"
+        )
+
+
+def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, Figure]:
+    """The type of each figure, its values, and these as they are written."""
+    found = {}
+    for name, part in text.figures.items():
+        given = {key: values.of(entry.value, names, f"figure {name}.{key}") for key, entry in part.values.items()}
+        if values.missing not in given.values():
+            in_si = {key: counted_in_si(value) for key, value in given.items()}
+            found[name] = (part.type.text, in_si, MappingNode(part.values, part.type.position))
+    return found
+
+
+def _shown(value: object, unit: str) -> object:
+    """The value of a parameter of the model, as a plain number in the unit that it declares."""
+    return plain(value) if unit else counted_in_si(value)
 
 
 def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:

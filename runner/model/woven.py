@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from epicycle.actors import counted
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, CompositeExecutionAspect, ExecutionAspect, FiringTime, Reading, Selection
 
 from ..text import Problems
-from .graph import ModelGraph
+from .graph import ModelGraph, is_within
 
 
-@dataclass
+@dataclass(frozen=True)
 class AspectModel:
     """The composite that an aspect is, the port from which it answers, and the port by which each place asks it."""
 
@@ -33,7 +33,7 @@ class AspectModel:
         return said
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class WovenAspect:
     """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
 
@@ -65,6 +65,16 @@ class WovenAspect:
         """Where it stands, in words."""
         connections = (f"{source} -> {destination}" for source, destination in self.connections)
         return [*self.ports, *connections, *self.actors, *self.parameters]
+
+    def without(self, path: str) -> WovenAspect:
+        """The aspect when a part of the model is taken out at which it stood, too."""
+        return replace(
+            self,
+            ports=[port for port in self.ports if not is_within(port, path)],
+            actors={actor: unit for actor, unit in self.actors.items() if not is_within(actor, path)},
+            parameters=[each for each in self.parameters if not is_within(each, path)],
+            connections=[ends for ends in self.connections if not any(is_within(end, path) for end in ends)],
+        )
 
     @property
     def looks_at(self) -> list[str]:
