@@ -12,8 +12,16 @@ from .declarations import (
     PortText,
 )
 from .dimensions import Dimension, Factor, Level, Listed, Ranged, in_si, split_number
-from .disturbance import Disturbance, add_disturbances, add_parameters, load_disturbance, load_disturbances
-from .files import find_library, find_model, included_composites, read_model
+from .disturbance import (
+    COMPOSITE_THERE,
+    PARAMETER_THERE,
+    Disturbance,
+    add_disturbances,
+    joined,
+    load_disturbance,
+    load_disturbances,
+)
+from .files import find_model, read_library, read_model
 from .inheritance import inherit
 from .models import DeclarationReader
 from .schema import CONSTRUCTS, json_schema, schema_text
@@ -26,6 +34,7 @@ from .values import Values
 __all__ = [
     "ALWAYS",
     "ASPECTS",
+    "COMPOSITE_THERE",
     "CONSTRUCTS",
     "FALLS",
     "GREATER",
@@ -33,6 +42,7 @@ __all__ = [
     "MAX_REPLICATIONS",
     "MAX_STUDY_SEED",
     "NUMBERS",
+    "PARAMETER_THERE",
     "RESERVED",
     "RISES",
     "SIGNALS",
@@ -61,23 +71,22 @@ __all__ = [
     "StudyMetric",
     "Values",
     "add_disturbances",
-    "add_parameters",
     "asks_for_none",
     "change_aspect",
     "check_own_usage",
     "check_usage",
-    "find_library",
     "find_model",
     "find_study",
     "in_si",
-    "included_composites",
     "inherit",
     "is_study",
+    "joined",
     "json_schema",
     "load_disturbance",
     "load_disturbances",
     "parse_setting",
     "put_aspect",
+    "read_library",
     "read_model",
     "read_overrides",
     "read_study",

@@ -164,19 +164,21 @@ def _value(text: str, option: str, offset: int, problems: Problems) -> Node | No
     return parse(" " * offset + text, COMMAND_LINE, problems, option)
 
 
-def without(text: ModelText, name: str, problems: Problems) -> None:
-    """Take an aspect out of a model."""
-    if text.root.aspects.pop(name, None) is None:
-        option = f"--without {name}"
+def without(text: ModelText, name: str, problems: Problems) -> ModelText:
+    """The model without one of its aspects."""
+    aspects = text.root.aspects
+    if name not in aspects:
         problems.add(
-            f"the model has no aspect {name!r}{did_you_mean(name, list(text.root.aspects))}",
-            _in_option(option, 10),
-            f"its aspects: {', '.join(text.root.aspects) or 'none'}",
+            f"the model has no aspect {name!r}{did_you_mean(name, list(aspects))}",
+            _in_option(f"--without {name}", 10),
+            f"its aspects: {', '.join(aspects) or 'none'}",
         )
+    left = {key: part for key, part in aspects.items() if key != name}
+    return replace(text, root=replace(text.root, aspects=left))
 
 
-def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
-    """``name=Type,key=value,...``: add an aspect, or put another in the place of one that is there.
+def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText:
+    """``name=Type,key=value,...``: the model with one more aspect, or another in the place of one that is there.
 
     What an aspect that is replaced leaves to the new one, ``put_aspect`` says.
     """
@@ -187,7 +189,7 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
     parts = [rest[start:end].strip() for start, end in places]
     if not equals or not name.strip() or not parts or not parts[0]:
         problems.add(f"{change!r} is not of the form name=Type,key=value", position)
-        return
+        return text
     name = name.strip()
     values: dict[str, Entry] = {}
     at: tuple[PointcutText, ...] | None = None
@@ -196,24 +198,24 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
         key = key.strip()
         if not equals or not key:
             problems.add(f"{part!r} is not of the form key=value", position)
-            return
+            return text
         stop = len(option) - len(rest) + end
         if key == "at":
             at = _pointcuts(value, option, stop - len(value))
             continue
         node = _value(value, option, stop - len(value), problems)
         if node is None:
-            return
+            return text
         values[key] = Entry(Scalar(key, key, True, position), node)
     if not NAME.match(name):
         problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
-        return
+        return text
     enabled = values.pop("enabled").value if "enabled" in values else None
-    put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or (), enabled))
+    return put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or (), enabled))
 
 
-def put_aspect(text: ModelText, part: PartText) -> None:
-    """Add an aspect to a model, or put it in the place of the one of its name.
+def put_aspect(text: ModelText, part: PartText) -> ModelText:
+    """The model with one more aspect, or with another in the place of the one of its name.
 
     The one that goes leaves its ports unless the new one has its own, and its parameters if the type stays the same.
     """
@@ -221,7 +223,7 @@ def put_aspect(text: ModelText, part: PartText) -> None:
     if old is not None:
         values = {**old.values, **part.values} if old.type.text == part.type.text else part.values
         part = replace(part, at=part.at or old.at, values=values)
-    text.root.aspects[part.name] = part
+    return replace(text, root=replace(text.root, aspects={**text.root.aspects, part.name: part}))
 
 
 def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]:
