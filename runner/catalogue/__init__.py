@@ -8,6 +8,7 @@ from .packaged import (
     model_folders,
     packaged_disturbances,
     packaged_models,
+    packaged_ones,
     packaged_studies,
     unreadable,
 )
@@ -56,6 +57,7 @@ __all__ = [
     "model_folders",
     "packaged_disturbances",
     "packaged_models",
+    "packaged_ones",
     "packaged_studies",
     "parts_of",
     "read_type",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from epicycle.actors import counted_in_si, plain
@@ -11,6 +10,7 @@ from epicycle.actors import counted_in_si, plain
 from ..catalogue import installed
 from ..collection import without_collection
 from ..language import (
+    COMPOSITE_THERE,
     ModelText,
     Setting,
     Settings,
@@ -18,8 +18,8 @@ from ..language import (
     add_disturbances,
     change_aspect,
     check_usage,
-    included_composites,
     inherit,
+    joined,
     load_disturbances,
     parse_setting,
     read_model,
@@ -67,18 +67,20 @@ def load_model(
     settings += _settings(set, problems)
     with without_collection():
         # What the files say.
-        text, path, reader = read_model(str(name), problems)
-        declared = included_composites(text, path, reader, problems)
+        text, declared = read_model(str(name), problems)
         catalogue = installed().with_types(types)
-        disturbances = load_disturbances(map(str, _several(disturb)), declared, problems)
+        disturbances = load_disturbances(map(str, _several(disturb)), problems)
+        for disturbance in disturbances:
+            declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
         composites, broken = inherit(declared, catalogue.actors, problems, limits)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What is changed from outside; what disturbances set comes first, for the last one wins.
-        settings = add_disturbances(text, disturbances, problems) + settings
+        text, set_by_them = add_disturbances(text, disturbances, problems)
+        settings = set_by_them + settings
         for change in without_aspects:
-            without(text, change, problems)
+            text = without(text, change, problems)
         for change in aspects:
-            change_aspect(text, change, problems)
+            text = change_aspect(text, change, problems)
         # What comes of it.
         known = Known(composites, catalogue, broken)
         settler = Settler(Settings(settings, limits), problems)
@@ -147,7 +149,7 @@ def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:
 
 def _settings(given: Iterable[str | Setting] | Mapping[str, object], problems: Problems) -> list[Setting]:
     if not isinstance(given, Mapping):
-        read = (parse_setting(each, problems) if isinstance(each, str) else replace(each) for each in given)
+        read = (parse_setting(each, problems) if isinstance(each, str) else each for each in given)
         return [setting for setting in read if setting is not None]
     node = node_of(given, call_site())
     assert isinstance(node, MappingNode)

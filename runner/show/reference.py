@@ -24,6 +24,7 @@ from ..catalogue import (
     parts_of,
     shown,
 )
+from ..language import CONSTRUCTS
 from ..model import Model
 from ..printing import columns
 from .figures import Figure
@@ -158,6 +159,10 @@ def markdown(
     for title, types in (("Figures", figures), ("Figures of studies", study_figures)):
         lines.append(f"## {title}\n")
         lines += [block for each in described(types) for block in _markdown(each)]
+    lines.append("## Keys\n")
+    for title, construct in CONSTRUCTS.items():
+        rows = [[f"`{key}`", each.doc.replace("<", "\\<")] for key, each in construct.keys.items()]
+        lines += [f"### {title}\n", _rows(("key", "what it is"), rows)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
@@ -315,8 +315,7 @@ def _together(study: Study, place: Iterable[int]) -> Level:
 
 def _load(study: Study, level: Level) -> Model:
     types = [each for file in study.types for each in types_of_file(file)]
-    settings = [replace(setting, used=False) for setting in level.settings]
-    return load_model(study.model, set=settings, disturb=level.disturb, types=types)
+    return load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
 
 
 @dataclass

@@ -36,7 +36,7 @@ from epicycle.runner.language import (
 from epicycle.runner.language.fields import QUANTITY, Construct
 from epicycle.runner.language.models import BESIDE
 from epicycle.runner.language.parameter_schema import schema_of as value_schema
-from epicycle.runner.language.places import CONNECTION, PATTERN
+from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
 from epicycle.runner.model.connect import _ENDPOINT as ENDPOINT
 from epicycle.runner.model.indices import BadIndexError, resolve
 from epicycle.runner.show import figure_types
@@ -252,7 +252,7 @@ def test_connections_are_those_that_can_be_read(text: str) -> None:
     connection = reader.connection(node.entries["connection"].value)  # type: ignore[union-attr]
     ports = [*connection.sources, *connection.destinations] if connection is not None else []
     is_good = connection is not None and not len(problems) and all(is_endpoint(port.text) for port in ports)
-    assert bool(re.search(CONNECTION, text)) == is_good, text
+    assert bool(re.search(CONNECTION_TEXT, text)) == is_good, text
 
 
 def is_endpoint(text: str) -> bool:
