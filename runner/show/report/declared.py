@@ -11,21 +11,9 @@ from ...model import Model
 from ...study import Plan
 from ...text import Mapping, Node, Problems, Sequence, plain
 from ..drawing import Complaint, made, place, tell
+from . import of_signals  # noqa: F401  whose types are known by that
 from .figure import SignalFigure, StudyFigure
-from .of_signals import Series, SingleRun, Tracks
 from .of_table import CURVES, Distributions, Means
-
-__all__ = [
-    "Distributions",
-    "Means",
-    "Series",
-    "SingleRun",
-    "Tracks",
-    "check_figures",
-    "default_figures",
-    "figures_of_study",
-    "study_figure_types",
-]
 
 
 def study_figure_types() -> dict[str, type[StudyFigure]]:
