@@ -39,7 +39,7 @@ COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
-    "tests/actors", "tests/api", "tests/aspects", "tests/cli/test_output.py", "tests/conformance", "tests/core",
+    "tests/actors", "tests/api", "tests/aspects", "tests/commands/test_output.py", "tests/conformance", "tests/core",
     "tests/engine", "tests/library",
     "tests/model", "tests/numerics", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
