@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from epicycle.aspects import Aspect, ExecutionAspect, JoinPoint, Unit
@@ -25,10 +26,11 @@ class Visits:
         self._acts = acts
         self._mutes = (*(() if acts else ("forward", "stop")), *(() if tells else ("act", "count", "record")))
         self._points: dict[JoinPoint, JoinPoint] = {}
-        setattr(self.aspect, "pass_token", self._pass_token)  # noqa: B010 (they are methods)
-        setattr(self.aspect, "pass_by", self._pass_by)  # noqa: B010
+        # Each run has a copy of the original, and tells this of it.
+        setattr(self.aspect, "pass_token", partial(self._pass_token, aspect))  # noqa: B010 (they are methods)
+        setattr(self.aspect, "pass_by", partial(self._pass_by, aspect))  # noqa: B010
         if isinstance(aspect, ExecutionAspect):
-            setattr(self.aspect, "begin", self._begin)  # noqa: B010
+            setattr(self.aspect, "begin", partial(self._begin, aspect))  # noqa: B010
 
     def demand_some(self, at: str | Sequence[str]) -> None:
         """Raise ``AssertionError`` if nothing has passed."""
@@ -37,20 +39,20 @@ class Visits:
                 f"nothing has passed {self._original!r} at {at}, so nothing is shown: let it run longer"
             )
 
-    def _pass_token(self, token: Any, point: JoinPoint) -> None:
+    def _pass_token(self, original: Aspect, token: Any, point: JoinPoint) -> None:
         self.count += 1
         if point.port not in self.streams:
             self.streams[point.port] = repr(point.random)
-        self._do(self._original.pass_token, token, point)
+        self._do(original.pass_token, token, point)
 
-    def _pass_by(self, token: Any, point: JoinPoint) -> None:
-        self._do(self._original.pass_by, token, point)
+    def _pass_by(self, original: Aspect, token: Any, point: JoinPoint) -> None:
+        self._do(original.pass_by, token, point)
 
-    def _begin(self, unit: Unit) -> None:
+    def _begin(self, original: ExecutionAspect, unit: Unit) -> None:
         assert isinstance(self._original, ExecutionAspect)
         muted = self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart"))
         assert isinstance(muted, Unit)
-        self._original.begin(muted)
+        original.begin(muted)
 
     def _do(self, method: Callable[[Any, JoinPoint], None], token: Any, point: JoinPoint) -> None:
         known = self._points.get(point)

@@ -193,8 +193,8 @@ connections: [t.output -> fast.go, fast.gone -> probe.input]
 aspects: {slow: {type: ExecutionTime, time: 0.4 s, at: fast}}
 run: {stop: 3 s}
 """
-    model, results = simulate(text)
-    assert [(time, tokens) for time, _, tokens in seen(model)] == [(n + 0.2, (n,)) for n in range(3)]
+    simulation, results = simulate(text)
+    assert [(time, tokens) for time, _, tokens in seen(simulation)] == [(n + 0.2, (n,)) for n in range(3)]
     assert {act[3] for act in acts(results)} == {0.4}
 
 
@@ -234,16 +234,16 @@ connections: [t.output -> first.input, t.output -> a.input, a.output -> last.inp
 aspects: {hold: {type: Hold, at: a}, free: {type: Free, at: first.input}}
 run: {stop: 3 s}
 """
-    model, _ = simulate(text, types=[Hold, Free])
-    assert seen(model) == [(n + 1.0, 1, (n,)) for n in range(3)]  # while t fires, the turn of a is still to come
+    simulation, _ = simulate(text, types=[Hold, Free])
+    assert seen(simulation) == [(n + 1.0, 1, (n,)) for n in range(3)]  # while t fires, the turn of a is still to come
     held.clear()
     # While b fires, which comes after a, it is over: so it is the next microstep.
     later = text.replace("last: {type: Scale}", "last: {type: Scale}, b: {type: Scale}, c: {type: Scale}")
     later = later.replace(
         "t.output -> first.input", "t.output -> b.input, b.output -> c.input, t.output -> first.input"
     )
-    model, _ = simulate(later.replace("at: first.input", "at: c.input"), types=[Hold, Free])
-    assert seen(model) == [(n + 0.0, 2, (n,)) for n in range(4)]
+    simulation, _ = simulate(later.replace("at: first.input", "at: c.input"), types=[Hold, Free])
+    assert seen(simulation) == [(n + 0.0, 2, (n,)) for n in range(4)]
 
 
 # -- what leaves no trace -------------------------------------------------------------------------------------------
@@ -361,9 +361,10 @@ def test_times_for_all_actors_over_and_over(tmp_path: Path) -> None:
     model = CHAIN.format("type: ExecutionTime, times: times.csv, scale: 2, at: [a, probe]")
     (tmp_path / "m.yaml").write_text(f"model: m\n{model}", encoding="utf-8")
     model_ = load_model(tmp_path / "m.yaml", types=TYPES)
-    results = Simulation(model_, keep_log=True).run()
+    simulation = Simulation(model_, keep_log=True)
+    results = simulation.run()
     assert [time for time, _ in sent(results)] == pytest.approx([0.2, 1.6, 2.2, 3.6, 4.2])
-    assert [row[0] for row in seen(model_)] == pytest.approx([0.4, 2.2, 2.4, 4.2, 4.4])
+    assert [row[0] for row in seen(simulation)] == pytest.approx([0.4, 2.2, 2.4, 4.2, 4.4])
 
 
 @pytest.mark.parametrize(
@@ -546,8 +547,9 @@ actors: {t: {type: Ticker}, single: {type: Single}}
 connections: [t.output -> single.go]
 run: {stop: 3 s}
 """
-    model, results = simulate(text)
-    assert {woven.name: woven.actors for woven in model.aspects} == {"single.slow": {"single.one": "single.one"}}
+    simulation, results = simulate(text)
+    aspects = simulation.model.aspects
+    assert {woven.name: woven.actors for woven in aspects} == {"single.slow": {"single.one": "single.one"}}
     assert [time for time, _ in sent(results, "single.one")] == [1, 2, 3]
 
 
@@ -573,7 +575,7 @@ run: {stop: 300 s}
     simulation = Simulation(model, keep_log=True)
     results = simulation.run()
     assert sent(results, "plan") == [(200.5, "over")]
-    assert len(simulation._wiring._executions["plan"]._asked) < 3
+    assert len(simulation._run._ways._executions["plan"]._asked) < 3
 
 
 def test_streams_belong_to_actors() -> None:
