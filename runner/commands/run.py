@@ -78,8 +78,10 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Run the model, report and write what was asked for."""
     from epicycle.actors import EpicycleError
 
-    from ..engine import ActorError, LogFile, LogFilter, LoopError, Pace, Simulation
-    from ..show import FigureError, check_folder, draw_figures, figures_of, summary_object, summary_table, write_folder
+    from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
+    from ..model import figures_of
+    from ..results import LogFile
+    from ..show import FigureError, check_folder, draw_figures, summary_object, summary_table, write_folder
     from ..text import Problems
 
     log = LogFile(options.log) if options.log is not None else None

@@ -120,7 +120,7 @@ def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], 
 
 def _token(token: Any) -> str:
     """A token on one line, its numbers to six digits, and not too much of it."""
-    from ..engine import plain
+    from ..results import plain
     from ..shown import six_digits
 
     text = json.dumps(six_digits(plain(token)), ensure_ascii=False)
@@ -128,7 +128,7 @@ def _token(token: Any) -> str:
 
 
 def _as_json(firing: Firing) -> str:
-    from ..engine import plain
+    from ..results import plain
 
     def tag(at: Tag | None) -> dict[str, float | int] | None:
         return None if at is None else {"time": at.seconds, "microstep": at.microstep}
