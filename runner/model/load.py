@@ -31,8 +31,9 @@ from ..text import NORMAL, Limits, Problems, call_site, node_of
 from ..text import Mapping as MappingNode
 from .checks import check
 from .draft import Draft
+from .figures import figures_of
 from .graph import ModelGraph
-from .model import Figure, Model
+from .model import DeclaredFigure, Model
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .untried import try_classes
@@ -86,8 +87,6 @@ def load_model(
         settler = Settler(Settings(settings, limits), problems)
         model = build(text, known, settler, limits)
         if model.figures:
-            from ..show import figures_of  # here, for what is shown stands on what is run
-
             figures_of(model, problems)
         problems.raise_if_any()
         model.warnings = problems.warnings
@@ -127,7 +126,7 @@ def _check_names(known: Known, problems: Problems) -> None:
         )
 
 
-def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, Figure]:
+def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, DeclaredFigure]:
     """The type of each figure, its values, and these as they are written."""
     found = {}
     for name, part in text.figures.items():

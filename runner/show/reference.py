@@ -10,11 +10,12 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from epicycle.actors import Configurable, bounds_text, variants
+from epicycle.actors import Configurable, bounds_text
 
 from ..catalogue import (
     TAKES,
     Catalogue,
+    Figure,
     Measure,
     ParameterReference,
     PortReference,
@@ -27,12 +28,6 @@ from ..catalogue import (
 from ..language import CONSTRUCTS
 from ..model import Model
 from ..printing import columns
-from .figures import Figure
-
-
-def figure_types() -> dict[str, type[Figure]]:
-    """The figures that a model may ask for, by name."""
-    return dict(sorted(variants(Figure).items()))
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import shutil
 from html.parser import HTMLParser
@@ -20,7 +19,6 @@ from epicycle.runner.show.report.data import Data
 from epicycle.runner.show.report.figure import layout, roles
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
-from epicycle.runner.shown import rounded
 from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
 from epicycle.runner.study.plan.described import si_unit
 from epicycle.runner.study.run.manifest import manifest_text
@@ -105,7 +103,7 @@ def page(folder: Path) -> Page:
 def queue(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a study of a queue, with its report."""
     folder = tmp_path_factory.mktemp("queue")
-    model = (Path(__file__).parents[2] / "models" / "mm1.yaml").read_text().replace("stop: 4000 s", "stop: 200 s")
+    model = (Path(__file__).parents[3] / "models" / "mm1.yaml").read_text().replace("stop: 4000 s", "stop: 200 s")
     (folder / "mm1.yaml").write_text(model)
     (folder / "queue.yaml").write_text(QUEUE.replace("model: mm1", "model: ./mm1.yaml"))
     assert main(["study", str(folder / "queue.yaml"), "--out", str(folder / "out"), "--jobs", "2"]) == 0
@@ -392,12 +390,3 @@ def test_units_of_columns(queue: Path) -> None:
     assert plan.columns["load"].unit == "1"
     units = {"cm": "m", "km/h": "m/s", "deg/s": "rad/s", "%": "1", "Hz": "Hz", "N": "N", "kW": "m^2 kg/s^3", "min": "s"}
     assert {unit: si_unit(unit) for unit in units} == units
-
-
-def test_numbers_have_the_digits_of_their_interval() -> None:
-    assert rounded(4.8123, 2 * 0.0567) == "4.812"
-    assert rounded(4.8123, 2 * 0.567) == "4.81"
-    assert rounded(1234.5, 2 * 56.7) == "1,234"
-    assert rounded(4.8123, 0.0) == "4.8123"
-    assert rounded(4.8123, math.inf) == "4.8123"
-    assert rounded(math.nan, 1.0) == "–"
