@@ -271,11 +271,11 @@ def _is_plain(cls: type) -> bool:
 
 def _attributes(thing: Any) -> Iterable[tuple[str, Any]]:
     """What an object holds, by name."""
-    yield from getattr(thing, "__dict__", _EMPTY).items()
     cls: Any = type(thing)
-    for name in _slots(cls):
-        if (value := getattr(thing, name, _NOTHING)) is not _NOTHING:
-            yield name, value
+    named: dict[str, Any] = getattr(thing, "__dict__", _EMPTY)
+    if slots := _slots(cls):
+        named = {**named, **{name: getattr(thing, name) for name in slots if hasattr(thing, name)}}
+    return named.items()
 
 
 @cache

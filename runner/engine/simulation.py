@@ -8,6 +8,7 @@ from typing import Any, TypeVar, overload
 from epicycle.actors import Actor, EpicycleError, Process, Tag, did_you_mean, to_nanoseconds
 from epicycle.aspects import Aspect
 
+from ..collection import without_collection
 from ..model import Model, WovenAspect
 from ..results import EventLog, Record, Results, Signal
 from .copies import Copies
@@ -56,7 +57,8 @@ class Snapshot:
 
 
 def _copy(run: Run) -> Run:
-    return Copies(run.outside).of(run)
+    with without_collection():
+        return Copies(run.outside).of(run)
 
 
 class Simulation:
