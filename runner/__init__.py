@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .engine import ActorError, Simulation
-    from .model import Composite, Model, ModelError, load_composite, load_model
+    from .model import Composite, Model, load_composite, load_model
     from .results import Results, Signal
     from .study import StudyResults, open_study
+    from .text import ModelError
     from .trial import Trial
 
 __all__ = [
@@ -35,7 +36,7 @@ _HOMES = {
     "Simulation": "engine",
     "Trial": "trial",
     "Model": "model",
-    "ModelError": "model",
+    "ModelError": "text",
     "load_composite": "model",
     "load_model": "model",
     "StudyResults": "study",

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
 from .parameter import Configurable, ParameterError
@@ -89,6 +89,15 @@ class _NoContext:
         raise RuntimeError(f"{self._actor.path} is not part of a running model")
 
 
+class _SourceByPorts:
+    """What ``Actor.is_source`` is for a class that does not say: what has no inputs can only be woken by itself."""
+
+    def __get__(self, instance: object, owner: type[Actor]) -> bool:
+        ports = declared_ports(owner).values()
+        takes_tokens = any(isinstance(port, InputPort) and not isinstance(port, ParameterPort) for port in ports)
+        return not takes_tokens and not has_own_ports(owner)
+
+
 class Actor(Configurable):
     """Base of all actors: declare ``InputPort``, ``OutputPort`` and ``Parameter`` in the class, write ``fire``.
 
@@ -102,8 +111,9 @@ class Actor(Configurable):
     ...             self.output.send(self.factor * token)
     """
 
-    # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.
-    is_source: ClassVar[bool] = False
+    # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.  It follows from
+    # the class's having no input beside parameters; one that has inputs and starts by itself says True.
+    is_source: ClassVar[bool] = cast(bool, _SourceByPorts())
 
     @property
     def is_endless(self) -> bool:
@@ -112,7 +122,7 @@ class Actor(Configurable):
 
     def __init__(self, path: str, **parameters: object) -> None:
         try:
-            super().__init__(**parameters)
+            self._configure(parameters)
         except ParameterError as error:
             raise ParameterError(f"{path}: {error}") from None
         self.path = path
@@ -131,6 +141,7 @@ class Actor(Configurable):
                 self.outputs[name] = bound
         for name, port in self.own_ports().items():
             self._add_own(name, port)
+        self.check()
 
     if not TYPE_CHECKING:  # or else every name would be there
 

@@ -81,17 +81,19 @@ def add_types(command: argparse.ArgumentParser) -> None:
 
 def own_types(options: argparse.Namespace) -> list[type]:
     """The types of the files that ``--types`` names."""
-    from ..model.own_types import types_of_file
+    from ..catalogue import types_of_file
 
     return [each for file in options.types for each in types_of_file(Path(file))]
 
 
-def seed(text: str) -> int:
-    """A seed: a whole number from 0 on."""
-    number = int(text) if text.isdecimal() else -1
-    if not 0 <= number < 2**64:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to 2**64 - 1")
-    return number
+def seed(text: str, last: int | None = None) -> int:
+    """A seed: a whole number from 0 on, and up to ``last`` where others follow it."""
+    from ..text import MAX_SEED
+
+    last = MAX_SEED if last is None else last
+    if not text.isdecimal() or len(text) > 20 or int(text) > last:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {last}")
+    return int(text)
 
 
 def positive(text: str) -> int:
@@ -123,7 +125,8 @@ def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) ->
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     """The model that the options describe; warnings are printed, or with ``strict`` raised."""
-    from ..model import ModelError, load_model
+    from ..model import load_model
+    from ..text import ModelError
 
     model = load_model(
         options.model,

@@ -80,8 +80,8 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     from epicycle.actors import EpicycleError
 
     from ..engine import ActorError, LogFile, LogFilter, LoopError, Pace, Simulation
-    from ..model import Problems
     from ..show import FigureError, check_folder, draw_figures, figures_of, summary_object, summary_table, write_folder
+    from ..text import Problems
 
     log = LogFile(options.log) if options.log is not None else None
     if log is None and options.log_where:

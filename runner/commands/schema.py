@@ -22,8 +22,8 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Write the schema."""
-    from ..model.catalogue import installed
-    from ..model.schema import json_schema, schema_text
+    from ..catalogue import installed
+    from ..language import json_schema, schema_text
     from ..show import figure_types
     from ..show.report import study_figure_types
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, complain_traceback, tell
-from .options import DONE, FAILED, INTERRUPTED, add_types
+from .options import DONE, FAILED, INTERRUPTED, add_types, seed
 
 if TYPE_CHECKING:
     from ..study import Plan, StudyResults
@@ -75,11 +75,9 @@ def count(text: str) -> int:
 
 def first_seed(text: str) -> int:
     """A seed after which those of all replications are seeds, too."""
-    from ..study.declaration import MAX_STUDY_SEED
+    from ..language import MAX_STUDY_SEED
 
-    if not text.isdecimal() or len(text) > 20 or int(text) > MAX_STUDY_SEED:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {MAX_STUDY_SEED}")
-    return int(text)
+    return seed(text, MAX_STUDY_SEED)
 
 
 def address(text: str) -> str:
@@ -103,8 +101,9 @@ def seconds(text: str) -> float:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Read, try and run the study."""
+    from ..language import read_study
     from ..show.report import check_figures
-    from ..study import Plan, available_cores, check_size, read_study
+    from ..study import Plan, available_cores, check_size
 
     check_session(options)
     types = [Path(file) for file in options.types]
@@ -153,9 +152,7 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Make the runs that are missing, and tell what came of it."""
     from epicycle.actors import counted
 
-    from ..study import WorkerError, WriteError, open_study, run_study
-    from ..study.one_run import again
-    from ..study.progress import progress
+    from ..study import WorkerError, WriteError, again, open_study, progress, run_study
 
     try:
         with progress(plan.study.name) as told:

@@ -12,10 +12,10 @@ from typing import Any, TypeAlias
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula, operand
 
+from ..catalogue import MSER5, TIME, Measure
 from ..model import Metric
-from ..model.measure import MSER5, TIME, Measure
 from ..results import Outcome
-from ..tables import short
+from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
 from .statistic import statistic_of
 

@@ -195,7 +195,7 @@ class Run:
 
     def _placed(self, error: ActorError) -> ActorError:
         """The error with the place in the model file where its actor is declared, and the user's line it comes from."""
-        position = self.model.graph.positions.get(error.path)
+        position = self.model.position_of(error.path)
         where = f"{position.file}:{position.line}:{position.column}" if position else ""
         return ActorError(error.path, error.tag, error.doing, error.reason, where, raised_at(_cause(error)))
 

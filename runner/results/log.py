@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, Tag, to_seconds
 
-from ..tables import pandas_module, short
+from ..shown import short
+from ..tables import pandas_module
 from .encoding import canonical, plain
 from .signal import Past
 from .waiting import LARGE, WaitingTokens

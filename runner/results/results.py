@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, did_you_mean, to_seconds
 
-from ..tables import Table, as_html, as_text, pandas_module, short
+from ..shown import short
+from ..tables import Table, as_html, as_text, pandas_module
 from .encoding import cell, leaves
 from .log import EventLog
 from .outcome import Interval, Outcome

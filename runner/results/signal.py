@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from epicycle.actors import EpicycleError, Tag, counted, did_you_mean, to_seconds
 
-from ..tables import Table, as_html, as_text, pandas_module, short
+from ..shown import short
+from ..tables import Table, as_html, as_text, pandas_module
 from .encoding import field_names, leaves
 
 if TYPE_CHECKING:

@@ -76,17 +76,17 @@ def state(model: Model) -> Any:
     return {
         "ports": [(path, sorted((key, str(value)) for key, value in node.items())) for path, node in nodes],
         "edges": list(graph.ports.edges(keys=True)),
-        "hops": [(str(hop), hop.order, hop.delay) for hop in graph.since(0)],
+        "hops": [(str(hop), hop.order, hop.delay) for hop in graph.hops],
         "ways": [[str(hop) for hop in (*graph.incoming(port), *graph.outgoing(port))] for port in graph.ports],
-        "actors": [(path, id(actor), actor.path, actor.home is graph) for path, actor in graph.actors.items()],
+        "actors": [(path, id(actor), actor.path, actor.home is not None) for path, actor in graph.actors.items()],
         "by path": [deepcopy(list(each.items())) for each in by_path],
         "borders": [deepcopy(graph.borders(path)) for path in graph.composites],
         "clocks": list(graph.clocks),
-        "names": [set(each) for each in (graph.empty_arrays, graph.unknown, graph.absent)],
-        "rest": (graph.is_wired, graph.mark(), list(map(str, graph.detours)), model.is_checked),
+        "gaps": [set(each) for each in (model.draft.empty, model.draft.unknown, model.draft.open, model.draft.kinds)],
+        "rest": (model.draft.is_wired, graph.next_order, list(map(str, graph.detours)), model.is_checked),
         "aspects": [(woven.name, id(woven), repr(woven)) for woven in model.aspects],
         "watched": (model.recorded[:], model.stop_ports[:], [repr(metric) for metric in model.metrics], model.stop),
-        "scopes": [(id(scope), list(scope._children), repr(scope)) for scope in scopes],
+        "scopes": [(id(scope), list(scope._inside.children), repr(scope)) for scope in scopes],
     }
 
 
@@ -196,7 +196,7 @@ def test_after_a_refused_disturbance_what_it_would_have_added_is_not_there(folde
         model.remove("wait")
     (problem,) = caught.value.problems
     assert problem.message == "m has no actor 'wait'"
-    assert problem.help == ("valid actors: line, more[0], more[1], beside, clock, shop",)
+    assert problem.help == ("valid actors: clock, line, more[0], more[1], shop, beside",)
     (folder / "d.yaml").write_text(DISTURBANCE.rpartition("  second")[0], encoding="utf-8")
     assert [woven.name for woven in model.disturb(folder / "d.yaml")] == ["wait", "first"]
     model.remove("wait")

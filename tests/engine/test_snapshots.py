@@ -19,10 +19,10 @@ import simpy
 from epicycle.actors import Actor, Clock, EpicycleError, InputPort, OutputPort, Recorder
 from epicycle.aspects import Aspect, CommunicationAspect, JoinPoint
 from epicycle.runner import Model, Simulation, load_model
+from epicycle.runner.catalogue import packaged_disturbances, packaged_models
 from epicycle.runner.engine import ActorError, CopyError, SnapshotError, Tracer
-from epicycle.runner.model import packaged_disturbances, packaged_models
 from tests.aspects.strengths import AT_WORK
-from tests.aspects.test_non_interference import GRID, at_home
+from tests.aspects.testing.test_non_interference import GRID, at_home
 from tests.conformance.conformance_parts import TYPES
 from tests.engine.engine_parts import Plan, Script, Ticker, load
 

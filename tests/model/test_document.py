@@ -9,9 +9,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.model import document
-from epicycle.runner.model.document import Mapping, Node, Scalar, parse, plain, read
-from epicycle.runner.model.problems import ModelError, Position, Problems
+from epicycle.runner.text import Mapping, ModelError, Node, Position, Problems, Scalar, document, parse, plain, read
 
 
 def load(text: str) -> Node:

@@ -6,15 +6,7 @@ import pickle
 import pytest
 
 from epicycle.actors.core.errors import EpicycleError
-from epicycle.runner.model.problems import (
-    MAX_PROBLEMS,
-    ModelError,
-    Position,
-    Problem,
-    Problems,
-    did_you_mean,
-    nearest,
-)
+from epicycle.runner.text import MAX_PROBLEMS, ModelError, Position, Problem, Problems, did_you_mean, nearest
 
 LINE = "    vehicle: {type: Vehicle, sped: 8 m/s}"
 MISTYPED = Problem(

@@ -14,18 +14,17 @@ import pytest
 
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
-from epicycle.runner.model import Problems
+from epicycle.runner.language import StudyMetric, read_study
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.show.report.figure import layout, roles
-from epicycle.runner.show.report.numbers import rounded
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
-from epicycle.runner.study import Plan, StudyMetric, read_study
-from epicycle.runner.study.columns import Column, si_unit
-from epicycle.runner.study.manifest import manifest_text
-from epicycle.runner.study.replays import Replay, ReplayError, repeat
-from epicycle.runner.study.statistics import half_width
+from epicycle.runner.shown import rounded
+from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
+from epicycle.runner.study.plan.described import si_unit
+from epicycle.runner.study.run.manifest import manifest_text
+from epicycle.runner.text import Problems
 from tests.study.study_parts import STUDY, THIS, write
 
 QUEUE = """
@@ -372,7 +371,7 @@ def test_figures_of_a_study_that_names_none(vary: str, figures: list[str], tmp_p
     problems = Problems()
     found = figures_of_study(plan, problems)
     assert list(found) == figures
-    assert [complaint for figure in found.values() for complaint in figure.check(plan)] == []
+    assert [complaint for figure in found.values() for complaint in figure.complaints(plan)] == []
     assert len(problems) == 0
 
 
