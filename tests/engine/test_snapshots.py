@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -327,9 +328,10 @@ class Library(Actor):
         self.loop: list[Any] = [self]
         self.loop.append(self.loop)
         self.alias = self.queues[self.input]
+        self.view = MappingProxyType({"input": self.input})
 
     def fire(self) -> None:
-        assert self.order["port"] is self.cells[1] is self.input
+        assert self.order["port"] is self.cells[1] is self.view["input"] is self.input
         assert self.seen == {self.input: {self.input, self.output}}
         assert self.loop[0] is self
         assert self.loop[1] is self.loop
