@@ -29,7 +29,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from epicycle.actors import Actor, EpicycleError
+from epicycle.actors import Actor, EpicycleError, Parameter
 from epicycle.actors.expression import Formula, PortFormula
 from epicycle.aspects import Aspect, JoinPoint
 
@@ -103,6 +103,11 @@ class Copies:
     def _fill_dict(self, thing: dict[Any, Any], made: dict[Any, Any]) -> None:
         for key, value in thing.items():
             made[self._copy(key)] = self._copy(value)
+
+    def _view(self, thing: types.MappingProxyType[Any, Any]) -> types.MappingProxyType[Any, Any]:
+        inner: dict[Any, Any] = {}
+        self._to_fill.append((self._fill_dict, thing, inner, self._owner))
+        return types.MappingProxyType(inner)
 
     def _tuple(self, thing: Any) -> Any:
         items = [self._copy(item) for item in thing]
@@ -271,11 +276,11 @@ def _is_plain(cls: type) -> bool:
 
 def _attributes(thing: Any) -> Iterable[tuple[str, Any]]:
     """What an object holds, by name."""
-    yield from getattr(thing, "__dict__", _EMPTY).items()
     cls: Any = type(thing)
-    for name in _slots(cls):
-        if (value := getattr(thing, name, _NOTHING)) is not _NOTHING:
-            yield name, value
+    named: dict[str, Any] = getattr(thing, "__dict__", _EMPTY)
+    if slots := _slots(cls):
+        named = {**named, **{name: getattr(thing, name) for name in slots if hasattr(thing, name)}}
+    return named.items()
 
 
 @cache
@@ -322,7 +327,7 @@ _CONSTANT = frozenset(
         type(typing.Any), type(list[int] | T), type(typing.Annotated[int, 1]), np.float64, np.int64, np.bool_,
     }
 )  # fmt: skip
-_UNCHANGING = (type, enum.Enum, PurePath, np.dtype, np.generic, np.ufunc, Formula, PortFormula)
+_UNCHANGING = (type, enum.Enum, PurePath, np.dtype, np.generic, np.ufunc, Parameter, Formula, PortFormula)
 _MAKE: dict[type, Callable[[Copies, Any], Any]] = {
     list: Copies._list,
     deque: lambda copies, thing: copies._later(
@@ -330,6 +335,7 @@ _MAKE: dict[type, Callable[[Copies, Any], Any]] = {
     ),
     dict: Copies._dict,
     set: Copies._set,
+    types.MappingProxyType: Copies._view,
     tuple: Copies._tuple,
     types.FunctionType: Copies._function,
     types.CellType: Copies._cell,

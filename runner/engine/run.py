@@ -42,6 +42,7 @@ class Run:
     ) -> None:
         self.model = model
         self.seed = seed
+        self.keeps = keeps
         self.is_begun = self.is_over = False
         self.stopped = ""  # why there is nothing more to do, once there is not
         self._tracer = tracer

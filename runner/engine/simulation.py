@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar, overload
 
 from epicycle.actors import Actor, EpicycleError, Process, Tag, did_you_mean, to_nanoseconds
 from epicycle.aspects import Aspect
 
+from ..collection import without_collection
 from ..model import Model, WovenAspect
 from ..results import EventLog, Record, Results, Signal
 from .copies import Copies
@@ -33,16 +35,16 @@ class Snapshot:
         self.tag = run.director.last
         self._digest = run.log.digest  # which leaves nothing in the log that waits for its bytes
         self._steps = run.director.steps
-        self._is_begun = run.is_begun
         # Python cannot copy a generator: what is kept of processes is the way there.
         has_processes = run.is_begun and any(isinstance(actor, Process) for actor in run.actors.values())
-        self._run = None if has_processes else _copy(run)
+        self.run = None if has_processes else _copy(run)  # a copy that stays where it is
+        self._keeps = run.keeps
 
-    def again(self, start: Callable[[int], Run]) -> Run:
-        """A run that goes on from here; ``start`` makes one that begins, with a seed.  Raises ``SnapshotError``."""
-        if self._run is not None:
-            return _copy(self._run)
-        run = start(self.seed)
+    def again(self) -> Run:
+        """A run that goes on from here; raises ``SnapshotError``."""
+        if self.run is not None:
+            return _copy(self.run)
+        run = Run(self.model, self.seed, self._keeps)
         run.go(None, most=self._steps)
         if (run.director.last, run.log.digest) != (self.tag, self._digest):
             raise SnapshotError(
@@ -56,7 +58,8 @@ class Snapshot:
 
 
 def _copy(run: Run) -> Run:
-    return Copies(run.outside).of(run)
+    with without_collection():
+        return Copies(run.outside).of(run)
 
 
 class Simulation:
@@ -88,10 +91,9 @@ class Simulation:
         if seed < 0:
             raise ValueError(f"a seed is a whole number from 0 up, not {seed}")
         self.model = model
-        self._keeps = keep_log.keeps if keep_log else None
         self._is_told_of = log_to is not None or tracer is not None
         self._parts = _parts(model.graph.actors, model.aspects)
-        self._run = Run(model, seed, self._keeps, log_to, tracer)
+        self._run = Run(model, seed, keep_log.keeps if keep_log else None, log_to, tracer)
 
     # -- running --------------------------------------------------------------------------------------------------
 
@@ -108,7 +110,8 @@ class Simulation:
         ``pace`` holds the run to the wall clock.
         """
         self._refuse_over()
-        self._run.go(self._until(until), progress=progress, pace=pace)
+        stop = self.model.stop_time if until is None else to_nanoseconds(until)
+        self._run.go(stop, progress=progress, pace=pace)
         return self._run.finish()
 
     def advance(self, until: float) -> bool:
@@ -136,9 +139,6 @@ class Simulation:
         if self._run.is_over:
             raise RuntimeError("a Simulation runs once: make another one for another run")
 
-    def _until(self, until: float | None) -> int | None:
-        return self.model.stop_time if until is None else to_nanoseconds(until)
-
     # -- going back -----------------------------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
@@ -148,12 +148,9 @@ class Simulation:
         copy, it holds how far the run has come, and going back to it runs the model again up to there.  Raises
         ``SnapshotError`` for a run that is over, or that others are told of; ``CopyError`` for what cannot be copied.
         """
+        self._refuse_told()
         if self._run.is_over:
             raise SnapshotError(f"the run of {self.model.name} is over: take a snapshot before its end")
-        if self._is_told_of:
-            raise SnapshotError(
-                f"the run of {self.model.name} is told to log_to or to a tracer, which cannot be untold: leave them out"
-            )
         return Snapshot(self._run)
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -161,23 +158,22 @@ class Simulation:
 
         Actors are copies of those in the snapshot: ask ``simulation["path"]`` for them once more.
         """
+        self._refuse_told()
         if snapshot.model is not self.model:
             raise SnapshotError(f"{snapshot!r} is of another model than this simulation of {self.model.name}")
+        self._run = snapshot.again()
+
+    def fork(self) -> Simulation:
+        """Another simulation that goes on from here, as this one does unless something is changed in it."""
+        snapshot, fork = self.snapshot(), copy.copy(self)
+        fork._run = snapshot.run or snapshot.again()
+        return fork
+
+    def _refuse_told(self) -> None:
         if self._is_told_of:
             raise SnapshotError(
                 f"the run of {self.model.name} is told to log_to or to a tracer, which cannot be untold: leave them out"
             )
-        self._run = snapshot.again(self._started)
-
-    def fork(self) -> Simulation:
-        """Another simulation that goes on from here, as this one does unless something is changed in it."""
-        fork = object.__new__(Simulation)
-        fork.__dict__.update(self.__dict__)
-        fork.restore(self.snapshot())
-        return fork
-
-    def _started(self, seed: int) -> Run:
-        return Run(self.model, seed, self._keeps)
 
     # -- what there is in it --------------------------------------------------------------------------------------
 

@@ -11,7 +11,6 @@ from epicycle.actors import (
     Context,
     Emit,
     EpicycleError,
-    InputPort,
     OutputPort,
     PortError,
     Tag,
@@ -76,6 +75,7 @@ class Ways:
         self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
         self._requests = {woven.name: Requests(woven) for woven in aspects if woven.model is not None}
         self._shared: dict[object, dict[Any, Any]] = {}
+        self._channels: dict[tuple[Hop, ...], int] = {}  # at their ends
         self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
         for woven in aspects:
             for path in (*woven.ports, *(woven.actors if isinstance(woven.aspect, ExecutionAspect) else ())):
@@ -100,7 +100,6 @@ class Ways:
             if path in self._woven_at or path in changed
         }
         self._emits = self._find()
-        self._varying: list[VaryingParameter] = []
         self._vary_parameters(aspects)
         for path, execution in self._executions.items():
             execution.way = self._scheduled(path, execution.execute)
@@ -120,7 +119,6 @@ class Ways:
             for woven in reversed(there):
                 entry = self._through(woven, path, path, entry)
             self._executions[owner].refresh.append(partial(entry, varying.nominal))
-            self._varying.append(varying)
 
     def director_of(self, path: str) -> Director | LocalDirector:
         """The director that an actor or composite stands under, with its time."""
@@ -153,41 +151,42 @@ class Ways:
         """From now on none can."""
         for output, _ in self._emits:
             output.disconnect()
-        for varying in self._varying:
-            varying.restore()
 
     def _find(self) -> list[tuple[OutputPort[Any], Emit]]:
         # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
-        channels: dict[tuple[Hop, ...], int] = {}
+        leaving: dict[str, list[tuple[Hop, ...]]] = {}
         for actor in self.actors.values():
             for port in actor.inputs.values():
                 wires = self.graph.wires_to(port)
                 port.width = len(wires)
-                channels.update({wire.hops: channel for channel, wire in enumerate(wires)})
+                for channel, wire in enumerate(wires):
+                    self._channels[wire.hops] = channel
+                    leaving.setdefault(wire.source.path, []).append(wire.hops)
+        for hops in leaving.values():
+            hops.sort(key=lambda way: [hop.order for hop in way])  # as they are declared
         emits = [
-            (output, self._emit(output, channels))
+            (output, self._emit(output, leaving.get(output.path, [])))
             for actor in self.actors.values()
             for output in actor.outputs.values()
         ]
-        self._open_requests(channels)
+        self._open_requests()
         return emits
 
-    def _open_requests(self, channels: dict[tuple[Hop, ...], int]) -> None:
+    def _open_requests(self) -> None:
         """Find the ways from the request ports of aspects that are models to the actors inside."""
         ways: dict[str, Deliver] = {}
         for requests in self._requests.values():
             for place, path in requests.model.requests.items():
                 if path not in ways:
-                    ways[path] = _all(self._branches(path, (), channels))
+                    ways[path] = _all(self._branches(path, ()))
                 passage = self._passages.get(path)
                 onward = ways[path] if passage is None else passage.lane(place, ways[path])
                 requests.entries[place] = self._woven(path, path, onward)
 
-    def _emit(self, port: OutputPort[Any], channels: dict[tuple[Hop, ...], int]) -> Emit:
+    def _emit(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emit:
         """What ``port.send`` does."""
         listeners = self._listeners.get(port.path, [])
-        everywhere = _all(listeners + self._branches(port.path, (), channels))
-        wires = self.graph.wires_from(port)
+        everywhere = _all(listeners + self._branches(port.path, ()))
         # To single channels, made when the first token takes them: few ever do.
         ways: dict[int, tuple[Write, Deliver]] = {}
         port.width = len(wires)
@@ -204,8 +203,7 @@ class Ways:
                 if not 0 <= channel < len(wires):
                     known = f"it has {counted(len(wires), 'channel')}, counted from 0"
                     raise PortError(f"{port.path} has no channel {channel}: {known}")
-                hops = wires[channel].hops
-                along = _all([*listeners, self._way(hops, channels[hops])])
+                along = _all([*listeners, self._way(wires[channel])])
                 way = ways[channel] = log.writer("send", path, name, channel, ""), along
             write_one, onward = way
             write_one(director.present or director.tag, token)
@@ -225,22 +223,21 @@ class Ways:
 
         return emit_woven
 
-    def _branches(self, path: str, hops: tuple[Hop, ...], channels: dict[tuple[Hop, ...], int]) -> list[Deliver]:
+    def _branches(self, path: str, hops: tuple[Hop, ...]) -> list[Deliver]:
         """The ways onward from a port, one for each connection that leaves it."""
         ways = []
         for hop in self.graph.outgoing(path):
             far, taken = hop.destination, (*hops, hop)
-            port = self.graph.ports.nodes[far]["port"]
-            if isinstance(port, InputPort):
-                onward = self._put(far, channels[taken])
+            if self.graph.owner(far) in self.actors:
+                onward = self._put(taken)
             else:
-                onward = _all(self._listeners.get(far, []) + self._branches(far, taken, channels))
+                onward = _all(self._listeners.get(far, []) + self._branches(far, taken))
             ways.append(self._over(hop, onward, taken))
         return ways
 
-    def _way(self, hops: tuple[Hop, ...], channel: int) -> Deliver:
+    def _way(self, hops: tuple[Hop, ...]) -> Deliver:
         """The way along one wire alone, for tokens that are sent to one channel."""
-        onward = self._put(hops[-1].destination, channel)
+        onward = self._put(hops)
         for hop in reversed(hops):
             onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]), hops)
         return onward
@@ -262,10 +259,11 @@ class Ways:
             onward = self._through(woven, far, source, onward, f"{hop.source} -> {far}")
         return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
 
-    def _put(self, path: str, channel: int) -> Deliver:
-        owner, _, name = path.rpartition(".")
+    def _put(self, hops: tuple[Hop, ...]) -> Deliver:
+        """The end of a wire, in the port of an actor."""
+        owner, _, name = hops[-1].destination.rpartition(".")
         port, execution = self.actors[owner].inputs[name], self._executions.get(owner)
-        return self.director.entry(port, channel, None if execution is None else execution.turn_of(port))
+        return self.director.entry(port, self._channels[hops], None if execution is None else execution.turn_of(port))
 
     def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:
         later = self._directors[self.graph.director_over(hop)].later

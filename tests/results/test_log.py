@@ -252,7 +252,7 @@ def test_order_and_digest() -> None:
 
 def test_the_digest_does_not_depend_on_the_hash_seed() -> None:
     script = (
-        "from tests.engine.test_log import MODEL, simulate\n"
+        "from tests.results.test_log import MODEL, simulate\n"
         "from epicycle.runner.engine import canonical\n"
         "print(simulate(MODEL, seed=3)[1].digest, canonical({'a', 'b', 'c', 'd'}).hex())"
     )
