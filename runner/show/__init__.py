@@ -1,5 +1,6 @@
 """What people see: of a run summary, figures, results folder; of what is installed, the reference."""
 
+from ..catalogue import Figure
 from .drawing import FigureError, draw
 from .figures import Histogram, TimeSeries, Trajectories
 from .folder import check_folder, draw_figures, write_folder
@@ -7,6 +8,7 @@ from .reference import aspects_at, described, detail, markdown, overview, parts_
 from .summary import summary_object, summary_table
 
 __all__ = [
+    "Figure",
     "FigureError",
     "Histogram",
     "TimeSeries",

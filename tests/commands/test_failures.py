@@ -17,7 +17,7 @@ from epicycle.runner.cli import main
 OWN = """\
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
 from epicycle.aspects import ClockAspect, CommunicationAspect
-from epicycle.runner.catalogue import Figure
+from epicycle.runner.show import Figure
 
 
 class Faulty(Actor):
