@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 import epicycle.actors
 import epicycle.aspects
 from epicycle.actors import Actor, Configurable, EpicycleError, Process
-from epicycle.aspects import Aspect, ClockAspect
+from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
 
 from ..text import note_package
 
@@ -166,12 +166,9 @@ class Catalogue:
 def built_in() -> Catalogue:
     """What Epicycle's public faces offer; bases that define no behaviour are left out."""
     actors = {name: each for name, each in _public(epicycle.actors, Actor) if each not in (Actor, Process)}
-    aspects = {name: each for name, each in _public(epicycle.aspects, Aspect) if _does_something(each)}
+    bases = (Aspect, JoinPointAspect, CompositeAspect, CompositeExecutionAspect)  # types of the last two are composites
+    aspects = {name: each for name, each in _public(epicycle.aspects, Aspect) if each not in bases}
     return Catalogue(actors, aspects)
-
-
-def _does_something(aspect: type[Aspect]) -> bool:
-    return aspect.pass_token is not Aspect.pass_token or issubclass(aspect, ClockAspect)
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from epicycle.actors import (
     Actor,
@@ -17,9 +17,19 @@ from epicycle.actors import (
     Tag,
     counted,
     declared_parameters,
-    random_stream,
 )
-from epicycle.aspects import ActorPoint, ClockAspect, ExecutionAspect, JoinPoint, Medium, Unit
+from epicycle.aspects import (
+    ActorPoint,
+    ClockAspect,
+    ExecutionAspect,
+    Job,
+    JoinPoint,
+    JoinPointAspect,
+    Medium,
+    PortAspect,
+    Unit,
+    aspect_stream,
+)
 
 from ..model import Clock, Hop, ModelGraph, WovenAspect, describe
 from ..results import EventLog, Signal, Write
@@ -28,6 +38,9 @@ from .execution import Execution
 from .local_time import Deliver, LocalDirector, Passage
 from .parameters import VaryingParameter
 from .requests import Requests
+
+T = TypeVar("T")
+P = TypeVar("P", bound=JoinPoint)
 
 
 class Ways:
@@ -53,7 +66,7 @@ class Ways:
         self.director = director
         self.log = log
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in aspects}
-        self._wrong_clocks = [woven for woven in aspects if isinstance(woven.aspect, ClockAspect)]
+        self._wrong_clocks = [(woven, aspect) for woven in aspects if isinstance(aspect := woven.aspect, ClockAspect)]
         self._to_begin: list[tuple[WovenAspect, ExecutionAspect, Unit]] = []
         self._units: dict[tuple[str, str], Unit] = {}
         self._listeners = listeners
@@ -65,7 +78,7 @@ class Ways:
         self._shared: dict[object, dict[Any, Any]] = {}
         self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
         for woven in aspects:
-            for path in (*woven.ports, *(() if isinstance(woven.aspect, ClockAspect) else woven.actors)):
+            for path in (*woven.ports, *(woven.actors if isinstance(woven.aspect, ExecutionAspect) else ())):
                 self._woven_at.setdefault(path, []).append(woven)
             for connection in woven.connections:
                 self._woven_on.setdefault(connection, []).append(woven)
@@ -90,7 +103,7 @@ class Ways:
         self._varying: list[VaryingParameter] = []
         self._vary_parameters(aspects)
         for path, execution in self._executions.items():
-            execution.way = self._woven(path, path, execution.execute)
+            execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
 
     def _vary_parameters(self, aspects: list[WovenAspect]) -> None:
@@ -120,11 +133,10 @@ class Ways:
     def _by_clock(self, path: str) -> Director | LocalDirector:
         """The director by the clock of an actor, if that is wrong."""
         clock = before = self.graph.clocks[self.graph.director_of(path)]
-        for woven in self._wrong_clocks:
-            if isinstance(woven.aspect, ClockAspect) and path in woven.actors:
-                random = random_stream(self.director.seed, woven.actors[path], f"aspect {woven.name}")
+        for woven, aspect in self._wrong_clocks:
+            if path in woven.actors:
                 try:
-                    ahead, speed = woven.aspect.error(random)
+                    ahead, speed = aspect.error(aspect_stream(self.director.seed, woven.actors[path], woven.name))
                 except Exception as error:
                     raise self._error(woven, f"error() at {path}", error) from error
                 clock = Clock(clock.start + ahead, clock.rate * speed)
@@ -267,30 +279,46 @@ class Ways:
 
     def _through(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str = "") -> Deliver:
         """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
-        point = self._point(woven, path, source, onward, place or path)
-        pass_token: Callable[[Any, JoinPoint], None] = woven.aspect.pass_token
-        if woven.model is not None:
-            pass_token = self._requests[woven.name].add_way(point, place or path)
+        aspect = woven.aspect
+        assert isinstance(aspect, PortAspect)
+        point = self._point(JoinPoint, woven, aspect, path, onward, place or path, source)
+        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()")
 
-        def through(token: Any) -> None:
+    def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
+        """``onward`` with the aspects that stand at an actor before it, the first declared outermost."""
+        for woven in reversed(self._woven_at.get(path, [])):
+            aspect = woven.aspect
+            assert isinstance(aspect, ExecutionAspect)
+            point = self._point(ActorPoint, woven, aspect, path, onward, path)
+            self._join(point, woven, aspect)
+            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()")
+        return onward
+
+    def _guarded(
+        self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
+    ) -> Callable[[T], None]:
+        """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
+        path = point.port
+
+        def through(passing: T) -> None:
             try:
-                pass_token(token, point)
+                act(passing, point)
             except (ActorError, LoopError):  # of what comes behind it
                 raise
             except Exception as error:
-                raise self._error(woven, f"pass_token() at {path}", error) from error
+                raise self._error(woven, f"{name} at {path}", error) from error
 
-        if woven.aspect.is_always_active:
+        if aspect.is_always_active:
             return through
 
-        def through_if_active(token: Any) -> None:
+        def through_if_active(passing: T) -> None:
             doing = "is_due()"
             try:
-                if woven.aspect.is_due(point.tag.time) and self._holds(woven, point):
-                    through(token)
+                if aspect.is_due(point.tag.time) and self._holds(woven, aspect, point):
+                    through(passing)
                 else:
                     doing = "pass_by()"
-                    woven.aspect.pass_by(token, point)
+                    aspect.pass_by(passing, point)
             except (ActorError, LoopError):  # of what comes behind it
                 raise
             except Exception as error:
@@ -307,12 +335,12 @@ class Ways:
         except EpicycleError as error:
             raise self._error(woven, "delivering", error) from None
 
-    def _holds(self, woven: WovenAspect, point: JoinPoint) -> bool:
+    def _holds(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
         """Whether the ``when`` of an aspect is true of what the ports have sent last; before they have, it is not."""
-        if woven.aspect.when is None:
+        if aspect.when is None:
             return True
         try:
-            return bool(point.value_of(woven.aspect.when))
+            return bool(point.value_of(aspect.when))
         except EpicycleError as error:
             raise self._error(woven, "when", error) from None
 
@@ -326,16 +354,24 @@ class Ways:
             key = (type(woven.aspect), woven.name.rpartition(".")[0], woven.aspect.medium)
         return self._shared.setdefault(key, {})
 
-    def _point(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str) -> JoinPoint:
-        name, is_actor = woven.name, path in self.actors
-        owner = path if is_actor else self.graph.owner(path)
-        local = self.director if woven.aspect.in_model_time else self.director_of(owner)
+    def _point(
+        self,
+        kind: type[P],
+        woven: WovenAspect,
+        aspect: JoinPointAspect[T, P],
+        path: str,
+        onward: Callable[[T], None],
+        place: str,
+        source: str = "",
+    ) -> P:
+        """Where an aspect stands: at a port or parameter, or at an actor."""
+        name, owner = woven.name, path if kind is ActorPoint else self.graph.owner(path)
+        local = self.director if aspect.in_model_time else self.director_of(owner)
         blame = partial(self._error, woven, f"later() at {path}")
-        weaver = (ActorLoom if is_actor else Loom)(local, self.director, self.log, self._latest, self._signals, blame)
-        kind = ActorPoint if is_actor else JoinPoint
-        point = kind(name, path, weaver, onward, self.shared(woven), place, woven.readings, source, woven.selections)
-        if isinstance(point, ActorPoint):
-            self._join(point, woven, weaver)
+        context = EngineContext(local, self.director, self.log, self._latest, self._signals, blame)
+        point = kind(name, path, context, onward, self.shared(woven), place, woven.readings, source, woven.selections)
+        if woven.model is not None:
+            point.enter = self._requests[name].add_way(point, place)
         first = self._points_at.setdefault((name, place), point)
         if first is point:
             self.points[name].append(point)
@@ -343,22 +379,24 @@ class Ways:
             point.share(first)
         return point
 
-    def _join(self, point: ActorPoint, woven: WovenAspect, weaver: Loom) -> None:
+    def _join(self, point: ActorPoint, woven: WovenAspect, aspect: ExecutionAspect) -> None:
         """Make the join point of an actor part of what the aspect was aimed at."""
         aimed = woven.name, woven.actors[point.port]
         if aimed not in self._units:
-            self._units[aimed] = Unit(aimed[1], point, weaver)
+            self._units[aimed] = Unit(aimed[1], point)
             self.points[woven.name].append(self._units[aimed])
-            if isinstance(woven.aspect, ExecutionAspect):
-                self._to_begin.append((woven, woven.aspect, self._units[aimed]))
+            self._to_begin.append((woven, aspect, self._units[aimed]))
         point.keeper, point.unit = self._executions[point.port], self._units[aimed]
         point.unit.points.append(point)
 
     def _forget(self, path: str) -> None:
         """Tell the aspects at an actor that it has lost its state."""
         for woven in self._woven_at.get(path, ()):
+            aspect, point = woven.aspect, self._points_at[woven.name, path]
+            assert isinstance(aspect, ExecutionAspect)
+            assert isinstance(point, ActorPoint)
             try:
-                woven.aspect.forget(self._points_at[woven.name, path])
+                aspect.forget(point)
             except Exception as error:
                 raise self._error(woven, f"forget() at {path}", error) from error
 
@@ -373,7 +411,7 @@ class Ways:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
 
 
-class Loom:
+class EngineContext:
     """What the engine offers to a join point: the time of the director that it stands under, the log and signals."""
 
     def __init__(
@@ -415,21 +453,13 @@ class Loom:
         except Exception as error:
             raise self._blame(error) from error
 
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
         """Write an act of an aspect into the log."""
-        actor, _, name = port.rpartition(".")
-        self._log.add(self._director.tag, event, actor, name, None, aspect, token)
+        self._log.add(self._director.tag, event, owner, port, None, aspect, token)
 
     def record(self, signal: str, token: Any) -> None:
         """Append a token to a signal of the results."""
         self._signals.setdefault(signal, Signal(signal)).add(self._director.tag, token)
-
-
-class ActorLoom(Loom):
-    """The same for the join point of an actor."""
-
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
-        self._log.add(self._director.tag, event, port, "", None, aspect, token)
 
 
 def _all(ways: list[Deliver]) -> Deliver:

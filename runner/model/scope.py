@@ -457,7 +457,7 @@ class Scope:
         self, place: object, cls: type[Aspect], graph: ModelGraph, position: Position, problems: Problems
     ) -> str | None:
         """The path of a port, or of an actor or composite for an aspect that stands at such."""
-        if "actor" not in cls.stands_at or not isinstance(place, (Actor, Composite)):
+        if cls.at_ports or not isinstance(place, (Actor, Composite)):
             return self._known(place, graph, position, problems)
         if isinstance(place, Actor) and graph.actors.get(place.path) is not place:
             problems.add(f"{place.path} is not part of this model", position, "add it to the model first")

@@ -17,6 +17,7 @@ from epicycle.actors import declared_parameters
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
+    JoinPointAspect,
     PortsParameter,
     Reading,
     Selection,
@@ -113,7 +114,8 @@ class Weaving:
                 readings[value] = [self._reading(name, each, position) for each in value.references]
                 for reference, fields in value.given_fields:
                     self._check_given(name, reference, fields, ports, position)
-        chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
+        asked = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
+        chosen = (port for pattern in asked for port in self.ports.select(self._full(pattern)))
         reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         woven = WovenAspect(
             self.name, aspect, ports, connections, actors, readings, selections, reads, parameters=parameters
@@ -128,7 +130,7 @@ class Weaving:
 
     def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         """The ports, connections and actors that the pointcuts select."""
-        if "actor" in self.cls.stands_at:
+        if not self.cls.at_ports:
             return [], [], self._select_actors(pointcuts)
         return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
 

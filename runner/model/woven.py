@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from epicycle.actors import counted
 from epicycle.actors.expression import PortFormula
-from epicycle.aspects import Aspect, CompositeExecutionAspect, ExecutionAspect, FiringTime, Reading, Selection
+from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
 
 from ..text import Problems
 from .graph import ModelGraph, is_within
@@ -99,7 +99,7 @@ def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems
     taken: dict[str, str] = {}
     for woven in aspects:
         aspect = woven.aspect
-        if not (isinstance(aspect, (ExecutionAspect, CompositeExecutionAspect)) and aspect.is_processor):
+        if not (isinstance(aspect, ExecutionAspect) and aspect.is_processor):
             continue
         if twice := [actor for actor in woven.actors if actor in taken]:
             problems.add(

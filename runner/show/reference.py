@@ -10,7 +10,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from epicycle.actors import Configurable, variants
+from epicycle.actors import Configurable, bounds_text, variants
 
 from ..catalogue import (
     TAKES,
@@ -246,10 +246,8 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
         kind = " or ".join(parameter.choices)
     elif parameter.min is not None and parameter.max is not None:
         kind += f", {parameter.min:g} to {parameter.max:g}"
-    elif parameter.min is not None:
-        kind += f" >= {parameter.min:g}"
-    elif parameter.max is not None:
-        kind += f" <= {parameter.max:g}"
+    else:
+        kind += bounds_text(parameter.min, parameter.above, parameter.max, "{:g}".format)
     return [
         parameter.name,
         kind,

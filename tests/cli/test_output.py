@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Clock, Display, EpicycleError, Parameter, readable, shortened, visible, visible_lines
-from epicycle.actors.core.visible import LONGEST
+from epicycle.actors.core.messages import LONGEST
 from epicycle.runner import Model, ModelError, Simulation, load_model
 from epicycle.runner.cli import main
 

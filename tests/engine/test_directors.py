@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process, Tag
-from epicycle.aspects import Aspect, JoinPoint
+from epicycle.aspects import JoinPoint, PortAspect
 from epicycle.runner.engine import ActorError
 from epicycle.runner.model import Clock
 from epicycle.runner.text import ModelError
@@ -70,7 +70,7 @@ class Nap(Process):
             self.output.send((self.environment.now, self.tag.time))
 
 
-class FixedWait(Aspect):
+class FixedWait(PortAspect):
     """Holds every token back for a time."""
 
     seconds = Parameter(float, 1.0, unit="s")
@@ -79,7 +79,7 @@ class FixedWait(Aspect):
         point.forward(token, self.seconds)
 
 
-class Twofold(Aspect):
+class Twofold(PortAspect):
     """Lets every token through twice at once."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
