@@ -1,7 +1,7 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
 from .figure import Figure, figure_types
-from .measure import MSER5, TAKES, TIME, TOKENS, Measure, Take, conversion_problem, take_problem
+from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
 from .own_types import TypesError, types_of_file
 from .packaged import (
     find,
@@ -13,7 +13,7 @@ from .packaged import (
     packaged_studies,
     unreadable,
 )
-from .port_types import BUILT_IN, PortTypeError, read_type, token_types
+from .port_types import PortTypeError, read_type, token_types
 from .reference import (
     ParameterReference,
     PortReference,
@@ -29,7 +29,6 @@ from .reference import (
 from .types import Catalogue, CatalogueError, Types, built_in, installed, load_all
 
 __all__ = [
-    "BUILT_IN",
     "MSER5",
     "TAKES",
     "TIME",
@@ -41,7 +40,6 @@ __all__ = [
     "ParameterReference",
     "PortReference",
     "PortTypeError",
-    "Take",
     "TypeReference",
     "Types",
     "TypesError",

@@ -1,6 +1,6 @@
 """What a file says: models, composites, disturbances, studies and what is set from outside, as declared constructs."""
 
-from .claims import ALWAYS, FALLS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection
+from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Questions, Selection
 from .declarations import (
     CompositeText,
     ConnectionText,
@@ -11,7 +11,7 @@ from .declarations import (
     PointcutText,
     PortText,
 )
-from .dimensions import Dimension, Factor, Level, Listed, Ranged, in_si, split_number
+from .dimensions import Dimension, Factor, Level, in_si, split_number
 from .disturbance import (
     COMPOSITE_THERE,
     PARAMETER_THERE,
@@ -21,14 +21,14 @@ from .disturbance import (
     load_disturbance,
     load_disturbances,
 )
-from .files import find_model, read_library, read_model
+from .files import read_library, read_model
 from .inheritance import inherit
 from .models import DeclarationReader
 from .schema import CONSTRUCTS, json_schema, schema_text
-from .settings import Setting, Settings, change_aspect, parse_setting, put_aspect, read_overrides, settings_in, without
-from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, find_study, is_study, read_study, study_of_text
+from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
+from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
-from .usage import check_own_usage, check_usage
+from .usage import check_usage
 from .values import Values
 
 __all__ = [
@@ -38,7 +38,6 @@ __all__ = [
     "CONSTRUCTS",
     "FALLS",
     "GREATER",
-    "LESS",
     "MAX_REPLICATIONS",
     "MAX_STUDY_SEED",
     "NUMBERS",
@@ -55,7 +54,6 @@ __all__ = [
     "Factor",
     "Guideline",
     "Level",
-    "Listed",
     "MetricText",
     "ModelText",
     "ParameterText",
@@ -63,7 +61,6 @@ __all__ = [
     "PointcutText",
     "PortText",
     "Questions",
-    "Ranged",
     "Selection",
     "Setting",
     "Settings",
@@ -73,10 +70,7 @@ __all__ = [
     "add_disturbances",
     "asks_for_none",
     "change_aspect",
-    "check_own_usage",
     "check_usage",
-    "find_model",
-    "find_study",
     "in_si",
     "inherit",
     "is_study",
@@ -85,7 +79,6 @@ __all__ = [
     "load_disturbance",
     "load_disturbances",
     "parse_setting",
-    "put_aspect",
     "read_library",
     "read_model",
     "read_overrides",

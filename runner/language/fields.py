@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from epicycle.actors import Parameter, ParameterError
 
 from ..catalogue import as_written
-from ..text import Entry, Node, NodeReader, Position, Scalar, Sequence, Text, is_empty
+from ..text import Entry, Node, NodeReader, Position, Scalar, Text, is_empty
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -198,8 +198,3 @@ class Construct:
         """What a node says, by attribute; None if it is no mapping."""
         entries = self.entries(reader, node, what)
         return None if entries is None else self.values(reader, entries, what, at or node.position)
-
-
-def items_of(node: Node) -> tuple[Node, ...]:
-    """The items of a list, or what stands in place of one."""
-    return node.items if isinstance(node, Sequence) else (node,)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..text import Mapping, Node, NodeReader, Scalar, Text, inside, split
+from ..text import Mapping, Node, NodeReader, Scalar, Sequence, Text, inside, split
 from .declarations import ConnectionText, PointcutText
 from .fields import (
     AT,
@@ -16,7 +16,6 @@ from .fields import (
     Schema,
     Shape,
     computed,
-    items_of,
     looks_like,
     node_as,
     one_or_more,
@@ -170,7 +169,7 @@ POINTCUT = Construct(
 def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText, ...]:
     """A pattern, ``!pattern``, ``{at: ...}``, ``{type: ..., port: ...}`` or ``{tag: ...}``, or a list of these."""
     found = []
-    for item in items_of(node):
+    for item in node.items if isinstance(node, Sequence) else (node,):
         if not isinstance(item, Mapping):
             found += [PointcutText.of(text) for text in reader.texts(item, what)]
             continue

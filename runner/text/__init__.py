@@ -1,7 +1,7 @@
 """Positioned text: YAML as nodes that know where they stand, problems with places, and limits; it knows no language."""
 
-from .document import MAX_BYTES, Entry, Mapping, Node, Scalar, Sequence, Value, parse, plain, read
-from .files import COMMAND_LINE, Noted, data_file, note_file, note_package, noting
+from .document import Entry, Mapping, Node, Scalar, Sequence, parse, plain, read
+from .files import COMMAND_LINE, Noted, data_file, note_package, noting
 from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
 from .patterns import (
     Comparisons,
@@ -24,17 +24,14 @@ from .problems import (
     Problem,
     Problems,
     did_you_mean,
-    marked,
     nearest,
     told_raised,
-    visible,
 )
 from .reading import NAME, NAMES_HAVE, SURE, NodeReader, Text, inside, is_empty, split, within
 from .site import call_site, entries_of, node_of
 
 __all__ = [
     "COMMAND_LINE",
-    "MAX_BYTES",
     "MAX_PROBLEMS",
     "MAX_SEED",
     "NAME",
@@ -59,7 +56,6 @@ __all__ = [
     "Sequence",
     "Text",
     "TooManyError",
-    "Value",
     "call_site",
     "check_pattern",
     "compile_pattern",
@@ -70,13 +66,11 @@ __all__ = [
     "in_general",
     "inside",
     "is_empty",
-    "marked",
     "matches",
     "names_asked",
     "names_of",
     "nearest",
     "node_of",
-    "note_file",
     "note_package",
     "noting",
     "parse",
@@ -85,6 +79,5 @@ __all__ = [
     "select",
     "split",
     "told_raised",
-    "visible",
     "within",
 ]
