@@ -26,7 +26,7 @@ _DISPLAY = logging.getLogger("epicycle.display")
 
 
 class Recorder(Actor):
-    """Keeps what comes, for Python to read after the run: ``model.graph.actors["path"].tokens``.
+    """Keeps what comes, for Python to read after the run: ``simulation["path"].tokens``.
 
     In a model file ``run: {record: [port]}`` does the same without an actor.  Ptolemy: ``Recorder``.
     """

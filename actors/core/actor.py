@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol, cast
+from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
 from .parameter import Configurable, ParameterError
@@ -160,6 +160,16 @@ class Actor(Configurable):
             self.inputs[name] = bound
         else:
             self.outputs[name] = bound
+
+    def twin(self, known: dict[int, Any]) -> Self:
+        """Engine: the beginning of a copy that is part of no run: its ports.  ``known`` gets what is copied, by id."""
+        made = object.__new__(type(self))
+        made.path = self.path
+        for side in (self.inputs, self.outputs):
+            known[id(side)] = bound = {name: port.bind(made) for name, port in side.items()}
+            known.update((id(port), bound[name]) for name, port in side.items())
+        known[id(self.context)] = _NoContext(made)
+        return made
 
     def move(self, path: str) -> None:
         """Engine: the actor gets its full path in the model that it is added to."""

@@ -29,9 +29,10 @@ class Visits:
         self._mutes = (*(() if acts else ("forward", "stop")), *(() if tells else ("act", "count", "record")))
         self._points: dict[JoinPoint, JoinPoint] = {}
         decides = "pass_token" if isinstance(aspect, PortAspect) else "schedule"
+        # Each run has a copy of the original, and tells this of it.
         if isinstance(aspect, JoinPointAspect):
-            setattr(self.aspect, decides, partial(self._pass, decides))
-            setattr(self.aspect, "pass_by", partial(self._pass, "pass_by"))  # noqa: B010 (they are methods)
+            setattr(self.aspect, decides, partial(self._pass, aspect, decides))
+            setattr(self.aspect, "pass_by", partial(self._pass, aspect, "pass_by"))  # noqa: B010 (they are methods)
         if isinstance(aspect, ExecutionAspect):
             setattr(self.aspect, "begin", partial(self._begin, aspect))  # noqa: B010
 
@@ -45,7 +46,7 @@ class Visits:
     def _begin(self, aspect: ExecutionAspect, unit: Unit) -> None:
         aspect.begin(self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart")))
 
-    def _pass(self, method: str, passing: Any, point: JoinPoint) -> None:
+    def _pass(self, original: Aspect, method: str, passing: Any, point: JoinPoint) -> None:
         """Let the aspect do what it does with a token or a firing."""
         if method != "pass_by":
             self.count += 1
@@ -54,7 +55,7 @@ class Visits:
         known = self._points.get(point)
         if known is None:
             known = self._points[point] = self._muted(point)
-        getattr(self._original, method)(passing, known)
+        getattr(original, method)(passing, known)
         self.shares = self.shares or bool(point.shared)
         if not self._acts:
             point.forward(passing)

@@ -126,19 +126,10 @@ def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], 
 def _token(token: Any) -> str:
     """A token on one line, its numbers to six digits, and not too much of it."""
     from ..engine import plain
+    from ..shown import six_digits
 
-    text = json.dumps(_rounded(plain(token)), ensure_ascii=False)
+    text = json.dumps(six_digits(plain(token)), ensure_ascii=False)
     return text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}..."
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
-        return float(f"{value:.6g}")
-    if isinstance(value, list):
-        return [_rounded(item) for item in value]
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    return value
 
 
 def _as_json(firing: Firing) -> str:

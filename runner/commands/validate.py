@@ -23,12 +23,12 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         return check_study(options)
     model = load(options, strict=options.strict)
     if model.endless:
-        told = f"warning: {model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
-        if options.strict:
-            from epicycle.actors import EpicycleError
+        from epicycle.actors import EpicycleError
 
-            raise EpicycleError(told.removeprefix("warning: "))
-        complain(told)
+        told = f"{model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
+        if options.strict:
+            raise EpicycleError(told)
+        complain(f"warning: {told}")
     tell(f"{options.model} is valid: {model.extent}")
     return DONE
 

@@ -9,7 +9,7 @@ from epicycle.actors import EpicycleError, to_nanoseconds, to_seconds
 from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
 from ..model import WovenAspect
-from .local import Deliver
+from .local_time import Deliver
 
 
 class Requests:

@@ -84,7 +84,7 @@ def load_model(
         settler = Settler(Settings(settings, limits), problems)
         model = build(text, known, settler, limits)
         if model.figures:
-            from ..show import figures_of  # here, for what is shown stands on what is run, and this on models
+            from ..show import figures_of  # here, for what is shown stands on what is run
 
             figures_of(model, problems)
         problems.raise_if_any()

@@ -10,14 +10,15 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 from ..catalogue import take_problem
 from ..collection import without_collection
 from ..language import Values
-from ..tables import Table, as_html, as_text, short
+from ..shown import short
+from ..tables import Table, as_html, as_text
 from ..text import NAME, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .decorated import arranged
 from .draft import Draft
-from .ends import Port, mistake, raising
+from .ends import Port, raising
 from .graph import ModelGraph, is_within
 from .schedule import firing_order
 from .scope import Composite, Scope
@@ -71,7 +72,6 @@ class Model(Scope):
         self.figures: dict[str, Figure] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
-        self.is_running = False
         self._scopes: dict[str, Composite] = {}
         self._order: dict[str, int] | None = None  # worked out since then
         self.stop = stop
@@ -122,7 +122,6 @@ class Model(Scope):
         """
         from .disturbance import disturb
 
-        self.refuse_if_running()
         draft, found = disturb(self, str(disturbance), set or {}, types, call_site())
         self.adopt(draft, found)
         return found
@@ -154,9 +153,12 @@ class Model(Scope):
         values = {"take": take, **options}
         self._watch([of], lambda watching, text: watching.metric(name, text, values, position))
 
+    def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
+        """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
+        return Watching(self.draft, Values(problems), problems).select(Text(pattern, position), what)
+
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[Watching, Text], None]) -> None:
         """Find out what is to be watched as for a model file."""
-        self.refuse_if_running()
         position = call_site()
         with raising() as problems:
             watching = Watching(self.draft, Values(problems), problems, self.recorded)
@@ -188,15 +190,6 @@ class Model(Scope):
         return self._order
 
     # -- changes: what is called here has been found to be right --------------------------------------------------
-
-    def refuse_if_running(self) -> None:
-        """Raise ``ModelError`` if the model is being run."""
-        if self.is_running:
-            raise mistake(
-                f"{self.name} is being run and cannot be changed",
-                call_site(),
-                "change it before or after the run; what is to change in a run is for an aspect",
-            )
 
     def edit(self) -> Draft:
         """The draft, which is then changed: what was checked before may no longer hold."""

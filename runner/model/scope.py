@@ -102,7 +102,6 @@ class Scope:
         those of lower ``priority`` fire first, then those that were added first.  Raises ``ModelError``.
         """
         position = call_site()
-        self._model.refuse_if_running()
         if isinstance(part, Actor) and part.home is not None:
             raise mistake(
                 f"{part.path} is part of a model already, and an actor belongs to one model",
@@ -151,7 +150,6 @@ class Scope:
         (default: as around it) and goes ``drift`` times as fast.  Raises ``ModelError``.
         """
         position = call_site()
-        self._model.refuse_if_running()
         made, ports = Composite(self._model, self._full(name)), [("input", each) for each in inputs]
         ports += [("output", each) for each in outputs]
         with raising() as problems:
@@ -171,7 +169,6 @@ class Scope:
     def remove(self, name: str) -> None:
         """Take out an actor or a composite with all that is connected to it, stands at it and watches it."""
         position = call_site()
-        self._model.refuse_if_running()
         full, parts = self._full(name), self._model.graph.parts(self.path)
         instances = parts.get(name.partition("[")[0], [])
         with raising() as problems:
@@ -245,7 +242,6 @@ class Scope:
         sides connects equal indices.  ``delay`` is in seconds or a text with a unit; without it, tokens arrive
         within the tag in which they are sent.  Raises ``ModelError``.
         """
-        self._model.refuse_if_running()
         position = call_site()
         with raising() as problems:
             links = self._links(source, destination, delay, position, problems)
@@ -254,7 +250,6 @@ class Scope:
 
     def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
         """Take out the connections between ports, which are given as to ``connect``; there must be some."""
-        self._model.refuse_if_running()
         position, graph = call_site(), self._model.graph
         with raising() as problems:
             links = self._links(source, destination, None, position, problems)
@@ -472,7 +467,6 @@ class Scope:
     def unweave(self, name: str) -> None:
         """Take an aspect out, with its composite if it is a model."""
         full, model = self._full(name), self._model
-        model.refuse_if_running()
         known = [woven.name for woven in model.aspects]
         if full not in known:
             raise mistake(
@@ -502,7 +496,6 @@ class Composite(Scope):
 
     def _port(self, name: str, direction: str) -> CompositePort:
         position = call_site()
-        self._model.refuse_if_running()
         self.check_port(name, (), position)
         full = self._full(name)
         self._model.edit().graph.add_composite_port(full, direction, position)

@@ -111,14 +111,14 @@ class Watching:
 
     def record(self, text: Text) -> None:
         """Keep what the ports behind a pattern send."""
-        found = [path for path in self._select(text, "record") if path not in self._recorded]
+        found = [path for path in self.select(text, "record") if path not in self._recorded]
         self._recorded.update(found)
         self.found.recorded += found
 
     def stop_when(self, text: Text) -> None:
         """End the run when a port behind the pattern sends something true."""
         self.found.stop_position = text.position
-        for path in self._select(text, "stop_when"):
+        for path in self.select(text, "stop_when"):
             self.found.stop_ports.append(path)
             for port in self.graph.source_of(path):
                 if not accepts(float | bool, port.type):
@@ -142,7 +142,7 @@ class Watching:
         measure = self._measure(what, options, position, places or {})
         if measure is None:
             return
-        paths = self._select(of, what)
+        paths = self.select(of, what)
         self._watched += len(paths)
         limit = self.graph.limits.watched
         if self._watched > limit:
@@ -184,7 +184,7 @@ class Watching:
             self.problems.add(f"{what}: {problem}", places.get(option, position), *([advice] if advice else []))
         return measure
 
-    def _select(self, text: Text, what: str) -> list[str]:
+    def select(self, text: Text, what: str) -> list[str]:
         """The output ports that a pattern selects, composites' included."""
         try:
             found = self._outputs.select(text.text)

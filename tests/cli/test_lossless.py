@@ -18,8 +18,8 @@ import pytest
 from epicycle.actors import Tag
 from epicycle.runner.cli import main
 from epicycle.runner.engine import LogError, Record
-from epicycle.runner.engine import log_file as log_file_module
-from epicycle.runner.engine.log_file import LogFile
+from epicycle.runner.results import log_file as log_file_module
+from epicycle.runner.results.log_file import LogFile
 
 ENDLESS = """
 model: tick

@@ -64,9 +64,8 @@ def feed(
     seed: int = 0,
 ) -> tuple[Actor, dict[str, list[tuple[float, Any]]], Results]:
     """The actor after the run, what it sent as (time, token) by port, and the results."""
-    model = model_of(actor, inputs, types)
-    results = Simulation(model, keep_log=True, seed=seed).run(until=until)
-    it = model.graph.actors["it"]
+    simulation = Simulation(model_of(actor, inputs, types), keep_log=True, seed=seed)
+    results, it = simulation.run(until=until), simulation["it"]
     sent: dict[str, list[tuple[float, Any]]] = {name: [] for name in it.outputs}
     for record in results.log.records:
         if record.event == "send" and record.actor == "it":

@@ -209,9 +209,9 @@ def test_a_loop_through_the_states_needs_no_delay() -> None:
         "  - plant.x -> control.input, keep.input\n"
         "  - control.output -> plant.u\n"
     )
-    loaded = load(model)
-    Simulation(loaded).run(until=2.0)
-    assert loaded.graph.actors["keep"].tokens == pytest.approx([0.9**k for k in range(21)], abs=1e-9)  # type: ignore[attr-defined]
+    simulation = Simulation(load(model))
+    simulation.run(until=2.0)
+    assert simulation["keep"].tokens == pytest.approx([0.9**k for k in range(21)], abs=1e-9)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(

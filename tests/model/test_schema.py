@@ -37,8 +37,8 @@ from epicycle.runner.language.fields import QUANTITY, Construct
 from epicycle.runner.language.models import BESIDE
 from epicycle.runner.language.parameter_schema import schema_of as value_schema
 from epicycle.runner.language.places import CONNECTION, PATTERN
-from epicycle.runner.model.indices import BadIndexError, resolve
 from epicycle.runner.model.connect import _ENDPOINT as ENDPOINT
+from epicycle.runner.model.indices import BadIndexError, resolve
 from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import study_figure_types
 from epicycle.runner.text import PatternError, Problems, compile_pattern, parse, plain

@@ -18,9 +18,9 @@ from epicycle.runner.language import StudyMetric, read_study
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.show.report.figure import layout, roles
-from epicycle.runner.show.report.numbers import rounded
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
+from epicycle.runner.shown import rounded
 from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
 from epicycle.runner.study.plan.described import si_unit
 from epicycle.runner.study.run.manifest import manifest_text

@@ -19,8 +19,9 @@ from epicycle.actors import Actor, OutputPort, Tag
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.engine import Results, Signal, plain
-from epicycle.runner.show import figures, figures_of
+from epicycle.runner.show import draw, figures_of
 from epicycle.runner.show.folder import write_signals
+from epicycle.runner.show.pen import Sheet
 from epicycle.runner.text import Problems
 
 
@@ -216,9 +217,9 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, list[Any
     model = load_model(tmp_path / "m.yaml", types=[Talk])
     results = Simulation(model).run()
     found: dict[str, list[Any]] = {}
-    monkeypatch.setattr(figures, "save", lambda canvas, path: found.update({path.stem: canvas.get_axes()}))
+    monkeypatch.setattr(Sheet, "save", lambda sheet, paths: found.update({paths[0].stem: sheet.axes}))
     for name, figure in figures_of(model, Problems()).items():
-        figure.draw(results, tmp_path / f"{name}.png")
+        draw(name, figure, results, tmp_path / f"{name}.png")
     return found
 
 
@@ -246,7 +247,7 @@ def test_a_text_is_a_strip_of_states(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert bars(states) == {
         "t.text": [("idle", 0.0, 1.0), ("$\\frac{", 1.0, 2.0), ("'_x'", 2.0, 3.0), ("idle", 3.0, 4.0)]
     }
-    assert (states.get_xlabel(), states.get_title()) == ("time (s)", "talk, seed 0, 4 s")
+    assert (states.get_xlabel(), states.get_title("left")) == ("time (s)", "talk, seed 0, 4 s")
 
 
 def test_lines_are_above_strips(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -275,5 +276,5 @@ def test_figures_of_states_are_files(tmp_path: Path) -> None:
     model = load_model(tmp_path / "m.yaml", types=[Talk])
     results = Simulation(model).run()
     for name, figure in figures_of(model, Problems()).items():
-        figure.draw(results, tmp_path / f"{name}.svg")
+        draw(name, figure, results, tmp_path / f"{name}.svg")
         assert (tmp_path / f"{name}.svg").read_bytes().startswith(b"<?xml")

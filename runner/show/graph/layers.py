@@ -7,8 +7,11 @@ many; it has one place in each layer that it passes, however many branches it ha
 
 from __future__ import annotations
 
+from bisect import bisect_right, insort
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, TypeVar
 
 import networkx as nx
@@ -276,27 +279,12 @@ def _all_crossings(layers: list[list[Cell]], joints: list[list[tuple[Pin, Pin]]]
 
 
 def _crossings(left: list[Cell], right: list[Cell], pairs: list[tuple[Pin, Pin]]) -> int:
-    """How many pairs of straight lines between two layers would cross: inversions, counted with a Fenwick tree."""
+    """How many pairs of straight lines between two layers would cross; those of one pin do not cross each other."""
     ranks, others = _ranks(left, "right"), _ranks(right, "left")
-    lines = sorted((ranks[one], others[other]) for one, other in pairs)
-    size = len(others) + 1
-    tree = [0] * (size + 1)
-    crossings = done = index = 0
-    while index < len(lines):
-        upto = index
-        while upto < len(lines) and lines[upto][0] == lines[index][0]:
-            upto += 1
-        for _, rank in lines[index:upto]:  # lines of one pin do not cross each other
-            below, at = 0, rank + 1
-            while at > 0:
-                below += tree[at]
-                at -= at & -at
-            crossings += done - below
-        for _, rank in lines[index:upto]:
-            at = rank + 1
-            while at <= size:
-                tree[at] += 1
-                at += at & -at
-        done += upto - index
-        index = upto
+    crossings, above = 0, list[int]()
+    for _, ends in groupby(sorted((ranks[one], others[other]) for one, other in pairs), key=itemgetter(0)):
+        here = [end for _, end in ends]
+        crossings += sum(len(above) - bisect_right(above, end) for end in here)
+        for end in here:
+            insort(above, end)
     return crossings

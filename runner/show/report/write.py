@@ -17,11 +17,11 @@ from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, repla
 from ...text import ModelError, Problems
 from ..drawing import FigureError
 from ..folder import MAX_NAME
+from ..pen import FORMATS, style
 from .data import Data
 from .declared import figures_of_study
 from .figure import RunKey, SignalFigure, StudyFigure
 from .page import Picture, report_page
-from .style import FORMATS, style
 
 Extracts = dict[str, dict[RunKey, Any]]  # by figure and run
 

@@ -186,23 +186,23 @@ def test_the_order_of_declaration_is_the_order_of_application() -> None:
             "actors: {t: {type: Ticker, limit: 1}, probe: {type: Probe}}\n"
             f"connections: [t.output -> probe.input]\naspects: {{{lines}}}"
         )
-        model, results = simulate(text, types=[Mark])
-        assert seen(model) == [(0.0, 1, (f"0{first}{second}",))]
+        simulation, results = simulate(text, types=[Mark])
+        assert seen(simulation) == [(0.0, 1, (f"0{first}{second}",))]
         assert [(r.aspect, r.value) for r in results.log.records if r.event == "marked"] == [
             (first, 0), (second, f"0{first}")
         ]  # fmt: skip
 
 
 def test_a_port_that_fans_out_decides_once() -> None:
-    model, results = fan(outside="loss: {type: PacketLoss, probability: 0.5, at: 'fan[0].in'}")
-    one, two = seen(model, "fan[0].one"), seen(model, "fan[0].two")
+    simulation, results = fan(outside="loss: {type: PacketLoss, probability: 0.5, at: 'fan[0].in'}")
+    one, two = seen(simulation, "fan[0].one"), seen(simulation, "fan[0].two")
     assert one == two
     assert in_interval(len(one), 0.5, 401)
-    assert len(seen(model, "fan[1].one")) == 401
+    assert len(seen(simulation, "fan[1].one")) == 401
     assert results.aspects["loss"]["dropped"] == 401 - len(one)
     # Where it stands at the ports behind it, each decides for itself.
-    model, _ = fan(outside="loss: {type: PacketLoss, probability: 0.5, at: 'fan[0].*.input'}")
-    assert seen(model, "fan[0].one") != seen(model, "fan[0].two")
+    simulation, _ = fan(outside="loss: {type: PacketLoss, probability: 0.5, at: 'fan[0].*.input'}")
+    assert seen(simulation, "fan[0].one") != seen(simulation, "fan[0].two")
 
 
 def test_several_connections_of_a_port_share_its_stream() -> None:
@@ -221,33 +221,33 @@ run: {stop: 4 s}
 
 
 def test_an_aspect_at_the_output_of_a_composite() -> None:
-    model, results = fan(outside="failure: {type: MeasurementFailure, probability: 0.5, at: 'fan[0].out'}")
+    simulation, results = fan(outside="failure: {type: MeasurementFailure, probability: 0.5, at: 'fan[0].out'}")
     out, inner = results.signals["fan[0].out"], results.signals["fan[0].s.output"]
     assert len(inner.tokens) == 401
     assert in_interval(len(out.tokens), 0.5, 401)
-    assert sum(len(tokens) for _, _, tokens in seen(model)) == 401 + len(out.tokens)
+    assert sum(len(tokens) for _, _, tokens in seen(simulation)) == 401 + len(out.tokens)
 
 
 def test_aspects_that_belong_to_a_composite() -> None:
-    model, results = fan(inside="loss: {type: PacketLoss, probability: 0.5, at: one.input}")
-    assert [woven.name for woven in model.aspects] == ["fan[0].loss", "fan[1].loss"]
-    assert [woven.ports for woven in model.aspects] == [["fan[0].one.input"], ["fan[1].one.input"]]
-    assert seen(model, "fan[0].one") != seen(model, "fan[1].one")
-    assert len(seen(model, "fan[0].two")) == 401
+    simulation, results = fan(inside="loss: {type: PacketLoss, probability: 0.5, at: one.input}")
+    assert [woven.name for woven in simulation.model.aspects] == ["fan[0].loss", "fan[1].loss"]
+    assert [woven.ports for woven in simulation.model.aspects] == [["fan[0].one.input"], ["fan[1].one.input"]]
+    assert seen(simulation, "fan[0].one") != seen(simulation, "fan[1].one")
+    assert len(seen(simulation, "fan[0].two")) == 401
     for name in ("fan[0]", "fan[1]"):
-        assert results.aspects[f"{name}.loss"]["dropped"] == 401 - len(seen(model, f"{name}.one"))
-    model, _ = fan(
+        assert results.aspects[f"{name}.loss"]["dropped"] == 401 - len(seen(simulation, f"{name}.one"))
+    simulation, _ = fan(
         inside="loss: {type: PacketLoss, probability: 0.5, at: one.input}", set=["fan[1].loss.probability=0"]
     )
-    assert len(seen(model, "fan[1].one")) == 401
+    assert len(seen(simulation, "fan[1].one")) == 401
 
 
 def test_forwarding_later() -> None:
     text = "actors: {t: {type: Ticker, limit: 1}, probe: {type: Probe}}\nconnections: [t.output -> probe.input]\n"
-    model, _ = simulate(text + "aspects: {echo: {type: Echo, at: probe.input}}", types=[Echo])
-    assert seen(model) == [(0.0, 1, (0,)), (0.0, 2, (0,)), (1.0, 1, (0,))]
-    model, results = simulate(text + "aspects: {echo: {type: Echo, at: t.output}}", types=[Echo])
-    assert seen(model) == [(0.0, 1, (0,)), (0.0, 2, (0,)), (1.0, 1, (0,))]
+    simulation, _ = simulate(text + "aspects: {echo: {type: Echo, at: probe.input}}", types=[Echo])
+    assert seen(simulation) == [(0.0, 1, (0,)), (0.0, 2, (0,)), (1.0, 1, (0,))]
+    simulation, results = simulate(text + "aspects: {echo: {type: Echo, at: t.output}}", types=[Echo])
+    assert seen(simulation) == [(0.0, 1, (0,)), (0.0, 2, (0,)), (1.0, 1, (0,))]
     assert [row[:2] for row in sends(results)] == [(0.0, 1), (0.0, 2), (1.0, 1)]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from epicycle.actors import Tag
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.engine.log import Record
+from epicycle.runner.results.log import Record
 
 LOSS, BURST = 0.25, 4.0
 BERNOULLI = f"packet_loss=PacketLoss,probability={LOSS}"

@@ -78,8 +78,8 @@ connections: [t.output -> fast.go, fast.gone -> probe.input]
 aspects: {slow: {type: ExecutionTime, time: 0.4 s, at: fast}}
 run: {stop: 3 s}
 """
-    model, results = simulate(text)
-    assert [(time, tokens) for time, _, tokens in seen(model)] == [(n + 0.2, (n,)) for n in range(3)]
+    simulation, results = simulate(text)
+    assert [(time, tokens) for time, _, tokens in seen(simulation)] == [(n + 0.2, (n,)) for n in range(3)]
     assert {act[3] for act in acts(results)} == {0.4}
 
 
@@ -140,9 +140,10 @@ def test_times_for_all_actors_over_and_over(tmp_path: Path) -> None:
     model = CHAIN.format("type: ExecutionTime, times: times.csv, scale: 2, at: [a, probe]")
     (tmp_path / "m.yaml").write_text(f"model: m\n{model}", encoding="utf-8")
     model_ = load_model(tmp_path / "m.yaml", types=TYPES)
-    results = Simulation(model_, keep_log=True).run()
+    simulation = Simulation(model_, keep_log=True)
+    results = simulation.run()
     assert [time for time, _ in sent(results)] == pytest.approx([0.2, 1.6, 2.2, 3.6, 4.2])
-    assert [row[0] for row in seen(model_)] == pytest.approx([0.4, 2.2, 2.4, 4.2, 4.4])
+    assert [row[0] for row in seen(simulation)] == pytest.approx([0.4, 2.2, 2.4, 4.2, 4.4])
 
 
 @pytest.mark.parametrize(

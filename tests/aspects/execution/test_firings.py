@@ -125,16 +125,16 @@ connections: [t.output -> first.input, t.output -> a.input, a.output -> last.inp
 aspects: {hold: {type: Hold, at: a}, free: {type: Free, at: first.input}}
 run: {stop: 3 s}
 """
-    model, _ = simulate(text, types=[Hold, Free])
-    assert seen(model) == [(n + 1.0, 1, (n,)) for n in range(3)]  # while t fires, the turn of a is still to come
+    simulation, _ = simulate(text, types=[Hold, Free])
+    assert seen(simulation) == [(n + 1.0, 1, (n,)) for n in range(3)]  # while t fires, the turn of a is still to come
     held.clear()
     # While b fires, which comes after a, it is over: so it is the next microstep.
     later = text.replace("last: {type: Scale}", "last: {type: Scale}, b: {type: Scale}, c: {type: Scale}")
     later = later.replace(
         "t.output -> first.input", "t.output -> b.input, b.output -> c.input, t.output -> first.input"
     )
-    model, _ = simulate(later.replace("at: first.input", "at: c.input"), types=[Hold, Free])
-    assert seen(model) == [(n + 0.0, 2, (n,)) for n in range(4)]
+    simulation, _ = simulate(later.replace("at: first.input", "at: c.input"), types=[Hold, Free])
+    assert seen(simulation) == [(n + 0.0, 2, (n,)) for n in range(4)]
 
 
 ZEROS = [aspect for aspect in AT_ZERO if isinstance(aspect, ExecutionAspect)]
@@ -213,7 +213,7 @@ run: {stop: 300 s}
     simulation = Simulation(model, keep_log=True)
     results = simulation.run()
     assert sent(results, "plan") == [(200.5, "over")]
-    assert len(simulation._wiring._executions["plan"]._asked) < 3
+    assert len(simulation._run._ways._executions["plan"]._asked) < 3
 
 
 class Named(ExecutionAspect):

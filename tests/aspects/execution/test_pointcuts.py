@@ -132,8 +132,9 @@ actors: {t: {type: Ticker}, single: {type: Single}}
 connections: [t.output -> single.go]
 run: {stop: 3 s}
 """
-    model, results = simulate(text)
-    assert {woven.name: woven.actors for woven in model.aspects} == {"single.slow": {"single.one": "single.one"}}
+    simulation, results = simulate(text)
+    aspects = simulation.model.aspects
+    assert {woven.name: woven.actors for woven in aspects} == {"single.slow": {"single.one": "single.one"}}
     assert [time for time, _ in sent(results, "single.one")] == [1, 2, 3]
 
 

@@ -156,8 +156,8 @@ BUS = "bus: {type: Bus, factor: 250 ms, at: a.input}"
 @pytest.mark.parametrize("seed", [1, 2])
 def test_order_shows(seed: int) -> None:
     def arrivals(first: str, second: str, period: str) -> tuple[list[tuple[float, int, Any]], float | None]:
-        model, results = simulate(LINE.format(first=first, second=second, period=period), seed=seed)
-        tokens = [(time, microstep, token) for time, microstep, tokens in seen(model, "a") for token in tokens]
+        simulation, results = simulate(LINE.format(first=first, second=second, period=period), seed=seed)
+        tokens = [(time, microstep, token) for time, microstep, tokens in seen(simulation, "a") for token in tokens]
         return tokens, results.aspects["bus"]["utilisation"]
 
     # What is dropped before the bus does not occupy it; what is dropped behind it does.  The same ones are dropped.

@@ -184,13 +184,13 @@ class Vandal(MeasurementAspect):
 
 
 class Gossip(ObservationAspect):
-    """Remembers in itself what it has seen, at whatever port."""
+    """Remembers in its class what it has seen, at whatever port and in whatever run."""
 
     events = ("seen",)
     seen = 0
 
     def observe(self, token: Any, point: JoinPoint) -> None:
-        self.seen += 1
+        Gossip.seen += 1
         point.act("seen", token, self.seen)
 
 

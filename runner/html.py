@@ -38,22 +38,37 @@ def tag(element: str, /, *content: Content, **attributes: str | None) -> Html:
     return Html(f"<{element}{said}>" if element in _VOID else f"<{element}{said}>{inner}</{element}>")
 
 
-def table(head: Iterable[Content], rows: Iterable[Iterable[Content]], *, names: int = 1) -> Html:
-    """A table whose first ``names`` columns are what the others are about."""
-    header = tag("tr", [tag("th", cell, scope="col") for cell in head])
+def table(
+    head: Iterable[Content],
+    rows: Iterable[Iterable[Content]],
+    *,
+    names: int = 1,
+    class_: str | None = None,
+    scopes: bool = True,
+) -> Html:
+    """A table whose first ``names`` columns are what the others are about; ``scopes``: it says so to screen readers."""
+
+    def heading(cell: Content, scope: str) -> Html:
+        return tag("th", cell, scope=scope if scopes else None)
+
     body = [
-        tag(
-            "tr",
-            [tag("th", cell, scope="row") if place < names else tag("td", cell) for place, cell in enumerate(row)],
-        )
+        tag("tr", [heading(cell, "row") if at < names else tag("td", cell) for at, cell in enumerate(row)])
         for row in rows
     ]
-    return tag("table", tag("thead", header), tag("tbody", body))
+    header = tag("tr", [heading(cell, "col") for cell in head])
+    return tag("table", tag("thead", header), tag("tbody", body), class_=class_)
 
 
-def with_class(element: Html, class_: str) -> Html:
-    """An element that has no attributes yet, with a class."""
-    return Html(element.replace(">", f' class="{escape(class_)}">', 1))
+def wide_table(
+    head: Iterable[Content], rows: Iterable[Iterable[Content]], *, names: int = 1, class_: str | None = None
+) -> Html:
+    """A table that is scrolled by itself where the page is narrower."""
+    return tag("div", table(head, rows, names=names, class_=class_), class_="scroll")
+
+
+def note(text: str) -> Html:
+    """A paragraph that explains."""
+    return tag("p", text, class_="note")
 
 
 def page(title: str, style: str, *content: Content) -> str:

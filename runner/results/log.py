@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, Tag, to_seconds
 
-from ..tables import pandas_module, short
+from ..shown import short
+from ..tables import pandas_module
 from .encoding import canonical, plain
+from .signal import Past
 from .waiting import LARGE, WaitingTokens
 
 if TYPE_CHECKING:
     import pandas
-
-    from .director import Crowd
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
 _TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
@@ -81,7 +81,7 @@ class EventLog:
         keeps: Callable[[str, str, str, str], bool] | None = None,
         log_to: Callable[[Record], None] | None = None,
     ) -> None:
-        self.records: list[Record] = []
+        self.records: list[Record] = Past()
         self._log_to = log_to
         self._keeps = keeps
         self._writers: dict[tuple[str, str, str, str, int | None], Write] = {}
@@ -93,7 +93,7 @@ class EventLog:
         self._hashed = 0  # records
         self._tag: Tag | None = None  # of the last record
         self._stamp = b""  # the same in bytes
-        self.crowd: Crowd | None = None  # is told of many records at one tag
+        self.crowd: Callable[[Tag, str, int], None] | None = None  # is told of many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
@@ -118,7 +118,7 @@ class EventLog:
             pieces.extend((self._stamp, head, kept))
             if len(pieces) > _MOST_PIECES:  # all of them at one tag, nearly
                 if self.crowd is not None:
-                    self.crowd.add(tag, f"{actor}.{port}", _MOST_PIECES // 3)
+                    self.crowd(tag, f"{actor}.{port}", _MOST_PIECES // 3)
                 self._hash_pieces()
             elif type(kept) is bytes and len(kept) > LARGE:
                 self._hash_pieces()

@@ -12,8 +12,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..columns import numbers, texts
-from .interrupt import held
+from ..interrupt import held
+from .arrow import numbers, texts
 from .log import COLUMNS, LogError, Record
 
 FORMATS = (".parquet", ".csv", ".jsonl")

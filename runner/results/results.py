@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import counted, to_seconds
+from epicycle.actors import counted, did_you_mean, to_seconds
 
-from ..tables import Table, as_html, as_text, pandas_module, short
-from ..text import did_you_mean
-from .batches import Interval
+from ..shown import short
+from ..tables import Table, as_html, as_text, pandas_module
 from .encoding import cell, leaves
 from .log import EventLog
-from .measurement import Outcome
+from .outcome import Interval, Outcome
 from .signal import Signal, SignalError
 
 if TYPE_CHECKING:

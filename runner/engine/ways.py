@@ -1,4 +1,4 @@
-"""Wiring: the ways that tokens take, from every output port to the ports behind it."""
+"""Ways: the ways that tokens take, from every output port to the ports behind it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from epicycle.actors import (
+    Actor,
     Context,
     Emit,
     EpicycleError,
@@ -30,41 +31,42 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..model import Clock, Hop, Model, WovenAspect, describe
+from ..model import Clock, Hop, ModelGraph, WovenAspect, describe
+from ..results import EventLog, Signal, Write
 from .director import ActorError, CrowdError, Director, LoopError
 from .execution import Execution
-from .local import Deliver, LocalDirector, Passage
-from .log import EventLog, Write
+from .local_time import Deliver, LocalDirector, Passage
 from .parameters import VaryingParameter
 from .requests import Requests
-from .signal import Signal
 
 T = TypeVar("T")
 P = TypeVar("P", bound=JoinPoint)
 
 
-class Wiring:
-    """What ``send`` does at each port of a model: through delays, borders and join points to where a token is heard.
+class Ways:
+    """What ``send`` does at each port of a run: through delays, borders and join points to where a token is heard.
 
+    ``actors`` and ``aspects`` are those of the run; of the ``graph`` nothing is changed.
     ``listeners`` are told of every token that leaves the port of their path, be it an actor's or a composite's.
     ``signals`` is where aspects record what they see.
     """
 
     def __init__(
         self,
-        model: Model,
+        graph: ModelGraph,
+        actors: dict[str, Actor],
+        aspects: list[WovenAspect],
         director: Director,
         log: EventLog,
         listeners: dict[str, list[Deliver]],
         signals: dict[str, Signal],
     ) -> None:
-        self.graph = model.graph
+        self.graph = graph
+        self.actors = actors
         self.director = director
         self.log = log
-        self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in model.aspects}
-        self._wrong_clocks = [
-            (woven, aspect) for woven in model.aspects if isinstance(aspect := woven.aspect, ClockAspect)
-        ]
+        self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in aspects}
+        self._wrong_clocks = [(woven, aspect) for woven in aspects if isinstance(aspect := woven.aspect, ClockAspect)]
         self._to_begin: list[tuple[WovenAspect, ExecutionAspect, Unit]] = []
         self._units: dict[tuple[str, str], Unit] = {}
         self._listeners = listeners
@@ -72,18 +74,18 @@ class Wiring:
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
         self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
-        self._requests = {woven.name: Requests(woven) for woven in model.aspects if woven.model is not None}
+        self._requests = {woven.name: Requests(woven) for woven in aspects if woven.model is not None}
         self._shared: dict[object, dict[Any, Any]] = {}
         self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
-        for woven in model.aspects:
+        for woven in aspects:
             for path in (*woven.ports, *(woven.actors if isinstance(woven.aspect, ExecutionAspect) else ())):
                 self._woven_at.setdefault(path, []).append(woven)
             for connection in woven.connections:
                 self._woven_on.setdefault(connection, []).append(woven)
-        for woven in model.aspects:
+        for woven in aspects:
             if woven.model is not None:
                 listeners.setdefault(woven.model.response, []).append(partial(self._answer, woven))
-        for path in dict.fromkeys(path for woven in model.aspects for path in woven.looks_at):
+        for path in dict.fromkeys(path for woven in aspects for path in woven.looks_at):
             listeners.setdefault(path, []).append(partial(self._latest.__setitem__, path))
         self._directors: dict[str, Director | LocalDirector] = {}
         self._passages: dict[str, Passage] = {}
@@ -91,31 +93,31 @@ class Wiring:
             self._directors[composite] = director if clock.is_global else LocalDirector(director, clock)
             for paths in self.graph.borders(composite):
                 self._passages.update({path: Passage(path, director) for path in paths})
-        changed = {path.rpartition(".")[0] for woven in model.aspects for path in woven.parameters}
+        changed = {path.rpartition(".")[0] for woven in aspects for path in woven.parameters}
         self._executions = {
             path: Execution(actor, director, self._by_clock(path))
-            for path, actor in self.graph.actors.items()
+            for path, actor in actors.items()
             if path in self._woven_at or path in changed
         }
         self._emits = self._find()
         self._varying: list[VaryingParameter] = []
-        self._vary_parameters(model)
+        self._vary_parameters(aspects)
         for path, execution in self._executions.items():
             execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
 
-    def _vary_parameters(self, model: Model) -> None:
+    def _vary_parameters(self, aspects: list[WovenAspect]) -> None:
         """Let the aspects that stand at a parameter change it before each firing of its actor."""
         standing: dict[str, list[WovenAspect]] = {}
-        for woven in model.aspects:
+        for woven in aspects:
             for path in woven.parameters:
                 standing.setdefault(path, []).append(woven)
-        for path, aspects in standing.items():
+        for path, there in standing.items():
             owner, _, name = path.rpartition(".")
-            actor = self.graph.actors[owner]
+            actor = self.actors[owner]
             varying = VaryingParameter(actor, declared_parameters(type(actor))[name])
             entry: Deliver = varying.set
-            for woven in reversed(aspects):
+            for woven in reversed(there):
                 entry = self._through(woven, path, path, entry)
             self._executions[owner].refresh.append(partial(entry, varying.nominal))
             self._varying.append(varying)
@@ -157,14 +159,14 @@ class Wiring:
     def _find(self) -> list[tuple[OutputPort[Any], Emit]]:
         # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
         channels: dict[tuple[Hop, ...], int] = {}
-        for actor in self.graph.actors.values():
+        for actor in self.actors.values():
             for port in actor.inputs.values():
                 wires = self.graph.wires_to(port)
                 port.width = len(wires)
                 channels.update({wire.hops: channel for channel, wire in enumerate(wires)})
         emits = [
             (output, self._emit(output, channels))
-            for actor in self.graph.actors.values()
+            for actor in self.actors.values()
             for output in actor.outputs.values()
         ]
         self._open_requests(channels)
@@ -230,7 +232,7 @@ class Wiring:
             far, taken = hop.destination, (*hops, hop)
             port = self.graph.ports.nodes[far]["port"]
             if isinstance(port, InputPort):
-                onward = self._put(port, channels[taken])
+                onward = self._put(far, channels[taken])
             else:
                 onward = _all(self._listeners.get(far, []) + self._branches(far, taken, channels))
             ways.append(self._over(hop, onward, taken))
@@ -238,7 +240,7 @@ class Wiring:
 
     def _way(self, hops: tuple[Hop, ...], channel: int) -> Deliver:
         """The way along one wire alone, for tokens that are sent to one channel."""
-        onward = self._put(self.graph.ports.nodes[hops[-1].destination]["port"], channel)
+        onward = self._put(hops[-1].destination, channel)
         for hop in reversed(hops):
             onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]), hops)
         return onward
@@ -260,8 +262,9 @@ class Wiring:
             onward = self._through(woven, far, source, onward, f"{hop.source} -> {far}")
         return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
 
-    def _put(self, port: InputPort[Any], channel: int) -> Deliver:
-        execution = self._executions.get(port.actor.path)
+    def _put(self, path: str, channel: int) -> Deliver:
+        owner, _, name = path.rpartition(".")
+        port, execution = self.actors[owner].inputs[name], self._executions.get(owner)
         return self.director.entry(port, channel, None if execution is None else execution.turn_of(port))
 
     def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:

@@ -5,25 +5,30 @@ from __future__ import annotations
 import dataclasses
 from array import array
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import EpicycleError, Tag, counted, to_seconds
+from epicycle.actors import EpicycleError, Tag, counted, did_you_mean, to_seconds
 
-from ..tables import Table, as_html, as_text, pandas_module, short
-from ..text import did_you_mean
+from ..shown import short
+from ..tables import Table, as_html, as_text, pandas_module
 from .encoding import field_names, leaves
 
 if TYPE_CHECKING:
     import pandas
 
+T = TypeVar("T")
 _SHOWN = 8  # tokens at the beginning and at the end
 
 
 class SignalError(EpicycleError):
     """A signal, or a field of its tokens, that is not there."""
+
+
+class Past(list[T]):
+    """What has happened in a run, and does not change any more: a copy of the run has a list of the same things."""
 
 
 class Signal:
@@ -53,7 +58,7 @@ class Signal:
         try:
             self._tokens.append(token)
         except OverflowError:  # an int of more than 64 bits
-            self._tokens = [*self._tokens, token]
+            self._tokens = Past([*self._tokens, token])
             self._kind = None
         self._times.append(time)
         self._microsteps.append(microstep)
@@ -63,7 +68,7 @@ class Signal:
         if type(token) is int and not self._tokens:
             self._tokens, self._kind = array("q"), int
         else:
-            self._tokens, self._kind = list(self._tokens), None
+            self._tokens, self._kind = Past(self._tokens), None
 
     @property
     def tags(self) -> list[Tag]:
