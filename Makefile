@@ -48,8 +48,8 @@ mutants: $(DEV)
 	$(BIN)/python -m tests.mutation
 
 robust: $(DEV)
-	$(BIN)/python -m tests.numerics.robustness
-	$(BIN)/python -m tests.numerics.robustness --gap 0.03
+	$(BIN)/python -m tests.actors.robotics.numerics.robustness
+	$(BIN)/python -m tests.actors.robotics.numerics.robustness --gap 0.03
 
 portable: $(DEV)
 	$(BIN)/python -m tests.portable.portable

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from .combining import present, rounds
-from .core import Actor, InputPort, OutputPort, Parameter, elementary, to_seconds
+from .core import Actor, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
 
 
 class Counter(Actor):

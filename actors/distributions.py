@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Configurable, Parameter, ParameterError, Stream, array_parameter, counted, token_type
-from .core.laws import cumulated, weighted
+from .core import Configurable, EpicycleError, Parameter, ParameterError, Stream, array_parameter, counted, token_type
+from .core.choices import cumulated, weighted
 
 
 class Distribution(Configurable):
@@ -20,9 +20,16 @@ class Distribution(Configurable):
         """A value, from the stream given."""
         raise NotImplementedError(f"{type(self).__name__} has no draw()")
 
+    def draw_time(self, random: Stream, what: str = "a time") -> float:
+        """A value that is how long something takes, in s; raises ``EpicycleError`` if it cannot be that."""
+        time = self.draw(random)
+        if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
+            raise EpicycleError(f"{time!r} drawn from {self!r} is not {what} in s, a number >= 0")
+        return float(time)
+
 
 class Constant(Distribution):
-    """Always the same value."""
+    """Always the same value; the actor that sends one is ``Const``."""
 
     value = Parameter(float, doc="the value")
 
@@ -75,12 +82,8 @@ class Exponential(Distribution):
 class Gamma(Distribution):
     """The gamma distribution; with a whole ``shape`` the Erlang distribution."""
 
-    shape = Parameter(float, 1.0, unit="1", min=0, doc="the shape k; k = 1 is the exponential distribution")
+    shape = Parameter(float, 1.0, unit="1", above=0, doc="the shape k; k = 1 is the exponential distribution")
     mean = Parameter(float, 1.0, min=0, doc="the mean, shape times scale")
-
-    def check(self) -> None:
-        if self.shape == 0:
-            raise ParameterError("Gamma.shape: 0 is not above 0")
 
     def draw(self, random: Stream) -> float:
         return random.gamma(self.shape, self.mean / self.shape)

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from .combining import Latest
 from .core import (
     Actor,
     EpicycleError,
     InputPort,
+    Latest,
     OutputPort,
     Parameter,
     ParameterError,

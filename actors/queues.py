@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, ParameterError, PortParameter, to_nanoseconds, to_seconds
+from .core import (
+    Actor,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    Pending,
+    PortParameter,
+    to_nanoseconds,
+    to_seconds,
+)
 from .distributions import Distribution
-from .pending import Pending
 
 
 class Queue(Actor):
@@ -114,7 +123,4 @@ class Server(Actor):
     def _draw(self) -> float:
         if self.distribution is None:
             return self.service_time
-        time = self.distribution.draw(self.random)
-        if not isinstance(time, (int, float)) or not time >= 0:
-            raise ValueError(f"{time!r} drawn from {self.distribution!r} is not a service time in s, a number >= 0")
-        return float(time)
+        return self.distribution.draw_time(self.random, "a service time")

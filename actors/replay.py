@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from bisect import bisect_left
 from pathlib import Path
@@ -14,6 +13,7 @@ from .core import (
     OutputPort,
     Parameter,
     ParameterError,
+    did_you_mean,
     read_table,
     texts_parameter,
     to_nanoseconds,
@@ -71,9 +71,8 @@ class Replay(Actor):
         columns = [name for name in names if name != self.time] if self.columns is None else list(self.columns)
         for name in (self.time, *columns):
             if name not in names:
-                near = difflib.get_close_matches(name, names, n=1)
-                hint = f", did you mean {near[0]!r}?" if near else ""
-                raise self._error(f"there is no column {name!r}{hint}; columns: {', '.join(names)}")
+                guess = did_you_mean(name, names)
+                raise self._error(f"there is no column {name!r}{guess}; columns: {', '.join(names)}")
         if not columns:
             raise self._error(f"there is no column of values beside {self.time!r}")
         times = self._check_times(table.column(self.time).to_pylist())

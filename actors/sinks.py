@@ -37,9 +37,6 @@ class Recorder(Actor):
         int, None, min=0, doc="how many of the latest tokens are kept; all if left out"
     )
 
-    def check(self) -> None:
-        self.initialize()  # it can be read before a run, too
-
     def initialize(self) -> None:
         self.tags: list[Tag] = []
         self.tokens: list[Any] = []
@@ -104,7 +101,6 @@ class Histogram(Actor):
         if not -math.inf < self.low < self.high < math.inf:
             raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must be below high")
         self.edges: NDArray[np.float64] = np.linspace(self.low, self.high, self.bins + 1)
-        self.initialize()
 
     def initialize(self) -> None:
         self.counts: NDArray[np.int64] = np.zeros(self.bins, dtype=np.int64)

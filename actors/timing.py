@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, PortParameter, Tag, Wake, to_seconds, token_type
-from .pending import Pending
+from .core import Actor, InputPort, OutputPort, Parameter, Pending, PortParameter, Tag, Wake, to_seconds, token_type
 
 
 class TimeDelay(Actor):

@@ -165,7 +165,7 @@ class Throttle(CommunicationAspect):
 
     events: ClassVar[tuple[str, ...]] = ("dropped", "delayed")
 
-    rate = Parameter(float, min=1e-9, unit="1/s", doc="messages a second")
+    rate = Parameter(float, above=0, unit="1/s", doc="messages a second")
     burst = Parameter(int, 1, min=1, doc="messages that may pass at once")
     excess = Parameter(str, DROP, choices=(DROP, DELAY), doc="what happens to a message beyond that")
 

@@ -88,13 +88,13 @@ class RangeLoss(_SituatedLoss, CommunicationAspect):
     """
 
     sender = _SenderParameter()
-    range = Parameter(float, min=1e-9, unit="m", doc="distance at which half of the messages are lost")
+    range = Parameter(float, above=0, unit="m", doc="distance at which half of the messages are lost")
     exponent = Parameter(
         float, 3.0, min=0.0, unit="1", doc="path-loss exponent: 2 in free space, 3 to 5 around obstacles"
     )
     shadowing = Parameter(float, 4.0, min=0.0, unit="1", doc="standard deviation of the received power, in dB")
     correlation: Parameter[float | None] = Parameter(
-        float, None, min=1e-9, unit="m", doc="way over which shadowing changes; none: from message to message"
+        float, None, above=0, unit="m", doc="way over which shadowing changes; none: from message to message"
     )
 
     def loses(self, token: Any, point: JoinPoint) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from epicycle.actors.robotics.numerics.constraints import violations
+from epicycle.actors.robotics.numerics.definitions import violations
 from epicycle.actors.robotics.numerics.horizon import INFORM, HorizonProblem, trajectory
 
 Array = NDArray[np.float64]
@@ -243,7 +243,7 @@ def bounds_of(problem: HorizonProblem, controls: Array, slack: float = 1e-4) -> 
     ``slack`` is what ours allows itself beyond that; with much less fatrop goes in circles for ever.
     """
     found = violations(problem, controls)
-    return np.where(found > 1e-6, found + slack, 0.0)
+    return np.pad(np.where(found > 1e-6, found + slack, 0.0), ((0, 0), (2, 0)))  # steps 1 and 2 are decided before
 
 
 def worth(problem: HorizonProblem, controls: Array, bounds: Array) -> tuple[float, float]:
@@ -252,7 +252,7 @@ def worth(problem: HorizonProblem, controls: Array, bounds: Array) -> tuple[floa
     places = trajectory(problem.position, problem.velocity, controls, problem.period, steps)
     speeds = problem.velocity + problem.period * np.cumsum(controls, axis=0)[:-1]
     beyond = max(
-        float((violations(problem, controls) - bounds).max()),
+        float((violations(problem, controls) - bounds[:, 2:]).max()),
         float(np.hypot(*speeds.T).max()) - problem.max_speed,
         float(np.hypot(*controls.T).max()) - problem.max_acceleration,
     )

@@ -13,7 +13,7 @@ import simpy
 
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.engine import LoopError, Results
-from epicycle.runner.show import figures_of
+from epicycle.runner.model import figures_of
 from epicycle.runner.text import Problems
 
 

@@ -22,14 +22,15 @@ cancelled; asking twice for one tag fires once.
 ``wrapup`` is called once after the last tag, also when the run failed.  Nothing may be sent.
 
 An actor keeps all its state in itself, draws random numbers from ``random`` alone, and never looks at another actor:
-so it cannot know which aspects stand around it, and a run is a function of model and seed.
+so it cannot know which aspects stand around it, and a run is a function of model and seed.  Each run has actors of its
+own, copies of those in the model, and a snapshot of a run has copies of these.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol, Self, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
 from .parameter import Configurable, ParameterError
@@ -141,6 +142,14 @@ class Actor(Configurable):
         for name, port in self.own_ports().items():
             self._add_own(name, port)
         self.check()
+
+    if not TYPE_CHECKING:  # or else every name would be there
+
+        def __getattr__(self, name: str) -> Any:
+            missing = f"{type(self).__name__!r} object has no attribute {name!r}"
+            if vars(self).get("home") is not None and isinstance(vars(self).get("context"), _NoContext):
+                missing += f": {self.path} is the model's, and each run has its own, simulation[{self.path!r}]"
+            raise AttributeError(missing, name=name, obj=self)
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         """Ports that this instance has beside those of its class, by name; they follow from its parameters.

@@ -6,11 +6,24 @@ differentiation formulas (NDF) that stand there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
 from .newton import Convergence, Factors, Jacobian, Matrix
-from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, norm, stretch
+from .stepper import (
+    GROWTH_LIMIT,
+    SHRINK_LIMIT,
+    Derivative,
+    Limits,
+    Piece,
+    State,
+    Stepper,
+    added,
+    combined,
+    dot,
+    norm,
+    stretch,
+    taken,
+)
 
 _MAX_ORDER: Final = 5
 _MAX_CORRECTIONS: Final = 4
@@ -20,7 +33,6 @@ _ALPHA: Final = tuple((1.0 - kappa) * gamma for kappa, gamma in zip(_KAPPA, _GAM
 _ERROR: Final = tuple(
     kappa * gamma + 1.0 / (order + 1) for order, (kappa, gamma) in enumerate(zip(_KAPPA, _GAMMA, strict=True))
 )
-_ONES: Final = (1.0,) * (_MAX_ORDER + 1)
 _FACTORS: Final = [(1.0 / (number + 1), number / (number + 1)) for number in range(_MAX_ORDER)]
 
 
@@ -48,7 +60,7 @@ class BDF(Stepper):
         while step >= least:
             end = self.time + step
             step = end - self.time
-            predicted = _total(self._differences[: self._order + 1], _ONES)
+            predicted = combined([1.0] * (self._order + 1), self._differences[: self._order + 1])
             newton = Convergence(self.limits, _MAX_CORRECTIONS)
             correction = self._correct(newton, end, step, predicted)
             if not newton.is_reached:
@@ -61,7 +73,7 @@ class BDF(Stepper):
                     is_new = True
                 continue
             safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
-            state = [value + change for value, change in zip(predicted, correction, strict=True)]
+            state = added(predicted, correction)
             scale = self.scale(state)
             error = _ERROR[self._order] * norm(correction, scale)
             if error <= 1.0:
@@ -80,30 +92,28 @@ class BDF(Stepper):
         share = step / _ALPHA[self._order]
         if self._factors is None:
             self._factors = _factorised(self._matrix, share)
-        past = _total(self._differences[1 : self._order + 1], _GAMMA[1:])
+        past = combined(_GAMMA[1 : self._order + 1], self._differences[1 : self._order + 1])
         past = [value / _ALPHA[self._order] for value in past]
         scale = self.scale(predicted)
-        state, added = predicted, [0.0] * len(predicted)
+        state, correction = predicted, [0.0] * len(predicted)
         while self._factors is not None:
             rates = self.derivative(end, state)
-            change = self._factors.solve(
-                [share * rate - old - total for rate, old, total in zip(rates, past, added, strict=True)]
-            )
+            left = [share * rate - old - total for rate, old, total in zip(rates, past, correction, strict=True)]
+            change = self._factors.solve(left)
             goes_on = newton.goes_on(norm(change, scale))
-            added = [total + value for total, value in zip(added, change, strict=True)]
+            correction = added(correction, change)
             if not goes_on:
                 break
-            state = [value + each for value, each in zip(state, change, strict=True)]
-        return added
+            state = added(state, change)
+        return correction
 
     def _accept(self, correction: State) -> None:
         """Carry the differences on by a step: each is what it was, plus the one above it."""
         differences, order = self._differences, self._order
-        differences[order + 2] = [new - old for new, old in zip(correction, differences[order + 1], strict=True)]
+        differences[order + 2] = taken(correction, differences[order + 1])
         differences[order + 1] = correction
         for number in range(order, -1, -1):
-            pairs = zip(differences[number], differences[number + 1], strict=True)
-            differences[number] = [old + above for old, above in pairs]
+            differences[number] = added(differences[number], differences[number + 1])
         self._equal_steps += 1
 
     def _choose_order(self, scale: list[float], error: float, safety: float) -> None:
@@ -125,27 +135,14 @@ class BDF(Stepper):
         """Turn the differences into those of a step that is longer or shorter by a factor."""
         size = self._order + 1
         new, old = _spread(size, factor), _spread(size, 1.0)
-        for_all = [[_dot(row, column) for column in zip(*old, strict=True)] for row in new]
+        both = [[dot(row, column) for column in zip(*old, strict=True)] for row in new]
         differences = self._differences[:size]
-        self._differences[:size] = [_total(differences, weights) for weights in zip(*for_all, strict=True)]
+        self._differences[:size] = [combined(weights, differences) for weights in zip(*both, strict=True)]
         self._equal_steps = 0
 
     def piece(self) -> Piece:
         rows = self._differences[: self._order + 1]
         return Piece(self._start, self.time, self.time, self.next_step, _FACTORS[: self._order], rows)
-
-
-def _dot(left: Sequence[float], right: Sequence[float]) -> float:
-    total = 0.0
-    for one, other in zip(left, right, strict=True):
-        total += one * other
-    return total
-
-
-def _total(rows: Sequence[State], weights: Sequence[float]) -> State:
-    """The weighted sum of some rows."""
-    weights = weights[: len(rows)]
-    return [_dot(column, weights) for column in zip(*rows, strict=True)]
 
 
 def _spread(size: int, factor: float) -> Matrix:

@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 from typing import Final
 
-from .stepper import Derivative, Limits, State
+from .stepper import Derivative, Limits, State, taken
 
 Matrix = list[list[float]]
 
@@ -55,7 +55,7 @@ class Jacobian:
         moved[number] += move
         move = moved[number] - state[number]
         other = self._derivative(time, moved)
-        changes = [new - old for new, old in zip(other, rates, strict=True)]
+        changes = taken(other, rates)
         change, size = max(
             (abs(each), max(abs(new), abs(old))) for each, new, old in zip(changes, other, rates, strict=True)
         )

@@ -9,7 +9,20 @@ import math
 from typing import Final
 
 from .newton import Convergence, Factors, Jacobian, Matrix
-from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, norm, root_power
+from .stepper import (
+    GROWTH_LIMIT,
+    SHRINK_LIMIT,
+    Derivative,
+    Limits,
+    Piece,
+    State,
+    Stepper,
+    added,
+    combined,
+    norm,
+    root_power,
+    taken,
+)
 
 _MAX_CORRECTIONS: Final = 6
 _ROOT: Final = math.sqrt(6.0)
@@ -37,13 +50,12 @@ _DENSE: Final = (
 )
 _FACTORS: Final = [(1.0, 0.0)] * 3
 
-Triple = tuple[State, State, State]
+Stages = list[State]  # three, state by state
 
 
-def _times(matrix: tuple[tuple[float, float, float], ...], vectors: Triple) -> Triple:
-    """A matrix of three by three times the vectors of three stages, state by state."""
-    first, second, third = ([a * x + b * y + c * z for x, y, z in zip(*vectors, strict=True)] for a, b, c in matrix)
-    return first, second, third
+def _times(matrix: tuple[tuple[float, ...], ...], stages: Stages) -> Stages:
+    """A matrix of three by three times three stages."""
+    return [combined(row, stages) for row in matrix]
 
 
 class Radau(Stepper):
@@ -78,7 +90,7 @@ class Radau(Stepper):
                     self._is_new = True
                 continue
             safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
-            state = [value + change for value, change in zip(self.state, stages[2], strict=True)]
+            state = added(self.state, stages[2])
             error = self._error(self._factors[0], stages, state, step, filtered=was_rejected)
             factor = safety * self._predicted(step, error)
             if error <= 1.0:
@@ -91,16 +103,11 @@ class Radau(Stepper):
             was_rejected = True
         return False
 
-    def _solve(self, newton: Convergence, step: float) -> Triple:
+    def _solve(self, newton: Convergence, step: float) -> Stages:
         """The stages, as what each adds to the state."""
-        zero = [0.0] * len(self.state)
-        stages: Triple = (zero, zero, zero)
+        stages = [[0.0] * len(self.state)] * 3
         if self._piece is not None:  # the latest polynomial goes on for a while
-            first, second, third = (
-                [new - old for new, old in zip(self._piece.at(self.time + node * step), self.state, strict=True)]
-                for node in _NODES
-            )
-            stages = first, second, third
+            stages = [taken(self._piece.at(self.time + node * step), self.state) for node in _NODES]
         if self._factors is None:
             self._factors = _factorised(self._matrix, step)
         if self._factors is None:
@@ -111,42 +118,30 @@ class Radau(Stepper):
         parts = _times(_FROM_STAGES, stages)
         goes_on = True
         while goes_on:
-            rates = self._rates(step, stages)
+            rates = [
+                self.derivative(self.time + node * step, added(self.state, stage))
+                for node, stage in zip(_NODES, stages, strict=True)
+            ]
             one, two, three = _times(_FROM_STAGES, rates)
             change = self._factors[0].solve([rate - real * part for rate, part in zip(one, parts[0], strict=True)])
             both = self._factors[1].solve(
                 [rate - (pair * x - turn * y) for rate, x, y in zip(two, parts[1], parts[2], strict=True)]
                 + [rate - (pair * y + turn * x) for rate, x, y in zip(three, parts[1], parts[2], strict=True)]
             )
-            changes = change, both[:size], both[size:]
             goes_on = newton.goes_on(norm([*change, *both], scale * 3))
-            first, second, third = (
-                [old + new for old, new in zip(part, each, strict=True)]
-                for part, each in zip(parts, changes, strict=True)
-            )
-            parts = first, second, third
+            parts = list(map(added, parts, (change, both[:size], both[size:])))
             stages = _times(_TO_STAGES, parts)
         return stages
 
-    def _rates(self, step: float, stages: Triple) -> Triple:
-        first, second, third = (
-            self.derivative(
-                self.time + node * step, [value + each for value, each in zip(self.state, stage, strict=True)]
-            )
-            for node, stage in zip(_NODES, stages, strict=True)
-        )
-        return first, second, third
-
-    def _error(self, factors: Factors, stages: Triple, state: State, step: float, *, filtered: bool) -> float:
-        a, b, c = _ERROR
-        ends = [(a * x + b * y + c * z) / step for x, y, z in zip(*stages, strict=True)]
+    def _error(self, factors: Factors, stages: Stages, state: State, step: float, *, filtered: bool) -> float:
+        ends = [value / step for value in combined(_ERROR, stages)]
         scale = self.scale(self.state, state)
-        error = factors.solve([rate + each for rate, each in zip(self.rates, ends, strict=True)])
+        error = factors.solve(added(self.rates, ends))
         size = norm(error, scale)
         if filtered and size > 1.0:
             # The error of components that decay at once is exaggerated: once more through the system damps it.
-            rates = self.derivative(self.time, [value + each for value, each in zip(self.state, error, strict=True)])
-            size = norm(factors.solve([rate + each for rate, each in zip(rates, ends, strict=True)]), scale)
+            rates = self.derivative(self.time, added(self.state, error))
+            size = norm(factors.solve(added(rates, ends)), scale)
         return size
 
     def _predicted(self, step: float, error: float) -> float:
@@ -159,9 +154,9 @@ class Radau(Stepper):
         before, error_before = self._before
         return min(1.0, step / before * root_power(error_before, 0.25) / root) / root
 
-    def _accept(self, end: float, state: State, stages: Triple) -> None:
-        rows = [[a * x + b * y + c * z for x, y, z in zip(*stages, strict=True)] for a, b, c in _DENSE]
-        self._piece = Piece(self.time, end, self.time, end - self.time, _FACTORS, [self.state, *rows])
+    def _accept(self, end: float, state: State, stages: Stages) -> None:
+        rows = [self.state, *_times(_DENSE, stages)]
+        self._piece = Piece(self.time, end, self.time, end - self.time, _FACTORS, rows)
         self.time, self.state, self.rates = end, state, self.derivative(end, state)
 
     def _prepare(self, step: float, factor: float, newton: Convergence) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, norm, stretch
+from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, combined, norm, stretch
 from .tableaux import Stage, Tableau, Weights
 
 _SAFETY = 0.9
@@ -44,12 +44,12 @@ class RungeKutta(Stepper):
         time, start = begin
         state = start
         for share, weights in stages:
-            state = [value + step * change for value, change in zip(start, _combined(weights, rates), strict=True)]
+            state = [value + step * change for value, change in zip(start, _weighted(weights, rates), strict=True)]
             rates.append(self.derivative(time + share * step, state))
         return state
 
     def _error(self, rates: list[State], step: float, scale: list[float]) -> float:
-        errors = [norm(_combined(weights, rates), scale) for weights in self._tableau.errors]
+        errors = [norm(_weighted(weights, rates), scale) for weights in self._tableau.errors]
         if len(errors) == 1 or errors[0] == 0.0:
             return step * errors[0]
         high, low = errors
@@ -59,17 +59,10 @@ class RungeKutta(Stepper):
         start, state = self._begin
         step, rates = self.time - start, list(self._latest)
         self._pass(self._tableau.extra, self._begin, step, rates)
-        rows = [[step * value for value in _combined(weights, rates)] for weights in self._tableau.dense]
+        rows = [[step * value for value in _weighted(weights, rates)] for weights in self._tableau.dense]
         return Piece(start, self.time, start, step, self._tableau.factors, [state, *rows])
 
 
-def _combined(weights: Weights, rates: list[State]) -> State:
-    """The weighted sum of the derivatives at some stages, for each state."""
-    factors = [factor for _, factor in weights]
-    totals = []
-    for column in zip(*[rates[stage] for stage, _ in weights], strict=True):
-        total = 0.0
-        for factor, rate in zip(factors, column, strict=True):
-            total += factor * rate
-        totals.append(total)
-    return totals
+def _weighted(weights: Weights, rates: list[State]) -> State:
+    """The weighted sum of the derivatives at some stages."""
+    return combined([weight for _, weight in weights], [rates[stage] for stage, _ in weights])

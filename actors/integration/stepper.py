@@ -10,6 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import add, sub
 from typing import Final
 
 State = list[float]
@@ -40,6 +41,29 @@ def norm(values: Sequence[float], scale: Sequence[float]) -> float:
         ratio = value / unit
         total += ratio * ratio
     return math.sqrt(total / len(scale))
+
+
+def added(one: Sequence[float], other: Sequence[float]) -> State:
+    """The sum of two vectors."""
+    return list(map(add, one, other))
+
+
+def taken(one: Sequence[float], other: Sequence[float]) -> State:
+    """The first of two vectors less the other."""
+    return list(map(sub, one, other))
+
+
+def dot(one: Sequence[float], other: Sequence[float]) -> float:
+    """The sum of the products."""
+    total = 0.0
+    for left, right in zip(one, other, strict=True):
+        total += left * right
+    return total
+
+
+def combined(weights: Sequence[float], rows: Sequence[State]) -> State:
+    """The weighted sum of as many rows."""
+    return [dot(weights, column) for column in zip(*rows, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -126,7 +150,7 @@ class Stepper(ABC):
         size, speed = norm(self.state, scale), norm(self.rates, scale)
         trial = 1e-6 if size < 1e-5 or speed < 1e-5 else 0.01 * size / speed
         state = [value + trial * rate for value, rate in zip(self.state, self.rates, strict=True)]
-        change = [new - old for new, old in zip(self.derivative(trial, state), self.rates, strict=True)]
+        change = taken(self.derivative(trial, state), self.rates)
         bend = norm(change, scale) / trial if trial else math.inf
         if speed <= 1e-15 and bend <= 1e-15:
             step = max(1e-6, trial * 1e-3)

@@ -13,26 +13,7 @@ from .solvers import Barrier, Casadi, Solver
 from .vehicle import Vehicle
 
 __all__ = [
-    "Barrier",
-    "BodyState",
-    "BroadcastChannel",
-    "Casadi",
-    "ChannelError",
-    "CircularMotion",
-    "DistanceMonitor",
-    "Estimate",
-    "FilterError",
-    "FilterPyEstimator",
-    "GoalMonitor",
-    "Inform",
-    "Measurement",
-    "Objective",
-    "Plan",
-    "ReachGoal",
-    "RobustController",
-    "Sensor",
-    "SeparationMonitor",
-    "Solver",
-    "UnscentedEstimator",
-    "Vehicle",
-]
+    "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "DistanceMonitor",
+    "Estimate", "FilterError", "FilterPyEstimator", "GoalMonitor", "Inform", "Measurement", "Objective", "Plan",
+    "ReachGoal", "RobustController", "Sensor", "SeparationMonitor", "Solver", "UnscentedEstimator", "Vehicle",
+]  # fmt: skip

@@ -32,53 +32,38 @@ class _Standing(NamedTuple):
 
 
 class _Peers:
-    """The latest plans of the other robots, as the kernels take them.
+    """The latest plans of the other robots, each as a row that the kernels take.
 
     Where others stand at time 0 may be known before.  It is a plan of nobody to stay there, until a first plan takes
     the place of the nearest one.
     """
 
     def __init__(self, places: Array) -> None:
-        self._rows: dict[str, int] = {}
-        self._nobody: dict[str, tuple[float, float]] = {}
-        self._controls = 0  # room for so many of each robot
-        self.plans = np.empty((0, _CONTROLS))  # a row for each robot, sorted by name
-        for number, (x, y) in enumerate(places.tolist()):
-            name = f"[{number}]"  # which is no path
-            self._nobody[name] = x, y
-            self._make_room(name, 0)
-            self.plans[self._rows[name], :_CONTROLS] = x, y, 0.0, 0.0, 0.0, 0
+        # Their names are no paths.
+        self._nobody = {f"[{number}]": (x, y) for number, (x, y) in enumerate(places.tolist())}
+        self._rows = {name: np.array([x, y, 0.0, 0.0, 0.0, 0.0]) for name, (x, y) in self._nobody.items()}
 
     def hear(self, plan: Plan) -> None:
         """Remember a plan, unless a later one of that robot is known."""
-        count = len(plan.controls)
-        if plan.robot not in self._rows or count > self._controls:
-            if self._nobody and plan.robot not in self._rows:
-                self._meet(*plan.state.position.tolist())
-            self._make_room(plan.robot, count)
-        row = self.plans[self._rows[plan.robot]]
-        if plan.time >= row[_MADE_AT]:
-            (x, y), (vx, vy) = plan.state.position.tolist(), plan.state.velocity.tolist()
-            row[:_CONTROLS] = x, y, vx, vy, plan.time, count
-            row[_CONTROLS : _CONTROLS + 2 * count] = plan.controls.ravel()
+        known = self._rows.get(plan.robot)
+        if known is not None and plan.time < known[_MADE_AT]:
+            return
+        (x, y), (vx, vy) = plan.state.position.tolist(), plan.state.velocity.tolist()
+        if known is None and self._nobody:
+            away = {name: hypot(x - there[0], y - there[1]) for name, there in self._nobody.items()}
+            nearest = min(away, key=away.__getitem__)
+            del self._nobody[nearest], self._rows[nearest]
+        row = self._rows[plan.robot] = np.empty(_CONTROLS + plan.controls.size)
+        row[:_CONTROLS] = x, y, vx, vy, plan.time, len(plan.controls)
+        row[_CONTROLS:] = plan.controls.ravel()
 
-    def _meet(self, x: float, y: float) -> None:
-        """Forget who was thought to stand nearest to a place."""
-        away = {name: hypot(x - there[0], y - there[1]) for name, there in self._nobody.items()}
-        nearest = min(away, key=away.__getitem__)
-        del self._nobody[nearest]
-        self.plans = np.delete(self.plans, self._rows.pop(nearest), axis=0)
-        self._rows = {name: row for row, name in enumerate(self._rows)}
-
-    def _make_room(self, robot: str, controls: int) -> None:
-        known, names = self.plans, sorted({*self._rows, robot})
-        self._controls = max(self._controls, controls)
-        self.plans = np.zeros((len(names), _CONTROLS + 2 * self._controls))
-        self.plans[:, _MADE_AT] = -math.inf
-        for row, name in enumerate(names):
-            if name in self._rows:
-                self.plans[row, : known.shape[1]] = known[self._rows[name]]
-        self._rows = {name: row for row, name in enumerate(names)}
+    def table(self) -> Array:
+        """The rows, sorted by name."""
+        table = np.zeros((len(self._rows), max(map(len, self._rows.values()), default=_CONTROLS)))
+        for row, name in enumerate(sorted(self._rows)):
+            known = self._rows[name]
+            table[row, : len(known)] = known
+        return table
 
 
 class RobustController(TargetModel, Actor):
@@ -125,7 +110,7 @@ class RobustController(TargetModel, Actor):
         choices=(NOW, DECISION),
         doc="where the N steps begin: at t, or at t + period, when U_{t+1} begins to act",
     )
-    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="Delta t: time between two triggers")
+    period = Parameter(float, 0.1, unit="s", above=0, doc="Delta t: time between two triggers")
     safe_distance = Parameter(float, 2.0, unit="m", min=0, doc="Dmin: to the target and to other robots")
     margin = Parameter(float, 2.0, unit="1", min=0, doc="alpha: standard deviations to add to it")
     tube_initial = Parameter(float, 0.2, unit="m", min=1e-6, doc="sigma_r0: radius of the reachability set now")
@@ -140,23 +125,26 @@ class RobustController(TargetModel, Actor):
     robot_name = Parameter(str, "", doc="name in the plan; empty: the path of what the controller stands in")
 
     def initialize(self) -> None:
-        from .numerics import horizon, reachability
+        from .numerics import definitions, horizon, reachability
         from .numerics.warm_up import compile_kernels
 
         self.solver.prepare()
         compile_kernels()
         # Kept, as an import takes 1 us whenever it is met.
-        self._new_problem, self._standing_plan = horizon.HorizonProblem, reachability.standing_plan
-        self._expected_target, self._peer_tubes = reachability.expected_target, reachability.peer_tubes
+        self._standing_plan, self._peer_tubes = reachability.standing_plan, reachability.peer_tubes
+        self._expected_target, self._new_problem = reachability.expected_target, horizon.HorizonProblem
         self._name = self.robot_name or enclosing(self.path)
         tau = 1.0 if self.tube_time == STEPS else self.period
         # The kernels count steps from t.  From t + period on there is one more of them, and tau is 0 at the first.
         ahead = 1 if self.horizon_from == DECISION else 0
         self._steps = self.horizon + ahead
-        self._radius = reachability.tube_radius(
-            self.tube_initial - ahead * self.tube_growth * tau, self.tube_growth, tau, self._steps
+        self._radius = definitions.sigma_r(
+            self.tube_initial - ahead * self.tube_growth * tau, self.tube_growth * tau, np.arange(1.0, self._steps + 1)
         )
-        self._process_noise = self.process_noise
+        self._room = self.period, self._radius, self.tube_growth, self.safe_distance, self.margin
+        self._model = self.process_noise, self.covariance_noise, self.kappa, self.period
+        # Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N and their weights, without a target.
+        self._nobody = *(np.empty((0, self._steps, columns)) for columns in (2, 3)), np.empty((0, 2)), np.empty(0)
         self._applied = np.zeros(2)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(2), np.zeros(2), np.zeros((self._steps, 2)))
         self._peers = _Peers(self.peers_at_start)
@@ -214,20 +202,14 @@ class RobustController(TargetModel, Actor):
         velocity, speed = np.array([vx, vy]), hypot(vx, vy)
         standing = self._standing
         tube_centre, tube_radius, starts = self._standing_plan(
-            standing.position,
-            standing.velocity,
-            standing.controls,
-            now - standing.made_at,
-            self._radius,
-            velocity,
-            speed,
-            self.max_acceleration,
-            period,
+            *standing[1:], now - standing.made_at, self._radius, velocity, speed, self.max_acceleration, period
         )
-        target_mean, target_covariance, points, weights = self._target_ahead(now)
-        peer_mean, peer_distance = self._peer_tubes(
-            self._peers.plans, now, period, self._radius, self.tube_growth, self.safe_distance, self.margin
-        )
+        target, expected = self._target, self._nobody
+        if target is not None:
+            elapsed = now - target.time
+            expected = self._expected_target(target.mean, target.covariance, *self._model, elapsed, self._steps)
+        target_mean, target_covariance, points, weights = expected
+        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room)
         posed = self._new_problem(
             period=period,
             position=position,
@@ -244,19 +226,3 @@ class RobustController(TargetModel, Actor):
             peer_distance=peer_distance,
         )
         return self.objective.pose(posed, points, weights), starts
-
-    def _target_ahead(self, now: float) -> tuple[Array, Array, Array, Array]:
-        """Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N, weights; K is 0 or 1."""
-        target, steps = self._target, self._steps
-        if target is None:
-            return np.empty((0, steps, 2)), np.empty((0, steps, 3)), np.empty((0, 2)), np.empty(0)
-        return self._expected_target(
-            target.mean,
-            target.covariance,
-            self._process_noise,
-            self.covariance_noise,
-            self.kappa,
-            self.period,
-            now - target.time,
-            steps,
-        )

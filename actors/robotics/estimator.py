@@ -46,7 +46,7 @@ class _Estimator(TargetModel, Actor):
     estimate = OutputPort(Estimate, doc="the target's state (x, y, vx, vy) after fusion")
     too_late = OutputPort(int, doc="how many measurements so far came more than max_delay late; sent with each of them")
 
-    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="the time over which the process noise was measured")
+    period = Parameter(float, 0.1, unit="s", above=0, doc="the time over which the process noise was measured")
     prior_mean = array_parameter((4,), (10.0, 0.0, 0.0, 0.0), doc="first guess of (x, y, vx, vy) in m and m/s")
     prior_variance = array_parameter((4,), (400.0, 400.0, 4.0, 4.0), min=0, doc="its variances, in m^2 and m^2/s^2")
     max_delay = Parameter(
@@ -188,19 +188,13 @@ class UnscentedEstimator(_Estimator):
         super().initialize()
         self._move_and_fuse = ukf.predict_and_fuse  # kept, as an import takes 1 us whenever it is met
         self._model = lru_cache(8)(lambda elapsed: (ukf.constant_velocity(elapsed), self._noise_over(elapsed)))
-        self._mean = np.array(self.prior_mean)
-        self._covariance = np.diag(self.prior_variance)
+        self._averaged = self.noise_direction == EXPECTED
+        self._mean, self._covariance = np.array(self.prior_mean), np.diag(self.prior_variance)
 
     def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
-        transition, noise = self._model(elapsed)  # nearly always the same
+        model, rows = self._model(elapsed), self._rows(measurements)  # the model is nearly always the same
         self._mean, self._covariance, fused = self._move_and_fuse(
-            self._mean,
-            self._covariance,
-            transition,
-            noise,
-            self.kappa,
-            self._rows(measurements),
-            self.noise_direction == EXPECTED,
+            self._mean, self._covariance, *model, self.kappa, rows, self._averaged
         )
         return fused
 

@@ -63,7 +63,7 @@ class Barrier(Solver):
 
 
 class Casadi(Solver):
-    """CasADi's IPOPT on the same problem, warm-started: some 100 times slower, an independent check.
+    """CasADi's IPOPT on the same problem, warm-started: thousands of times slower, an independent check.
 
     It comes with ``pip install 'epicycle[casadi]'``.
     """

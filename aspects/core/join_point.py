@@ -207,7 +207,7 @@ class JoinPointAspect(Aspect, Generic[Passing, Point]):
     from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")
     until: Parameter[float | None] = Parameter(float, None, min=0.0, unit="s", doc="active before this time alone")
     every: Parameter[float | None] = Parameter(
-        float, None, min=1e-9, unit="s", doc="active again after this time, and again: a period of on and off"
+        float, None, above=0, unit="s", doc="active again after this time, and again: a period of on and off"
     )
     when = PortFormulaParameter(
         None, doc="active while this expression over ports is true, such as main.state.position[0] < 20"

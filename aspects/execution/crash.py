@@ -38,7 +38,7 @@ class CrashRestart(ExecutionAspect):
 
     times = array_parameter((None,), (), unit="s", min=0.0, doc="when it crashes")
     mtbf: Parameter[float | None] = Parameter(
-        float, None, min=1e-9, unit="s", doc="mean time from a repair to the next failure; none: no random failures"
+        float, None, above=0, unit="s", doc="mean time from a repair to the next failure; none: no random failures"
     )
     repair = DurationParameter(0.0, doc="how long it is down: a time or a distribution")
     state = Parameter(str, LOST, choices=(LOST, KEPT), doc="what becomes of the actors' state")

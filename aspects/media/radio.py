@@ -51,12 +51,12 @@ class RadioMedium(Medium):
 
     message_length = Parameter(float, 0.0, min=0.0, unit="bit", doc="length of a message")
     number_length = Parameter(float, 0.0, min=0.0, unit="bit", doc="what each number in the message adds to its length")
-    rate = Parameter(float, min=1e-9, unit="bit/s", doc="speed of transmission")
+    rate = Parameter(float, above=0, unit="bit/s", doc="speed of transmission")
     overhead = Parameter(
         float, 0.0, min=0.0, unit="s", doc="what each transmission takes besides: spacing, preamble, acknowledgement"
     )
     carrier_sense = Parameter(bool, True, doc="whether a station waits while another sends")
-    slot = Parameter(float, 9e-6, min=1e-9, unit="s", doc="time that a backoff counts in; IEEE 802.11: 9 or 20 us")
+    slot = Parameter(float, 9e-6, above=0, unit="s", doc="time that a backoff counts in; IEEE 802.11: 9 or 20 us")
     window = Parameter(int, 16, min=1, max=65536, doc="slots of the first backoff; 1: none")
     max_window = Parameter(int, 1024, min=1, max=65536, doc="slots of the longest backoff")
     retries = Parameter(

@@ -28,8 +28,8 @@ class Visits:
         self._acts = acts
         self._mutes = (*(() if acts else ("forward", "stop")), *(() if tells else ("act", "count", "record")))
         self._points: dict[JoinPoint, JoinPoint] = {}
-        decides = "pass_token" if isinstance(aspect, PortAspect) else "schedule"
         # Each run has a copy of the original, and tells this of it.
+        decides = "pass_token" if isinstance(aspect, PortAspect) else "schedule"
         if isinstance(aspect, JoinPointAspect):
             setattr(self.aspect, decides, partial(self._pass, aspect, decides))
             setattr(self.aspect, "pass_by", partial(self._pass, aspect, "pass_by"))  # noqa: B010 (they are methods)
@@ -43,8 +43,8 @@ class Visits:
                 f"nothing has passed {self._original!r} at {at}, so nothing is shown: let it run longer"
             )
 
-    def _begin(self, aspect: ExecutionAspect, unit: Unit) -> None:
-        aspect.begin(self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart")))
+    def _begin(self, original: ExecutionAspect, unit: Unit) -> None:
+        original.begin(self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart")))
 
     def _pass(self, original: Aspect, method: str, passing: Any, point: JoinPoint) -> None:
         """Let the aspect do what it does with a token or a firing."""

@@ -1,5 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
+from .figure import Figure, figure_types
 from .measure import MSER5, TAKES, TIME, TOKENS, Measure, Take, conversion_problem, take_problem
 from .own_types import TypesError, types_of_file
 from .packaged import (
@@ -8,6 +9,7 @@ from .packaged import (
     model_folders,
     packaged_disturbances,
     packaged_models,
+    packaged_ones,
     packaged_studies,
     unreadable,
 )
@@ -34,6 +36,7 @@ __all__ = [
     "TOKENS",
     "Catalogue",
     "CatalogueError",
+    "Figure",
     "Measure",
     "ParameterReference",
     "PortReference",
@@ -47,6 +50,7 @@ __all__ = [
     "conversion_problem",
     "describe",
     "doc_of",
+    "figure_types",
     "find",
     "first_sentence",
     "installed",
@@ -56,6 +60,7 @@ __all__ = [
     "model_folders",
     "packaged_disturbances",
     "packaged_models",
+    "packaged_ones",
     "packaged_studies",
     "parts_of",
     "read_type",

@@ -54,6 +54,7 @@ class ParameterReference:
     optional: bool
     default: object
     min: float | None
+    above: float | None
     max: float | None
     choices: tuple[str, ...]
     doc: str
@@ -126,6 +127,7 @@ def _parameter(parameter: Parameter[object]) -> ParameterReference:
         parameter.optional,
         None if parameter.required else as_written(parameter.default),
         parameter.min,
+        parameter.above,
         parameter.max,
         parameter.choices,
         parameter.doc,

@@ -5,14 +5,13 @@ closures over ports and queues; and it calls itself for each thing within a thin
 is too deep for it.  Here a thing is first made empty, then entered into a list of what is to be filled.
 
 What cannot change is not copied: numbers and texts, classes, functions without a memory, tuples and frozen dataclasses
-of such things, arrays that are read-only.  Everything else is copied as ``copy`` would, by the same protocol
-(``__deepcopy__``, ``__reduce_ex__``, ``__getstate__``).
+of such things, arrays that are read-only.  Anything else is copied by Python's own protocol: ``__deepcopy__``, or the
+``__reduce_ex__`` that every class has.
 """
 
 from __future__ import annotations
 
-import copy
-import dataclasses
+import copyreg
 import enum
 import hashlib
 import itertools
@@ -54,10 +53,10 @@ class Copies:
 
     def __init__(self, shared: Iterable[object] = (), callbacks: list[object] | None = None) -> None:
         self._known: dict[int, Any] = {id(thing): thing for thing in shared}
-        self._callbacks = callbacks
-        self._kept: list[Any] = []  # copied things live on, lest another gets the id of one
+        self._kept: list[Any] = []  # what was copied lives on, lest something else gets its id
         self._to_fill: list[tuple[_Fill, Any, Any, tuple[Any, str]]] = []
         self._owner: tuple[Any, str] = None, ""  # whose that is which is copied just now, and the attribute
+        self._callbacks = callbacks
 
     def of(self, thing: T) -> T:
         """The copy of a thing, whole; raises ``CopyError``."""
@@ -76,14 +75,12 @@ class Copies:
         known = self._known.get(id(thing), _NOTHING)
         if known is not _NOTHING:
             return known
-        make = _MAKE.get(cls) or _made_of(cls)
-        made = make(self, thing)
+        made = (_MAKE.get(cls) or _made_of(cls))(self, thing)
         self._known[id(thing)] = made
-        if made is not thing:
-            self._kept.append(thing)
+        self._kept.append(thing)
         return made
 
-    def _later(self, fill: _Fill, thing: Any, made: Any) -> Any:
+    def _later(self, fill: _Fill, thing: Any, made: T) -> T:
         self._known[id(thing)] = made
         self._to_fill.append((fill, thing, made, self._owner))
         return made
@@ -92,27 +89,20 @@ class Copies:
 
     def _list(self, thing: list[Any]) -> list[Any]:
         if _CONSTANT.issuperset(map(type, thing)):
-            return thing[:]
-        return self._later(self._fill_list, thing, [])  # type: ignore[no-any-return]
+            return thing.copy()
+        return self._later(lambda thing, made: made.extend(map(self._copy, thing)), thing, [])
 
-    def _fill_list(self, thing: list[Any], made: list[Any]) -> None:
-        made.extend(map(self._copy, thing))
-
-    def _deque(self, thing: deque[Any]) -> deque[Any]:
-        return self._later(self._fill_list, thing, deque(maxlen=thing.maxlen))  # type: ignore[no-any-return]
+    def _set(self, thing: set[Any]) -> set[Any]:
+        return self._later(lambda thing, made: made.update(map(self._copy, thing)), thing, set())
 
     def _dict(self, thing: dict[Any, Any]) -> dict[Any, Any]:
-        return self._later(self._fill_dict, thing, {})  # type: ignore[no-any-return]
+        if _CONSTANT.issuperset(map(type, thing)) and _CONSTANT.issuperset(map(type, thing.values())):
+            return thing.copy()
+        return self._later(self._fill_dict, thing, {})
 
     def _fill_dict(self, thing: dict[Any, Any], made: dict[Any, Any]) -> None:
         for key, value in thing.items():
             made[self._copy(key)] = self._copy(value)
-
-    def _set(self, thing: set[Any]) -> set[Any]:
-        return self._later(self._fill_set, thing, set())  # type: ignore[no-any-return]
-
-    def _fill_set(self, thing: set[Any], made: set[Any]) -> None:
-        made.update(map(self._copy, thing))
 
     def _tuple(self, thing: Any) -> Any:
         items = [self._copy(item) for item in thing]
@@ -122,8 +112,7 @@ class Copies:
 
     def _frozen(self, thing: Any) -> Any:
         """A frozen dataclass: as a tuple."""
-        values = [(each.name, getattr(thing, each.name)) for each in dataclasses.fields(thing)]
-        copied = [(name, value, self._copy(value)) for name, value in values]
+        copied = [(name, value, self._copy(value)) for name, value in _attributes(thing)]
         if all(value is other for _, value, other in copied):
             return thing
         made = object.__new__(type(thing))
@@ -144,7 +133,7 @@ class Copies:
         if not has_memory or self._is_outside(thing):
             return thing
         cells = tuple(map(self._copy, thing.__closure__ or ()))
-        made: Any = types.FunctionType(thing.__code__, thing.__globals__, thing.__name__, None, cells)
+        made = types.FunctionType(thing.__code__, thing.__globals__, thing.__name__, None, cells)
         made.__qualname__, made.__kwdefaults__ = thing.__qualname__, thing.__kwdefaults__
         return self._later(self._fill_function, thing, made)
 
@@ -174,20 +163,15 @@ class Copies:
         return getattr(self._copy(owner), thing.__name__)
 
     def _partial(self, thing: partial[Any]) -> Any:
-        made: Any = partial(self._copy(thing.func), *map(self._copy, thing.args))
         keywords = {name: self._copy(value) for name, value in thing.keywords.items()}
-        return partial(made, **keywords) if keywords else made
+        return partial(self._copy(thing.func), *map(self._copy, thing.args), **keywords)
 
     # -- objects ---------------------------------------------------------------------------------------------------
 
     def _array(self, thing: Any) -> Any:
         if thing.dtype.hasobject:
-            made = np.empty_like(thing)
-            return self._later(lambda _, made: made.__setitem__(..., self.of(thing.tolist())), thing, made)
+            return self._by_protocol(thing)
         return thing if not thing.flags.writeable and thing.base is None else thing.copy()
-
-    def _count(self, thing: Any) -> Any:
-        return itertools.count(next(thing) + 1)  # it leaves a number out, which nobody misses
 
     def _weak(self, thing: Any) -> Any:
         there = thing()
@@ -197,12 +181,10 @@ class Copies:
         """An actor; one of a model in less time, for there may be thousands."""
         if self._callbacks is None:
             return self._object(thing)
-        made = thing.twin(self._known)
-        return self._later(self._fill_object, thing, made)
+        return self._later(self._fill_object, thing, thing.twin(self._known))
 
     def _object(self, thing: Any) -> Any:
-        made = object.__new__(type(thing))
-        self._later(self._fill_object, thing, made)
+        made = self._later(self._fill_object, thing, object.__new__(type(thing)))
         if type(thing).__hash__ is not _HASH:  # which asks what is in it, perhaps now
             self._fill_object(*self._to_fill.pop()[1:3])
         return made
@@ -212,7 +194,7 @@ class Copies:
         owns = isinstance(thing, (Actor, JoinPoint, Aspect))
         shared: tuple[str, ...] = getattr(cls, "copies_share", ())
         descriptors, put = _descriptors(cls), object.__setattr__
-        for name, value in getattr(thing, "__dict__", _EMPTY).items():
+        for name, value in _attributes(thing):
             if type(value) not in _CONSTANT and name not in shared:
                 if owns:
                     self._owner = thing, name
@@ -221,25 +203,45 @@ class Copies:
                 made.__dict__[name] = value
             else:
                 put(made, name, value)  # one by one, see ``_Port.bind``
-        for name in _slots(cls):
-            if (value := getattr(thing, name, _NOTHING)) is not _NOTHING:
-                put(made, name, self._copy(value))
 
     def _by_protocol(self, thing: Any) -> Any:
         """As ``copy.deepcopy`` does, for what says itself how it is to be copied."""
         if _is_global(thing):
             return thing
         try:
-            made = copy.deepcopy(thing, self._known)
+            if hasattr(thing, "__deepcopy__") and type(thing) is not np.ndarray:
+                return thing.__deepcopy__(self._known)
+            reduce = copyreg.dispatch_table.get(type(thing))
+            reduced: Any = thing.__reduce_ex__(4) if reduce is None else reduce(thing)
+            if isinstance(reduced, str):
+                return thing
+            make, arguments, state, items, pairs = (*reduced, None, None, None)[:5]
+            made = make(*self.of(arguments))
         except CopyError:
             raise
         except Exception as error:
             raise CopyError(
-                f"{_told(*self._owner)} holds a {type(thing).__qualname__}, which cannot be copied ({error}): let "
-                "its class say how, with __deepcopy__, or name the attribute in copies_share for copies of the run to "
-                "have it in common"
+                f"{_told(*self._owner)} holds a {type(thing).__qualname__}, which cannot be copied ({error}): let its "
+                "class say how, with __deepcopy__, or name the attribute in copies_share for copies of the run to have "
+                "it in common"
             ) from error
+        # Items are taken now, while nothing changes, and put in later, as they may lead here again.
+        rest = state, list(items or ()), list(pairs or ())
+        self._to_fill.append((self._fill_reduced, rest, made, self._owner))
         return made
+
+    def _fill_reduced(self, reduced: tuple[Any, list[Any], list[Any]], made: Any) -> None:
+        state, items, pairs = reduced
+        if state is not None and hasattr(made, "__setstate__"):
+            made.__setstate__(self.of(state))
+        elif state is not None:
+            in_dict, in_slots = state if isinstance(state, tuple) else (state, None)
+            for name, value in {**(in_dict or {}), **(in_slots or {})}.items():
+                object.__setattr__(made, name, self._copy(value))
+        for item in items:
+            made.append(self._copy(item))
+        for key, value in pairs:
+            made[self._copy(key)] = self._copy(value)
 
 
 @cache
@@ -249,12 +251,10 @@ def _made_of(cls: Any) -> Callable[[Copies, Any], Any]:
         return lambda _, thing: thing
     if issubclass(cls, Actor):
         return Copies._actor
+    if issubclass(cls, tuple) and hasattr(cls, "_fields"):
+        return Copies._tuple
     if hasattr(cls, "__deepcopy__") or not _is_plain(cls):
-        return (
-            Copies._tuple
-            if issubclass(cls, tuple) and cls.__reduce_ex__ is object.__reduce_ex__
-            else Copies._by_protocol
-        )
+        return Copies._by_protocol
     params = vars(cls).get("__dataclass_params__")
     return Copies._frozen if params is not None and params.frozen else Copies._object
 
@@ -267,6 +267,15 @@ def _is_plain(cls: type) -> bool:
         return False
     is_python = all(base is object or base.__flags__ & _HEAP_TYPE for base in cls.__mro__)
     return is_python and all(getattr(cls, name, None) is getattr(object, name, None) for name in _PROTOCOL)
+
+
+def _attributes(thing: Any) -> Iterable[tuple[str, Any]]:
+    """What an object holds, by name."""
+    yield from getattr(thing, "__dict__", _EMPTY).items()
+    cls: Any = type(thing)
+    for name in _slots(cls):
+        if (value := getattr(thing, name, _NOTHING)) is not _NOTHING:
+            yield name, value
 
 
 @cache
@@ -316,7 +325,9 @@ _CONSTANT = frozenset(
 _UNCHANGING = (type, enum.Enum, PurePath, np.dtype, np.generic, np.ufunc, Formula, PortFormula)
 _MAKE: dict[type, Callable[[Copies, Any], Any]] = {
     list: Copies._list,
-    deque: Copies._deque,
+    deque: lambda copies, thing: copies._later(
+        lambda thing, made: made.extend(map(copies._copy, thing)), thing, deque(maxlen=thing.maxlen)
+    ),
     dict: Copies._dict,
     set: Copies._set,
     tuple: Copies._tuple,
@@ -327,7 +338,7 @@ _MAKE: dict[type, Callable[[Copies, Any], Any]] = {
     types.MethodWrapperType: Copies._built_in,
     partial: Copies._partial,
     np.ndarray: Copies._array,
-    itertools.count: Copies._count,
+    itertools.count: lambda _, thing: itertools.count(next(thing) + 1),  # without a number that nobody misses
     weakref.ref: Copies._weak,
     array: lambda _, thing: thing[:],
     type(hashlib.sha256()): lambda _, thing: thing.copy(),

@@ -100,13 +100,11 @@ def node_as(schema: Schema) -> Shape:
     return Shape(schema, lambda reader, node, what: node)
 
 
-def number(kind: type, low: float | None = None, high: float | None = None, *, shown: bool = True) -> Shape:
-    """A number that is written out; without ``shown``, editors do not know its greatest value."""
+def number(kind: type, low: float | None = None, high: float | None = None) -> Shape:
+    """A number that is written out."""
     parameter: Parameter[Any] = Parameter(kind, min=low, max=high)
     schema: Schema = {"type": "integer" if kind is int else "number"}
     schema |= {key: as_written(bound) for key, bound in (("minimum", low), ("maximum", high)) if bound is not None}
-    if not shown:
-        schema.pop("maximum", None)
 
     def read(reader: NodeReader, node: Node, what: str) -> Any:
         try:

@@ -52,10 +52,9 @@ def _scalar(parameter: Parameter[Any]) -> Schema:
         return dict(COMPUTED_FLAG)
     if parameter.type in (str, Path):
         return {"type": ["string"]}
-    if parameter.type is int:
-        return computed("integer", parameter.min, parameter.max, parameter.unit)
-    if parameter.type in (float, int | float):
-        return computed("number", parameter.min, parameter.max, parameter.unit)
+    if parameter.type in (int, float, int | float):
+        found = computed("integer" if parameter.type is int else "number", parameter.min, parameter.max, parameter.unit)
+        return found if parameter.above is None else {**found, "exclusiveMinimum": as_written(parameter.above)}
     return {"type": ["array", "boolean", "number", "object", "string"]}
 
 

@@ -10,7 +10,7 @@ import networkx as nx
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
-from ..text import RAISE_IT, Position, Problems
+from ..text import RAISE_IT, Position, Problems, in_general
 from .draft import Draft
 from .graph import Detour, Hop, ModelGraph, Wire
 from .schedule import dependencies
@@ -85,6 +85,7 @@ def check_types(graph: ModelGraph, problems: Problems) -> None:
                 *(who for who in (_who(graph, path), _who(graph, far)) if who),
                 *((f"the way: {way}",) if len(hops) > 1 else ()),
                 *_other_position(hops[0].position, hops[-1].position),
+                about=("types", in_general(path), in_general(far)),
             )
 
 
@@ -127,6 +128,7 @@ def check_connections(draft: Draft, problems: Problems) -> None:
                     position,
                     *_open_end(graph, port.path),
                     f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
+                    about=("missing", in_general(port.path)),
                 )
             if len(wires) > 1 and not port.multi:
                 times = Counter(wire.source.path for wire in wires)
@@ -139,6 +141,7 @@ def check_connections(draft: Draft, problems: Problems) -> None:
                     wires[1].hops[-1].position,
                     *_first_connection(wires),
                     "connect one of them, or send through an actor that merges them",
+                    about=("several", in_general(port.path)),
                 )
 
 
@@ -198,6 +201,7 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
             *map(_step, ways),
             f"the aspect {detour.aspect} sends the tokens of all its ports through one model: let it stand at fewer of "
             "them, or give that model a delay",
+            about=("loop", *map(in_general, actors)),
         )
         return
     # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
@@ -213,6 +217,7 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
             if path in graph.clocks
         ),
         f"give one of these connections a delay, best the one that leads back: {_with_delay(graph, back)}",
+        about=("loop", *map(in_general, actors)),
     )
 
 
@@ -275,6 +280,7 @@ def check_reach(graph: ModelGraph, problems: Problems) -> None:
             f"{first} can never fire: it is no source, and {why}",
             graph.positions.get(first),
             *((f"nor can what it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
+            about=("idle", in_general(first)),
         )
 
 

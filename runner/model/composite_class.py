@@ -10,14 +10,12 @@ from pathlib import Path
 from ..catalogue import Catalogue, installed
 from ..language import (
     CompositeText,
-    DeclarationReader,
     PartText,
     Settings,
-    find_library,
-    included_composites,
     inherit,
+    read_library,
 )
-from ..text import Mapping, Position, Problems, Text, call_site, did_you_mean, entries_of, read
+from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
 from .draft import Draft
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
@@ -79,18 +77,9 @@ def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -
     >>> main = model.add(MobileRobot("main", start=[30, 0], objective=ReachGoal(goal=[0, 0]), max_speed="8 m/s"))
     """
     problems = Problems()
-    path = find_library(Path(file))
-    node = read(path, problems)
-    text = None
-    if node is not None:
-        reader = DeclarationReader(problems)
-        is_model = isinstance(node, Mapping) and "model" in node.entries
-        text = reader.model(node) if is_model else reader.included(node)
-    problems.raise_if_any()
-    assert text is not None, "what cannot be read is a problem"
+    declared = read_library(file, problems)
     catalogue = installed().with_types(types)
-    found = included_composites(text, path, DeclarationReader(problems), problems)
-    composites, broken = inherit(found, catalogue.actors, problems)
+    composites, broken = inherit(declared, catalogue.actors, problems)
     if name not in composites and name not in broken:
         problems.add(
             f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}",

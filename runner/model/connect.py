@@ -250,7 +250,7 @@ class Wiring:
             return None
         except BadIndexError as error:
             forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
-            self._problem(str(error), text, *((f"valid are {forms}",) if "no index" in str(error) else ()))
+            self._problem(str(error), text, *((f"valid are {forms}",) if error.is_misshapen else ()))
             return None
         return [child.paths[each] for each in indices], several
 

@@ -7,7 +7,16 @@ from collections.abc import Mapping as AnyMapping
 from typing import TYPE_CHECKING
 
 from ..catalogue import installed
-from ..language import CompositeText, ParameterText, Settings, add_parameters, inherit, load_disturbance, settings_in
+from ..language import (
+    PARAMETER_THERE,
+    CompositeText,
+    ParameterText,
+    Settings,
+    inherit,
+    joined,
+    load_disturbance,
+    settings_in,
+)
 from ..text import Mapping, Position, Problems, node_of
 from .draft import Draft
 from .settle import Settler
@@ -27,10 +36,9 @@ def disturb(
     disturbance = load_disturbance(name, problems)
     problems.raise_if_any()
     assert disturbance is not None, "what cannot be read is a problem"
-    root = CompositeText(model.name, position)
-    for key, value in model.parameters.items():
-        root.parameters[key] = ParameterText(key, position, node_of(value, position))
-    add_parameters(disturbance.text, root, problems)
+    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
+    parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
+    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
     for setting in disturbance.settings:
         problems.add(
             f"{setting.path!r} cannot be set any more: the model is made",
@@ -41,7 +49,6 @@ def disturb(
         problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
     taken = {woven.name for woven in model.aspects}
     for part in disturbance.text.aspects.values():
-        root.aspects[part.name] = part
         if part.name in taken:
             problems.add(f"there is an aspect {part.name!r} already", part.position, "unweave it before")
     problems.raise_if_any()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from epicycle.actors import counted_in_si, plain
@@ -11,6 +10,7 @@ from epicycle.actors import counted_in_si, plain
 from ..catalogue import installed
 from ..collection import without_collection
 from ..language import (
+    COMPOSITE_THERE,
     ModelText,
     Setting,
     Settings,
@@ -18,8 +18,8 @@ from ..language import (
     add_disturbances,
     change_aspect,
     check_usage,
-    included_composites,
     inherit,
+    joined,
     load_disturbances,
     parse_setting,
     read_model,
@@ -31,8 +31,9 @@ from ..text import NORMAL, Limits, Problems, call_site, node_of
 from ..text import Mapping as MappingNode
 from .checks import check
 from .draft import Draft
+from .figures import figures_of
 from .graph import ModelGraph
-from .model import Figure, Model
+from .model import DeclaredFigure, Model
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .untried import try_classes
@@ -67,25 +68,25 @@ def load_model(
     settings += _settings(set, problems)
     with without_collection():
         # What the files say.
-        text, path, reader = read_model(str(name), problems)
-        declared = included_composites(text, path, reader, problems)
+        text, declared = read_model(str(name), problems)
         catalogue = installed().with_types(types)
-        disturbances = load_disturbances(map(str, _several(disturb)), declared, problems)
+        disturbances = load_disturbances(map(str, _several(disturb)), problems)
+        for disturbance in disturbances:
+            declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
         composites, broken = inherit(declared, catalogue.actors, problems, limits)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What is changed from outside; what disturbances set comes first, for the last one wins.
-        settings = add_disturbances(text, disturbances, problems) + settings
+        text, set_by_them = add_disturbances(text, disturbances, problems)
+        settings = set_by_them + settings
         for change in without_aspects:
-            without(text, change, problems)
+            text = without(text, change, problems)
         for change in aspects:
-            change_aspect(text, change, problems)
+            text = change_aspect(text, change, problems)
         # What comes of it.
         known = Known(composites, catalogue, broken)
         settler = Settler(Settings(settings, limits), problems)
         model = build(text, known, settler, limits)
         if model.figures:
-            from ..show import figures_of  # here, for what is shown stands on what is run
-
             figures_of(model, problems)
         problems.raise_if_any()
         model.warnings = problems.warnings
@@ -125,7 +126,7 @@ def _check_names(known: Known, problems: Problems) -> None:
         )
 
 
-def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, Figure]:
+def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, DeclaredFigure]:
     """The type of each figure, its values, and these as they are written."""
     found = {}
     for name, part in text.figures.items():
@@ -147,7 +148,7 @@ def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:
 
 def _settings(given: Iterable[str | Setting] | Mapping[str, object], problems: Problems) -> list[Setting]:
     if not isinstance(given, Mapping):
-        read = (parse_setting(each, problems) if isinstance(each, str) else replace(each) for each in given)
+        read = (parse_setting(each, problems) if isinstance(each, str) else each for each in given)
         return [setting for setting in read if setting is not None]
     node = node_of(given, call_site())
     assert isinstance(node, MappingNode)

@@ -26,7 +26,7 @@ from .settle import nanoseconds
 from .watch import Metric, Watched, Watching, checked_seed
 from .woven import WovenAspect, check_processors
 
-Figure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
+DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 
 
 class Model(Scope):
@@ -69,7 +69,7 @@ class Model(Scope):
         self.seed = checked_seed(seed)
         self.recorded: list[str] = []
         self.metrics: list[Metric] = []
-        self.figures: dict[str, Figure] = {}
+        self.figures: dict[str, DeclaredFigure] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
         self._scopes: dict[str, Composite] = {}

@@ -194,9 +194,11 @@ class Settler:
             return
         # One that differs in indices alone, or the nearest one of the same owner, or else the nearest of all.
         alike = [path for path in known if _INDEX.sub("", path) == _INDEX.sub("", setting.path)]
-        near = did_you_mean(setting.path, alike)
-        near = near or did_you_mean(last, beside).replace("mean '", f"mean '{owner}." if owner else "mean '")
-        near = near or did_you_mean(setting.path, known)
+        meant, name = nearest(setting.path, alike), nearest(last, beside)
+        if meant is None and name is not None:
+            meant = f"{owner}.{name}" if owner else name
+        meant = meant or nearest(setting.path, known)
+        near = "" if meant is None else f", did you mean {meant!r}?"
         valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
         self.problems.add(f"{setting.path!r} sets no parameter{near}", setting.position, *(() if near else valid))
 

@@ -25,7 +25,7 @@ from epicycle.aspects import (
 )
 
 from ..language import PointcutText
-from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, nearest
+from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, in_general, nearest
 from .draft import Draft
 from .firing_times import unknown_inputs
 from .woven import WovenAspect
@@ -209,18 +209,22 @@ class Weaving:
     def _enter_parameter(self, actor: str, name: str, pointcut: PointcutText) -> None:
         """Take a parameter of an actor, if it holds numbers that nothing else changes."""
         path, parameter = f"{actor}.{name}", declared_parameters(type(self.graph.actors[actor]))[name]
+        about = ("altered", in_general(path))
         if pointcut.exclude:
             self._parameters[path] = True
         elif parameter.type not in (int, float, int | float):
-            self._problem(f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut)
+            self._problem(
+                f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut, about=about
+            )
         elif vars(self.graph.actors[actor])[name] is None:
-            self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut)
+            self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
         elif path in self.graph.ports and self.graph.incoming(path):
             sender = self.graph.incoming(path)[0].source
             self._problem(
                 f"{path} gets its values over a connection",
                 pointcut,
                 f"let the aspect stand at {sender!r}, where they come from",
+                about=about,
             )
         else:
             self._parameters.setdefault(path, False)
@@ -480,9 +484,11 @@ class Weaving:
     def _full(self, text: str) -> str:
         return f"{self.scope}.{text}" if self.scope else text
 
-    def _problem(self, message: str, where: PointcutText | Text | Position | None, *hints: str) -> None:
+    def _problem(
+        self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
+    ) -> None:
         position = where.position if isinstance(where, (PointcutText, Text)) else where
-        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
+        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope, about=about)
 
 
 def _asked(pointcut: PointcutText) -> str:

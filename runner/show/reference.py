@@ -10,11 +10,12 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from epicycle.actors import Configurable, variants
+from epicycle.actors import Configurable, bounds_text
 
 from ..catalogue import (
     TAKES,
     Catalogue,
+    Figure,
     Measure,
     ParameterReference,
     PortReference,
@@ -24,14 +25,9 @@ from ..catalogue import (
     parts_of,
     shown,
 )
+from ..language import CONSTRUCTS
 from ..model import Model
 from ..printing import columns
-from .figures import Figure
-
-
-def figure_types() -> dict[str, type[Figure]]:
-    """The figures that a model may ask for, by name."""
-    return dict(sorted(variants(Figure).items()))
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
@@ -158,6 +154,10 @@ def markdown(
     for title, types in (("Figures", figures), ("Figures of studies", study_figures)):
         lines.append(f"## {title}\n")
         lines += [block for each in described(types) for block in _markdown(each)]
+    lines.append("## Keys\n")
+    for title, construct in CONSTRUCTS.items():
+        rows = [[f"`{key}`", each.doc.replace("<", "\\<")] for key, each in construct.keys.items()]
+        lines += [f"### {title}\n", _rows(("key", "what it is"), rows)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -241,10 +241,8 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
         kind = " or ".join(parameter.choices)
     elif parameter.min is not None and parameter.max is not None:
         kind += f", {parameter.min:g} to {parameter.max:g}"
-    elif parameter.min is not None:
-        kind += f" >= {parameter.min:g}"
-    elif parameter.max is not None:
-        kind += f" <= {parameter.max:g}"
+    else:
+        kind += bounds_text(parameter.min, parameter.above, parameter.max, "{:g}".format)
     return [
         parameter.name,
         kind,

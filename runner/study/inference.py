@@ -37,13 +37,11 @@ class Estimate:
 
 def half_width(values: Sequence[float], level: float = LEVEL) -> float:
     """Half the width of Student's confidence interval of the mean; infinite for fewer than two values."""
-    if len(values) < 2:
-        return math.inf
-    return student_quantile((1 + level) / 2, len(values) - 1) * standard_error(values)
+    count = len(values)
+    return student_quantile((1 + level) / 2, count - 1) * _standard_error(values) if count > 1 else math.inf
 
 
-def standard_error(values: Sequence[float]) -> float:
-    """The standard error of the mean; NaN for fewer than two values."""
+def _standard_error(values: Sequence[float]) -> float:
     return _deviation(values) / math.sqrt(len(values)) if len(values) > 1 else math.nan
 
 
@@ -59,7 +57,7 @@ def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
     if count == 0:
         return Estimate(math.nan, math.nan, -math.inf, math.inf, 0)
     value, half = math.fsum(values) / count, half_width(values, level)
-    return Estimate(value, standard_error(values), value - half, value + half, count)
+    return Estimate(value, _standard_error(values), value - half, value + half, count)
 
 
 def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: int = 9_999) -> Estimate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -281,3 +282,21 @@ def test_a_process_is_halted_in_the_step_in_which_what_it_waits_for_happens(beha
     shared: list[Any] = []
     results = behave(behaviour, "actors: {a: {type: Script}, b: {type: Script}}")
     assert [token for *_, token in sends(results)] == ["a"]
+
+
+def test_a_process_that_nobody_else_knows_goes_on_waiting_for_a_token(behave: Callable[..., Results]) -> None:
+    def behaviour(actor: Script) -> Generator[Any, Any, None]:
+        actor.environment.process(hear(actor))
+        while True:
+            yield actor.wait(0.3)
+            gc.collect()  # a process of SimPy's and the event it waits for hold each other alone
+
+    def hear(actor: Script) -> Generator[Any, Any, None]:
+        while True:
+            token = yield actor.read(actor.input)
+            actor.output.send(token)
+
+    results = behave(
+        behaviour, FED.replace("}}", "}, probe: {type: Probe}}").replace("input]", "input, a.output -> probe.input]")
+    )
+    assert len(sends(results, "a")) == len(sends(results, "t")) > 3

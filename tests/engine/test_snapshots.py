@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import random  # noqa: TID251 (where to look, and not what a model draws)
 import threading
+from collections import Counter, OrderedDict, defaultdict, deque
 from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
 import pytest
 import simpy
 
@@ -302,6 +307,57 @@ class Gatherer(Actor):
         self.output.send(self.add(self.random.random()))
 
 
+class Library(Actor):
+    """Keeps its state in what the standard library, NumPy and SimPy have for it, and in classes of its own."""
+
+    input: InputPort[Any] = InputPort(Any)
+    output: OutputPort[Any] = OutputPort(Any)
+
+    def initialize(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.queues: dict[Any, deque[Any]] = defaultdict(deque)
+        self.order: OrderedDict[str, Any] = OrderedDict(port=self.input)
+        self.cells = np.array([None, self.input, [1.0]], dtype=object)
+        self.seen = {self.input: {self.input, self.output}}
+        self.last = deque([0.0], maxlen=2)
+        self.resource = simpy.Container(self.context.environment, init=100)
+        self.frozen = Frozen([0.0])
+        self.numbers = itertools.count()
+        self.fraction = Fraction(1, 3)
+        self.loop: list[Any] = [self]
+        self.loop.append(self.loop)
+        self.alias = self.queues[self.input]
+
+    def fire(self) -> None:
+        assert self.order["port"] is self.cells[1] is self.input
+        assert self.seen == {self.input: {self.input, self.output}}
+        assert self.loop[0] is self
+        assert self.loop[1] is self.loop
+        self.counts["fired"] += 1
+        self.alias.append(self.input.value)
+        self.last.append(self.random.random())
+        self.cells[2].append(self.last[0])
+        self.frozen.values.append(self.last[1])
+        self.fraction /= 2
+        self.resource.get(1)
+        self.output.send(
+            [self.counts["fired"], list(self.alias), *self.cells[2], *self.frozen.values, *self.last, self.frozen.total]
+        )
+        self.output.send(
+            [list(self.queues[self.input]), float(self.fraction), self.resource.level, next(self.numbers) >= 0]
+        )
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Is frozen, but what it holds is not; and it knows more than its fields say."""
+
+    values: list[float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "total", 7.0)
+
+
 class Echo(CommunicationAspect):
     """Lets a token pass, and does it again later, by a function that it makes on the spot."""
 
@@ -335,6 +391,30 @@ def test_actors_and_aspects_of_ones_own() -> None:
     assert simulation[gatherer] is simulation["gatherer"]
     assert len(simulation[gatherer].kept) == simulation[echo].passed == 7
     assert (gatherer.kept, echo.passed) == ([], 0)
+    with pytest.raises(AttributeError) as caught:
+        gatherer.add(1.0)
+    assert str(caught.value) == (
+        "'Gatherer' object has no attribute 'add': gatherer is the model's, and each run has its own, "
+        "simulation['gatherer']"
+    )
+    with pytest.raises(AttributeError) as caught:
+        simulation[gatherer].added  # type: ignore[attr-defined]  # noqa: B018
+    assert str(caught.value) == "'Gatherer' object has no attribute 'added'"
+
+
+def test_all_kinds_of_state() -> None:
+    text = "actors: {t: {type: Ticker}, lib: {type: Library}, late: {type: TimeDelay, delay: 1.5}}\n"
+    model = load(text + "connections: [t.output -> lib.input, lib.output -> late.input]", types=[Library])
+    model.stop = 8
+    assert_goes_on(model, 20)
+
+
+def test_chains_may_be_long() -> None:
+    model = load(
+        "actors: {t: {type: Ticker}, s: {type: Scale, count: 3000}}\n"
+        'connections: ["t.output -> s[0].input", "s[..-2].output -> s[1..].input"]\nrun: {stop: 2}'
+    )
+    assert_goes_on(model, 2)
 
 
 def test_functions_lead_to_where_they_led() -> None:

@@ -21,7 +21,7 @@ import pytest
 from epicycle.actors import random_stream
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.catalogue import packaged_models
-from tests.core.test_random import CONTINUOUS, DISCRETE
+from tests.actors.core.test_random import CONTINUOUS, DISCRETE
 from tests.test_docs import TUTORIALS, Reader, blocks
 
 DISTURBED = "collision_avoidance"

@@ -14,26 +14,6 @@ from .powers import pow, power  # noqa: A004 (as in the module math)
 from .sums import total
 
 __all__ = [
-    "acos",
-    "asin",
-    "atan",
-    "atan2",
-    "cos",
-    "cosh",
-    "distance",
-    "exp",
-    "expm1",
-    "hypot",
-    "log",
-    "log1p",
-    "log2",
-    "log10",
-    "log_gamma",
-    "pow",
-    "power",
-    "sin",
-    "sinh",
-    "tan",
-    "tanh",
-    "total",
-]
+    "acos", "asin", "atan", "atan2", "cos", "cosh", "distance", "exp", "expm1", "hypot", "log", "log1p", "log2",
+    "log10", "log_gamma", "pow", "power", "sin", "sinh", "tan", "tanh", "total",
+]  # fmt: skip

@@ -6,23 +6,22 @@ import math
 
 import numpy as np
 
-from .compiled import borrower, inlined, inner, kernel
-from .horizon import HorizonProblem, roll_out
+from .compiled import borrower, inlined, inner
+from .horizon import HorizonProblem
 from .terms import Term, keep_away, keep_away_uncertain, stay_near
 from .typing import Array
 
 ROUNDING = 1e-6  # m; a constraint that is kept by less than this is not left out
 
-
-# Columns of a table of constraints, each at one step, one a row: what a solver walks through at every step of its own.
-ROW = 0  # 0 is f3, then f4 of every obstacle, then f5 of every peer
+# Columns of the table of constraints, which has a row for each of them at each step where it can be broken.
+OTHER = 0  # whom it is about: 0 is the own plan (f3), then come all obstacles (f4), then all peers (f5)
 WHEN = 1  # row of the arrays over the horizon
-PLACE = 2  # x, y of the other,
-NEED = 4  # the distance to it,
-MARGIN = 5  # alpha where it is an obstacle, whose
-_COVARIANCE = 6  # is xx, xy, yy
-BOUND = 9  # what a solver lets the constraint be at most,
-VALUE = 10  # and where it keeps what it is
+X, Y = 2, 3  # m, where the other is
+DISTANCE = 4  # m, that is to be kept from it, or at most if it is the own plan
+MARGIN = 5  # alpha, if it is an obstacle; 0 otherwise
+XX, XY, YY = 6, 7, 8  # m^2, the obstacle's covariance
+BOUND = 9  # m, what a solver lets the constraint's value be at most
+VALUE = 10  # m, the value where the solver has looked at it last
 _COLUMNS = 11
 
 
@@ -33,41 +32,37 @@ def constraints_of(problem: HorizonProblem, spare: float) -> Array:
     Steps 1 and 2 are decided before U_{t+1} acts: none bind there.
     """
     steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
-    table = np.empty(((1 + obstacles + peers) * steps, _COLUMNS))
+    table = np.zeros(((1 + obstacles + peers) * steps, _COLUMNS))
     return table[: _fill(problem, table, spare)]
 
 
 @borrower
 def _fill(problem: HorizonProblem, table: Array, spare: float) -> int:
-    """Write the constraints; returns how many they are."""
-    steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
-    count = 0
-    for r in range(1 + obstacles + peers):
-        for s in range(2, steps):
+    """Write the constraints into an empty table; returns how many they are."""
+    obstacles, count = problem.obstacle_mean.shape[0], 0
+    for other in range(1 + obstacles + problem.peer_mean.shape[0]):
+        for s in range(2, problem.tube_radius.shape[0]):
             margin = xx = xy = yy = 0.0
-            if r == 0:
-                x, y, need = problem.tube_centre[s, 0], problem.tube_centre[s, 1], problem.tube_radius[s]
-                if not need < math.inf:
+            if other == 0:
+                x, y, distance = problem.tube_centre[s, 0], problem.tube_centre[s, 1], problem.tube_radius[s]
+                if not distance < math.inf:
                     continue
-            elif r <= obstacles:
-                mean, covariance = problem.obstacle_mean, problem.obstacle_covariance
-                x, y, need, margin = mean[r - 1, s, 0], mean[r - 1, s, 1], problem.safe_distance, problem.margin
-                xx, xy, yy = covariance[r - 1, s, 0], covariance[r - 1, s, 1], covariance[r - 1, s, 2]
+            elif other <= obstacles:
+                mean, covariance, k = problem.obstacle_mean, problem.obstacle_covariance, other - 1
+                x, y, distance, margin = mean[k, s, 0], mean[k, s, 1], problem.safe_distance, problem.margin
+                xx, xy, yy = covariance[k, s, 0], covariance[k, s, 1], covariance[k, s, 2]
             else:
-                i = r - 1 - obstacles
-                x, y, need = problem.peer_mean[i, s, 0], problem.peer_mean[i, s, 1], problem.peer_distance[i, s]
-            most = need
+                i = other - 1 - obstacles
+                x, y, distance = problem.peer_mean[i, s, 0], problem.peer_mean[i, s, 1], problem.peer_distance[i, s]
+            most = distance
             if margin != 0.0:
                 centre, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
                 most += margin * math.sqrt(max(centre + math.sqrt(half * half + xy * xy), 0.0))
-            if not _within_reach(problem, r == 0, s, x, y, most, spare):
-                continue
-            table[count, ROW], table[count, WHEN] = r, s
-            table[count, PLACE], table[count, PLACE + 1], table[count, NEED] = x, y, need
-            table[count, MARGIN], table[count, _COVARIANCE] = margin, xx
-            table[count, _COVARIANCE + 1], table[count, _COVARIANCE + 2] = xy, yy
-            table[count, BOUND] = table[count, VALUE] = 0.0
-            count += 1
+            if _within_reach(problem, other == 0, s, x, y, most, spare):
+                table[count, OTHER], table[count, WHEN], table[count, DISTANCE] = other, s, distance
+                table[count, X], table[count, Y], table[count, MARGIN] = x, y, margin
+                table[count, XX], table[count, XY], table[count, YY] = xx, xy, yy
+                count += 1
     return count
 
 
@@ -100,37 +95,26 @@ def _within_reach(
 @inlined
 def term(table: Array, i: int, x: float, y: float) -> Term:
     """The i-th constraint at (x, y): value, gradient and Hessian."""
-    px, py, need, margin = table[i, PLACE], table[i, PLACE + 1], table[i, NEED], table[i, MARGIN]
-    if table[i, ROW] == 0.0:
-        return stay_near(x, y, px, py, need)
+    other_x, other_y, distance, margin = table[i, X], table[i, Y], table[i, DISTANCE], table[i, MARGIN]
+    if table[i, OTHER] == 0.0:
+        return stay_near(x, y, other_x, other_y, distance)
     if margin == 0.0:
-        return keep_away(x, y, px, py, need)
-    xx, xy, yy = table[i, _COVARIANCE], table[i, _COVARIANCE + 1], table[i, _COVARIANCE + 2]
-    return keep_away_uncertain(x, y, px, py, xx, xy, yy, need, margin)
+        return keep_away(x, y, other_x, other_y, distance)
+    return keep_away_uncertain(x, y, other_x, other_y, table[i, XX], table[i, XY], table[i, YY], distance, margin)
+
+
+@inlined
+def circle(table: Array, i: int) -> tuple[bool, float]:
+    """Where the i-th constraint reaches its bound, if it has no margin: whether inside is right, and the radius."""
+    near = table[i, OTHER] == 0.0
+    return near, table[i, DISTANCE] + (table[i, BOUND] if near else -table[i, BOUND])
 
 
 @borrower
 def certainly_kept(table: Array, i: int, x: float, y: float) -> bool:
     """Whether the i-th constraint is at most its bound at (x, y), without a root; an obstacle's is not looked at."""
-    dx, dy, need, bound = x - table[i, PLACE], y - table[i, PLACE + 1], table[i, NEED], table[i, BOUND]
-    squared = dx * dx + dy * dy
-    if table[i, ROW] == 0.0:
-        return bool(need + bound > 0.0 and squared <= (need + bound) * (need + bound))
-    return bool(table[i, MARGIN] == 0.0 and squared >= (need - bound) * (need - bound))
-
-
-@kernel
-def violations(problem: HorizonProblem, controls: Array) -> Array:
-    """Values of f3 (row 0), f4 and f5 with their margins at each step, shape (1 + K + n, N); <= 0 is satisfied.
-
-    Entries no control can change, or that do not bind, are -inf.
-    """
-    steps = controls.shape[0]
-    positions, velocities = np.empty((steps, 2)), np.empty((steps, 2))
-    roll_out(problem.position, problem.velocity, controls, problem.period, positions, velocities)
-    constraints = constraints_of(problem, math.inf)
-    found = np.full((1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0], steps), -math.inf)
-    for i in range(constraints.shape[0]):
-        s = int(constraints[i, WHEN])
-        found[int(constraints[i, ROW]), s] = term(constraints, i, positions[s, 0], positions[s, 1])[0]
-    return found
+    dx, dy = x - table[i, X], y - table[i, Y]
+    squared, (near, radius) = dx * dx + dy * dy, circle(table, i)
+    if near:
+        return radius > 0.0 and squared <= radius * radius
+    return bool(table[i, MARGIN] == 0.0 and squared >= radius * radius)

@@ -7,7 +7,7 @@ Row ``s - 1`` of an array over the horizon belongs to the prediction step s = 1.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,13 +49,13 @@ class HorizonProblem(NamedTuple):
 
     def to_reach(self, goal: Array) -> HorizonProblem:
         """The same problem with the objective of eq. (2)."""
-        return self._to(objective=REACH_GOAL, goal=np.array(goal))
+        return self._replace(objective=REACH_GOAL, goal=np.array(goal))
 
     def to_inform(
         self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float
     ) -> HorizonProblem:
         """The same problem with the objective of eq. (5), where ``others`` (n, N, 2) end to measure as well."""
-        return self._to(
+        return self._replace(
             objective=INFORM,
             sigma_positions=points,
             sigma_weights=weights,
@@ -65,39 +65,22 @@ class HorizonProblem(NamedTuple):
             measurement_range=reach,
         )
 
-    def _to(self, **objective: Any) -> HorizonProblem:
-        """The same problem with another objective; ``_replace`` takes three times as long."""
-        constraints: tuple[Any, ...] = self[:_OBJECTIVE]
-        return HorizonProblem(*constraints, **objective)
-
-
-_OBJECTIVE = HorizonProblem._fields.index("objective")  # this and what follows belongs to the objective
-
 
 @kernel
-def roll_out(
-    position: Array, velocity: Array, controls: Array, period: float, positions: Array, velocities: Array
-) -> None:
-    """Write the states at steps 1..N that follow from the state at step 1 and the controls from step 1 on.
+def trajectory(position: Array, velocity: Array, controls: Array, period: float, steps: int) -> Array:
+    """Positions at steps 1..``steps`` from the state at step 1 and the controls from there on, shape (steps, 2).
 
-    The equality constraint of eq. (2): ``P' = P + period * V``, ``V' = V + period * U``.
+    The equality constraint of eq. (2): ``P' = P + period * V``, ``V' = V + period * U``; past the last control the
+    velocity is kept.
     """
-    steps = positions.shape[0]
+    positions = np.empty((steps, 2))
     px, py = position[0], position[1]
     vx, vy = velocity[0], velocity[1]
     for s in range(steps):
         positions[s, 0], positions[s, 1] = px, py
-        velocities[s, 0], velocities[s, 1] = vx, vy
         px += period * vx
         py += period * vy
         if s < controls.shape[0]:
             vx += period * controls[s, 0]
             vy += period * controls[s, 1]
-
-
-@kernel
-def trajectory(position: Array, velocity: Array, controls: Array, period: float, steps: int) -> Array:
-    """Positions at steps 1..``steps``, shape (steps, 2); past the last control the velocity is kept."""
-    positions, velocities = np.empty((steps, 2)), np.empty((steps, 2))
-    roll_out(position, velocity, controls, period, positions, velocities)
     return positions

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...core.elementary import exp, hypot, log
 from .compiled import borrower, inner, kernel
+from .terms import Term
 from .typing import Array
 
 
@@ -35,14 +36,6 @@ def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) ->
                 difference = ranges[i] - ranges[j]
                 distance[i, j] += difference * difference / (2.0 * variance)
     return distance
-
-
-@kernel
-def negative_information(
-    x: float, y: float, sigma_positions: Array, weights: Array, others_distance: Array, variance: float
-) -> tuple[float, float, float, float, float, float]:
-    """-I at own position (x, y) with its gradient and Hessian: (value, d/dx, d/dy, xx, xy, yy)."""
-    return informed(new_points(sigma_positions, weights, others_distance), x, y, variance)
 
 
 # Columns of a table of sigma points, one a row.
@@ -76,8 +69,8 @@ def new_points(sigma_positions: Array, weights: Array, others_distance: Array) -
 
 
 @borrower
-def informed(points: Array, x: float, y: float, variance: float) -> tuple[float, float, float, float, float, float]:
-    """``negative_information`` of points in a table.
+def informed(points: Array, x: float, y: float, variance: float) -> Term:
+    """-I at own position (x, y) with its gradient and Hessian: (value, d/dx, d/dy, xx, xy, yy).
 
     The density's constant factor (2 pi eta)^(-n/2) is left out: it moves I by a constant and no optimum.
     Derivation: with E_ij = (r_i - r_j)^2 / (2 eta) + others_distance_ij and q_ij = w_j exp(-E_ij) normalised over j,

@@ -12,21 +12,25 @@ import math
 
 import numpy as np
 
-from .compiled import borrower, inner
+from .compiled import borrower, inlined, inner
+from .terms import Term
 from .typing import Array
+
+Vector = tuple[float, float]
+Matrix = tuple[float, float, float, float]  # by rows
+Quadratic = tuple[float, float, float, float, float]  # gradient and Hessian in the plane: x, y, xx, xy, yy
 
 _CURVATURE = 1e-9  # smallest eigenvalue of a repaired block
 
-
-# Columns of the table that holds all of a step, a row for each prediction step: one array is a fifth of the words, and
-# of the code, that seven are at every call.  It is indexed, never sliced: a slice costs as much as a whole term.
-POSITION = 0  # gradient and Hessian (x, y, xx, xy, yy) of the function in the position of the step,
-VELOCITY = 5  # in its velocity,
-CONTROL = 10  # and in its control
-_OWN = 15  # dU = -(own + position dP + velocity dV), what the recursion leaves for the way forward: own is (2,),
-_BY_POSITION = 17  # these are 2x2 matrices by rows
+# Columns of the table of stages, which has a row for each prediction step.  It is one array, as seven would be five
+# times the words at every call; and it is indexed, never sliced: a slice costs as much as a whole term.
+POSITION = 0  # quadratic function of the position at the step
+VELOCITY = 5  # of the velocity there
+CONTROL = 10  # of the control that begins to act there
+_CONSTANT = 15  # vector, then two matrices: the Newton step in the control is
+_BY_POSITION = 17  # -(constant + by_position (step in the position) + by_velocity (step in the velocity))
 _BY_VELOCITY = 21
-STEP = 25  # (2,) the Newton step in the control
+STEP = 25  # vector: the Newton step in the control
 _COLUMNS = 27
 
 
@@ -44,15 +48,20 @@ def clear(stages: Array) -> None:
             stages[s, POSITION + c] = 0.0
 
 
+@inlined
+def put(stages: Array, s: int, column: int, function: Quadratic) -> None:
+    """Write what the function is in the velocity or the control of step ``s``."""
+    stages[s, column], stages[s, column + 1], stages[s, column + 2] = function[0], function[1], function[2]
+    stages[s, column + 3], stages[s, column + 4] = function[3], function[4]
+
+
 @borrower
-def add(
-    stages: Array, s: int, slope: float, curvature: float, bend: float,
-    gx: float, gy: float, hxx: float, hxy: float, hyy: float,
-) -> None:  # fmt: skip
-    """Add p(h(.)) in the position of step ``s``: h has the given gradient and Hessian.
+def add(stages: Array, s: int, slope: float, curvature: float, bend: float, inside: Term) -> None:
+    """Add p(h(.)) in the position of step ``s``, where ``inside`` is h.
 
     p has the first derivative ``slope``, which ``curvature`` replaces in the Hessian, and the second ``bend``.
     """
+    _, gx, gy, hxx, hxy, hyy = inside
     stages[s, POSITION] += slope * gx
     stages[s, POSITION + 1] += slope * gy
     stages[s, POSITION + 2] += curvature * hxx + bend * gx * gx
@@ -75,125 +84,133 @@ def _repair(stages: Array, s: int) -> None:
     stages[s, POSITION + 3] = xy * scale
 
 
+@inlined
+def _at(stages: Array, s: int, column: int) -> Quadratic:
+    return (
+        stages[s, column], stages[s, column + 1],
+        stages[s, column + 2], stages[s, column + 3], stages[s, column + 4],
+    )  # fmt: skip
+
+
+@inlined
+def _sum(p: Quadratic, q: Quadratic) -> Quadratic:
+    return p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4]
+
+
+@inlined
+def _of_times(k: float, q: Quadratic) -> Quadratic:
+    """What q of k times a vector is as a function of the vector."""
+    return k * q[0], k * q[1], k * k * q[2], k * k * q[3], k * k * q[4]
+
+
+@inlined
+def _less(q: Quadratic, gradient: Vector, hessian: Matrix) -> Quadratic:
+    (x, y), (xx, xy, _, yy) = gradient, hessian
+    return q[0] - x, q[1] - y, q[2] - xx, q[3] - xy, q[4] - yy
+
+
+@inlined
+def _hessian(q: Quadratic) -> Matrix:
+    return q[2], q[3], q[3], q[4]
+
+
+@inlined
+def _plus(m: Matrix, k: float, n: Matrix) -> Matrix:
+    """m + k n."""
+    return m[0] + k * n[0], m[1] + k * n[1], m[2] + k * n[2], m[3] + k * n[3]
+
+
+@inlined
+def _scaled(k: float, m: Matrix) -> Matrix:
+    return k * m[0], k * m[1], k * m[2], k * m[3]
+
+
+@inlined
+def _times(m: Matrix, n: Matrix) -> Matrix:
+    (a, b, c, d), (xx, xy, yx, yy) = m, n
+    return a * xx + b * yx, a * xy + b * yy, c * xx + d * yx, c * xy + d * yy
+
+
+@inlined
+def _applied(m: Matrix, v: Vector) -> Vector:
+    return m[0] * v[0] + m[1] * v[1], m[2] * v[0] + m[3] * v[1]
+
+
 @borrower
 def newton_step(stages: Array, period: float, free: int) -> float:
     """Write the step in the controls; returns gradient . step (negative), or 0 if there is no descent.
 
     Only the first ``free`` controls are variables; the last of them is held from there on.
 
-    Backwards, the cost to go from step s is kept as a quadratic function of (dP, dV): gradient (a, c), Hessian
-    [[A, B], [B', C]].  The control of step s enters dV of the next one, so it is minimised out there; then
-    dP of the next step is written as dP + period * dV.  Only positions are repaired: f1, f2 and their barriers are
-    convex.
+    Backwards, the cost to go from step s is kept as a quadratic function of (dP, dV): A in dP, C in dV, and B, its
+    mixed second derivatives, with rows for dP.  The control of step s enters dV of the next one, so it is minimised out
+    there; then dP of the next step is written as dP + period * dV.  Only positions are repaired: f1, f2 and their
+    barriers are convex.
 
     A control dU that is held from step f on moves step f + k by k h dU in velocity and by k (k - 1) / 2 h^2 dU in
     position, beside what dV of step f and dP of the next one do, so that all that follows is summed in these three.
     """
-    h = period
-    descent = 0.0
-    ax = ay = cx = cy = 0.0
-    axx = axy = ayy = bxx = bxy = byx = byy = cxx = cxy = cyy = 0.0
-    # What a control costs later on: gradient, Hessian, and mixed derivatives with dP of the next step and dV.
-    lx = ly = lxx = lxy = lyy = hbxx = hbxy = hbyx = hbyy = hcxx = hcxy = hcyy = 0.0
+    h, descent = period, 0.0
+    A = C = U = (0.0, 0.0, 0.0, 0.0, 0.0)
+    B = PU = VU = (0.0, 0.0, 0.0, 0.0)  # mixed: PU of dP of the next step with the control, VU of dV with it
     for s in range(free, stages.shape[0]):
         held = s - free + 1.0
         w, by_v = held * h, (held - 1.0) * h
         by_u = 0.5 * w * by_v
         _repair(stages, s)
-        gx, gy = stages[s, POSITION], stages[s, POSITION + 1]
-        xx, xy, yy = stages[s, POSITION + 2], stages[s, POSITION + 3], stages[s, POSITION + 4]
-        vx, vy = stages[s, VELOCITY], stages[s, VELOCITY + 1]
-        vxx, vxy, vyy = stages[s, VELOCITY + 2], stages[s, VELOCITY + 3], stages[s, VELOCITY + 4]
-        ax, ay, axx, axy, ayy = ax + gx, ay + gy, axx + xx, axy + xy, ayy + yy
-        bxx, bxy, byy = bxx + by_v * xx, bxy + by_v * xy, byy + by_v * yy
-        cx, cy = cx + by_v * gx + vx, cy + by_v * gy + vy
-        cxx, cxy, cyy = cxx + by_v * by_v * xx + vxx, cxy + by_v * by_v * xy + vxy, cyy + by_v * by_v * yy + vyy
-        hbxx, hbxy, hbyy = hbxx + by_u * xx, hbxy + by_u * xy, hbyy + by_u * yy
-        hcxx, hcxy, hcyy = (
-            hcxx + by_v * by_u * xx + w * vxx,
-            hcxy + by_v * by_u * xy + w * vxy,
-            hcyy + by_v * by_u * yy + w * vyy,
-        )
-        lx += by_u * gx + w * vx + stages[s, CONTROL]
-        ly += by_u * gy + w * vy + stages[s, CONTROL + 1]
-        lxx += by_u * by_u * xx + w * w * vxx + stages[s, CONTROL + 2]
-        lxy += by_u * by_u * xy + w * w * vxy + stages[s, CONTROL + 3]
-        lyy += by_u * by_u * yy + w * w * vyy + stages[s, CONTROL + 4]
-    byx, hbyx = bxy, hbxy
+        position, velocity = _at(stages, s, POSITION), _at(stages, s, VELOCITY)
+        A = _sum(A, position)
+        B = _plus(B, by_v, _hessian(position))
+        C = _sum(_sum(C, _of_times(by_v, position)), velocity)
+        PU = _plus(PU, by_u, _hessian(position))
+        VU = _plus(_plus(VU, by_v * by_u, _hessian(position)), w, _hessian(velocity))
+        U = _sum(U, _sum(_sum(_of_times(by_u, position), _of_times(w, velocity)), _at(stages, s, CONTROL)))
     for s in range(free - 1, -1, -1):
         if s < free - 1:  # it is the velocity of the next step
-            lx, ly = h * cx, h * cy
-            hbxx, hbxy, hbyx, hbyy = h * bxx, h * bxy, h * byx, h * byy
-            hcxx, hcxy, hcyy = h * cxx, h * cxy, h * cyy
-            lxx, lxy, lyy = h * hcxx, h * hcxy, h * hcyy
-        qx, qy = stages[s, CONTROL] + lx, stages[s, CONTROL + 1] + ly
-        qxx, qxy, qyy = stages[s, CONTROL + 2] + lxx, stages[s, CONTROL + 3] + lxy, stages[s, CONTROL + 4] + lyy
-        determinant = qxx * qyy - qxy * qxy
-        if not (determinant > 0.0 and qxx > 0.0):
+            PU, VU = _scaled(h, B), _scaled(h, _hessian(C))
+            U = h * C[0], h * C[1], h * VU[0], h * VU[1], h * VU[3]
+        ux, uy, xx, xy, yy = _sum(_at(stages, s, CONTROL), U)
+        determinant = xx * yy - xy * xy
+        if not (determinant > 0.0 and xx > 0.0):
             return 0.0
         scale = 1.0 / determinant
-        ixx, ixy, iyy = scale * qyy, -scale * qxy, scale * qxx
-        ux, uy = ixx * qx + ixy * qy, ixy * qx + iyy * qy
-        descent -= qx * ux + qy * uy
-        # Rows of inverse(Q) times the mixed derivatives: how U_s answers to dP of the next step and to dV of this one.
-        pxx, pxy = ixx * hbxx + ixy * hbxy, ixx * hbyx + ixy * hbyy
-        pyx, pyy = ixy * hbxx + iyy * hbxy, ixy * hbyx + iyy * hbyy
-        vxx, vxy = ixx * hcxx + ixy * hcxy, ixx * hcxy + ixy * hcyy
-        vyx, vyy = ixy * hcxx + iyy * hcxy, ixy * hcxy + iyy * hcyy
-        stages[s, _OWN], stages[s, _OWN + 1] = ux, uy
-        stages[s, _BY_POSITION], stages[s, _BY_POSITION + 1] = pxx, pxy
-        stages[s, _BY_POSITION + 2], stages[s, _BY_POSITION + 3] = pyx, pyy
-        stages[s, _BY_VELOCITY], stages[s, _BY_VELOCITY + 1] = vxx + h * pxx, vxy + h * pxy
-        stages[s, _BY_VELOCITY + 2], stages[s, _BY_VELOCITY + 3] = vyx + h * pyx, vyy + h * pyy
-        # The cost without U_s, still in dP of the next step and dV of this one.
-        ax -= hbxx * ux + hbxy * uy
-        ay -= hbyx * ux + hbyy * uy
-        cx -= hcxx * ux + hcxy * uy
-        cy -= hcxy * ux + hcyy * uy
-        axx -= hbxx * pxx + hbxy * pyx
-        axy -= hbxx * pxy + hbxy * pyy
-        ayy -= hbyx * pxy + hbyy * pyy
-        bxx -= hbxx * vxx + hbxy * vyx
-        bxy -= hbxx * vxy + hbxy * vyy
-        byx -= hbyx * vxx + hbyy * vyx
-        byy -= hbyx * vxy + hbyy * vyy
-        cxx -= hcxx * vxx + hcxy * vyx
-        cxy -= hcxx * vxy + hcxy * vyy
-        cyy -= hcxy * vxy + hcyy * vyy
+        inverse = scale * yy, -scale * xy, -scale * xy, scale * xx
+        constant = _applied(inverse, (ux, uy))
+        by_position = _times(inverse, (PU[0], PU[2], PU[1], PU[3]))
+        by_velocity = _times(inverse, VU)
+        descent -= ux * constant[0] + uy * constant[1]
+        stages[s, _CONSTANT], stages[s, _CONSTANT + 1] = constant
+        by_both = _plus(by_velocity, h, by_position)
+        for c in range(4):
+            stages[s, _BY_POSITION + c], stages[s, _BY_VELOCITY + c] = by_position[c], by_both[c]
+        # The cost without the control, still in dP of the next step and dV of this one.
+        A = _less(A, _applied(PU, constant), _times(PU, by_position))
+        B = _plus(B, -1.0, _times(PU, by_velocity))
+        C = _less(C, _applied(VU, constant), _times(VU, by_velocity))
         # dP of the next step is dP + h dV; then what step s itself costs.
         _repair(stages, s)
-        cx += h * ax + stages[s, VELOCITY]
-        cy += h * ay + stages[s, VELOCITY + 1]
-        cxx += h * (h * axx + 2.0 * bxx) + stages[s, VELOCITY + 2]
-        cxy += h * (h * axy + bxy + byx) + stages[s, VELOCITY + 3]
-        cyy += h * (h * ayy + 2.0 * byy) + stages[s, VELOCITY + 4]
-        bxx += h * axx
-        bxy += h * axy
-        byx += h * axy
-        byy += h * ayy
-        ax += stages[s, POSITION]
-        ay += stages[s, POSITION + 1]
-        axx += stages[s, POSITION + 2]
-        axy += stages[s, POSITION + 3]
-        ayy += stages[s, POSITION + 4]
+        slid = (
+            h * A[0], h * A[1],
+            h * (h * A[2] + 2.0 * B[0]), h * (h * A[3] + B[1] + B[2]), h * (h * A[4] + 2.0 * B[3]),
+        )  # fmt: skip
+        C = _sum(C, _sum(slid, _at(stages, s, VELOCITY)))
+        B = _plus(B, h, _hessian(A))
+        A = _sum(A, _at(stages, s, POSITION))
     px = py = vx = vy = ux = uy = 0.0
     for s in range(stages.shape[0]):
         if s < free:
-            ux = -(
-                stages[s, _OWN]
-                + stages[s, _BY_POSITION] * px
-                + stages[s, _BY_POSITION + 1] * py
-                + stages[s, _BY_VELOCITY] * vx
-                + stages[s, _BY_VELOCITY + 1] * vy
-            )
-            uy = -(
-                stages[s, _OWN + 1]
-                + stages[s, _BY_POSITION + 2] * px
-                + stages[s, _BY_POSITION + 3] * py
-                + stages[s, _BY_VELOCITY + 2] * vx
-                + stages[s, _BY_VELOCITY + 3] * vy
-            )
-        stages[s, STEP], stages[s, STEP + 1] = ux, uy
+            for c in range(2):
+                p, v = _BY_POSITION + 2 * c, _BY_VELOCITY + 2 * c
+                stages[s, STEP + c] = -(
+                    stages[s, _CONSTANT + c]
+                    + stages[s, p] * px
+                    + stages[s, p + 1] * py
+                    + stages[s, v] * vx
+                    + stages[s, v + 1] * vy
+                )
+            ux, uy = stages[s, STEP], stages[s, STEP + 1]
+        else:
+            stages[s, STEP], stages[s, STEP + 1] = ux, uy
         px += h * vx
         py += h * vy
         vx += h * ux

@@ -9,18 +9,10 @@ import numpy as np
 from .compiled import inner, kernel
 from .horizon import trajectory
 from .typing import Array
-from .ukf import constant_velocity, predict, sigma_points
+from .ukf import constant_velocity, mapped, predict, sigma_points, turned
 
 OLDEST = 100_000.0  # periods
 _SAME = 1e-6  # periods: a difference between times that is due to rounding
-
-
-def tube_radius(initial: float, growth: float, step_length: float, steps: int) -> Array:
-    """sigma_r of eq. (3) at steps 1..N: ``initial + growth * step_length * s``.
-
-    ``step_length`` is 1 where tau counts steps (the default reading) and the period where it counts seconds.
-    """
-    return np.array([initial + growth * step_length * s for s in range(1, steps + 1)])
 
 
 @inner
@@ -31,16 +23,9 @@ def _age(elapsed: float, period: float, oldest: float) -> int:
 
 @kernel
 def standing_plan(
-    position: Array,
-    velocity: Array,
-    controls: Array,
-    elapsed: float,
-    radius: Array,
-    moving: Array,
-    speed: float,
-    max_acceleration: float,
-    period: float,
-) -> tuple[Array, Array, Array]:
+    position: Array, velocity: Array, controls: Array, elapsed: float, radius: Array, moving: Array, speed: float,
+    max_acceleration: float, period: float,
+) -> tuple[Array, Array, Array]:  # fmt: skip
     """What a plan from ``position`` and ``velocity`` with ``controls`` (N, 2) is good for, ``elapsed`` seconds later.
 
     f3: centres (N, 2) and radii (N,) of the tube around it, which binds where the plan reaches, with the ``radius``
@@ -98,11 +83,8 @@ def peer_tubes(
                 vx += period * plans[i, 6 + 2 * k]
                 vy += period * plans[i, 7 + 2 * k]
             if k >= age:
-                positions[i, k - age, 0], positions[i, k - age, 1] = px, py
-                if ahead < 0.0:
-                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * before_x, py + ahead * before_y
-                elif ahead > 0.0:
-                    positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * vx, py + ahead * vy
+                speed_x, speed_y = (before_x, before_y) if ahead < 0.0 else (vx, vy)
+                positions[i, k - age, 0], positions[i, k - age, 1] = px + ahead * speed_x, py + ahead * speed_y
         lost = max(0, age - 1)
         for s in range(steps):
             distances[i, s] = safe_distance + margin * (radius[s] + growth * lost)
@@ -117,28 +99,11 @@ def propagate(
 
     C <- A C A^T + Q; with Q = 0 only the present uncertainty is carried forward.
     """
-    size = mean.shape[0]
     means, covariances = np.empty((steps, 2)), np.empty((steps, 3))
-    now, spread = mean.copy(), covariance.copy()
-    moved, half = np.empty(size), np.empty((size, size))
     for s in range(steps):
-        for i in range(size):
-            moved[i] = 0.0
-            for j in range(size):
-                half[i, j] = 0.0
-            for k in range(size):
-                if transition[i, k] != 0.0:
-                    moved[i] += transition[i, k] * now[k]
-                    for j in range(size):
-                        half[i, j] += transition[i, k] * spread[k, j]
-        for i in range(size):
-            now[i] = moved[i]
-            for j in range(size):
-                spread[i, j] = process_noise[i, j]
-                for k in range(size):
-                    spread[i, j] += half[i, k] * transition[j, k]
-        means[s, 0], means[s, 1] = now[0], now[1]
-        covariances[s, 0], covariances[s, 1], covariances[s, 2] = spread[0, 0], spread[0, 1], spread[1, 1]
+        mean, covariance = mapped(transition, mean), turned(transition, covariance, process_noise)
+        means[s, 0], means[s, 1] = mean[0], mean[1]
+        covariances[s, 0], covariances[s, 1], covariances[s, 2] = covariance[0, 0], covariance[0, 1], covariance[1, 1]
     return means, covariances
 
 
@@ -160,15 +125,9 @@ def _after(mean: Array, covariance: Array, noise: Array, periods: float, period:
 
 @kernel
 def expected_target(
-    mean: Array,
-    covariance: Array,
-    noise: Array,
-    is_widened: bool,
-    kappa: float,
-    period: float,
-    elapsed: float,
+    mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float, elapsed: float,
     steps: int,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
     """What f4 and eq. (5) need of a target with constant velocity, from an estimate ``elapsed`` seconds before now.
 
     Means (1, N, 2) and covariances (1, N, 3) at steps 1..N from now on; the positions (M, 2) of its sigma points at

@@ -1,87 +1,94 @@
-"""A horizon problem as a solver works on it: a plan's table, what is minimised over it, and how far a step may go.
-
-f6 = max(0, d - Dmax) has a kink.  It is the value of ``min t, t >= 0, t >= d - Dmax``; putting both bounds of t into
-the barrier and eliminating t in closed form gives a smooth function that tends to f6 with the barrier parameter.
-"""
+"""A horizon problem as a solver works on it: the plan, what is minimised over it, and how far a step may go."""
 
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.elementary import log
 from .compiled import borrower, inlined, inner
-from .constraints import BOUND, MARGIN, NEED, PLACE, ROW, VALUE, WHEN, certainly_kept, constraints_of, term
+from .constraints import BOUND, MARGIN, VALUE, WHEN, X, Y, certainly_kept, circle, constraints_of, term
 from .horizon import REACH_GOAL, HorizonProblem
 from .mutual_information import informed, new_points
-from .newton import CONTROL, STEP, VELOCITY, add, clear, new_stages
-from .terms import Term, stay_near
+from .newton import CONTROL, STEP, VELOCITY, Quadratic, Vector, add, clear, new_stages, put
+from .terms import Term, smoothed, stay_near
 from .typing import Array
 
-RESTORE, OPTIMISE = 0.0, 1.0  # phases; numba would compile everything once for each of two integers
 _SHARE = 0.8  # of the way to the nearest limit that a step goes at most
 
-# Columns of the table of a plan, a row for each prediction step; each is x and y.
+# Columns of the table of a plan, which has a row for each prediction step: vectors (x, y).
 _POSITION = 0
 _VELOCITY = 2
 _TRIED = 4  # the controls that position and velocity follow from
 TAKEN = 6  # the best controls so far
-_MOVED = 8  # of the position, by a whole step
-_OBSTACLE = 10  # whom f6 is about
+_SHIFT = 8  # of the position, by a whole Newton step
+_TARGET = 10  # where the obstacle is that f6 is about
 _COLUMNS = 12
+
+
+class Phase(IntEnum):
+    """What is minimised, within f1 and f2."""
+
+    RESTORE = 0  # half the squared violations of f3-f5
+    OPTIMISE = 1  # the objective, with f3-f5 kept
 
 
 class Task(NamedTuple):
     """A problem as it is evaluated again and again: some numbers, and four tables that everything happens in."""
 
     period: float
-    x: float  # position and velocity at step 1
-    y: float
-    vx: float
-    vy: float
+    position: Vector  # at step 1
+    velocity: Vector
     max_speed: float
     max_acceleration: float
     seeks: bool  # the objective is eq. (2)
-    goal_x: float
-    goal_y: float
-    informs: bool  # it is eq. (5), and there is an obstacle
+    goal: Vector
     variance: float
     penalty: float
     reach: float
     free: int  # controls, the last of which is held
     plan: Array  # (N, 12)
     stages: Array  # of ``newton``
-    constraints: Array  # those within reach
-    points: Array  # sigma points, of ``mutual_information``
+    constraints: Array  # of ``constraints``, those within reach
+    points: Array  # of ``mutual_information``; none unless the objective is eq. (5) and there is an obstacle
 
 
 @inner
 def new_task(problem: HorizonProblem, steps: int, free: int, spare: float) -> Task:
-    plan = np.zeros((steps, _COLUMNS))
-    informs = problem.objective != REACH_GOAL and problem.obstacle_mean.shape[0] > 0
-    if informs:
+    plan, seeks = np.zeros((steps, _COLUMNS)), problem.objective == REACH_GOAL
+    points = plan[:0]
+    if not seeks and problem.obstacle_mean.shape[0] > 0:
         points = new_points(problem.sigma_positions, problem.sigma_weights, problem.others_distance)
         for s in range(steps):
-            plan[s, _OBSTACLE] = problem.obstacle_mean[0, s, 0]
-            plan[s, _OBSTACLE + 1] = problem.obstacle_mean[0, s, 1]
-    else:
-        points = plan[:0]
+            for c in range(2):
+                plan[s, _TARGET + c] = problem.obstacle_mean[0, s, c]
     return Task(
-        problem.period, problem.position[0], problem.position[1], problem.velocity[0], problem.velocity[1],
-        problem.max_speed, problem.max_acceleration, problem.objective == REACH_GOAL, problem.goal[0], problem.goal[1],
-        informs,
-        problem.measurement_variance, problem.range_penalty, problem.measurement_range,
-        free, plan, new_stages(steps), constraints_of(problem, spare), points,
-    )  # fmt: skip
+        period=problem.period,
+        position=(problem.position[0], problem.position[1]),
+        velocity=(problem.velocity[0], problem.velocity[1]),
+        max_speed=problem.max_speed,
+        max_acceleration=problem.max_acceleration,
+        seeks=seeks,
+        goal=(problem.goal[0], problem.goal[1]),
+        variance=problem.measurement_variance,
+        penalty=problem.range_penalty,
+        reach=problem.measurement_range,
+        free=free,
+        plan=plan,
+        stages=new_stages(steps),
+        constraints=constraints_of(problem, spare),
+        points=points,
+    )
 
 
 @borrower
 def _drive(task: Task) -> None:
     """Fill in the positions and velocities that follow from the controls tried."""
     plan = task.plan
-    px, py, vx, vy = task.x, task.y, task.vx, task.vy
+    (px, py), (vx, vy) = task.position, task.velocity
     for s in range(plan.shape[0]):
         plan[s, _POSITION], plan[s, _POSITION + 1] = px, py
         plan[s, _VELOCITY], plan[s, _VELOCITY + 1] = vx, vy
@@ -93,7 +100,7 @@ def _drive(task: Task) -> None:
 
 @borrower
 def move(task: Task, length: float) -> None:
-    """Go so much of the step from the controls taken."""
+    """Try the controls that lie so much of the Newton step from those taken."""
     plan, stages = task.plan, task.stages
     for s in range(plan.shape[0]):
         for c in range(2):
@@ -106,15 +113,20 @@ def take(task: Task) -> None:
     """Take the controls tried."""
     plan = task.plan
     for s in range(plan.shape[0]):
-        plan[s, TAKEN], plan[s, TAKEN + 1] = plan[s, _TRIED], plan[s, _TRIED + 1]
+        for c in range(2):
+            plan[s, TAKEN + c] = plan[s, _TRIED + c]
 
 
 @borrower
-def excess_of(task: Task) -> float:
-    """The largest value of f3-f5 with the controls taken: negative if all are kept strictly, inf if one is none."""
+def look(task: Task) -> float:
+    """Try the controls taken, and write the value of each of f3-f5 with them; returns the largest.
+
+    It is negative if all are kept strictly, and inf if one is no number.
+    """
     plan, constraints = task.plan, task.constraints
     for s in range(plan.shape[0]):
-        plan[s, _TRIED], plan[s, _TRIED + 1] = plan[s, TAKEN], plan[s, TAKEN + 1]
+        for c in range(2):
+            plan[s, _TRIED + c] = plan[s, TAKEN + c]
     _drive(task)
     largest = -math.inf
     for i in range(constraints.shape[0]):
@@ -126,114 +138,117 @@ def excess_of(task: Task) -> float:
     return largest
 
 
+@inlined
+def _beyond(task: Task, s: int) -> Term:
+    """How far the position is beyond reach of the obstacle, whose positive part is f6."""
+    plan = task.plan
+    x, y = plan[s, _POSITION], plan[s, _POSITION + 1]
+    return stay_near(x, y, plan[s, _TARGET], plan[s, _TARGET + 1], task.reach)
+
+
 @borrower
-def _ball(x: float, y: float, radius: float, mu: float, dual: float) -> Term:
+def objective_of(task: Task) -> float:
+    """The objective of eq. (2) or (5) with the controls tried."""
+    plan = task.plan
+    steps, value = plan.shape[0], 0.0
+    if task.seeks:
+        for s in range(steps):
+            dx, dy = plan[s, _POSITION] - task.goal[0], plan[s, _POSITION + 1] - task.goal[1]
+            value += dx * dx + dy * dy
+    elif task.points.shape[0] > 0:
+        value = informed(task.points, plan[steps - 1, _POSITION], plan[steps - 1, _POSITION + 1], task.variance)[0]
+        for s in range(steps):
+            value += task.penalty * max(0.0, _beyond(task, s)[0])
+    return value
+
+
+@inlined
+def _less_log(value: float, product: float, mu: float) -> tuple[float, float]:
+    """``value`` - mu log(``product``), with the log put off until the product gets too small or too large."""
+    if 1e-100 < product < 1e100:
+        return value, product
+    return value - mu * log(product), 1.0
+
+
+@borrower
+def _add_objective(task: Task, mu: float) -> float:
+    """Add the objective to the stages, with f6 smoothed; returns its value."""
+    plan, stages, gamma = task.plan, task.stages, task.penalty
+    steps, value, product = plan.shape[0], 0.0, 1.0
+    if task.seeks:
+        for s in range(steps):
+            dx, dy = plan[s, _POSITION] - task.goal[0], plan[s, _POSITION + 1] - task.goal[1]
+            value += dx * dx + dy * dy
+            add(stages, s, 2.0, 2.0, 0.0, (0.0, dx, dy, 1.0, 0.0, 1.0))
+    if not task.points.shape[0] > 0:
+        return value
+    x, y = plan[steps - 1, _POSITION], plan[steps - 1, _POSITION + 1]
+    information = informed(task.points, x, y, task.variance)
+    add(stages, steps - 1, 1.0, 1.0, 0.0, information)
+    value = information[0]
+    for s in range(steps if gamma != 0.0 else 0):
+        beyond = _beyond(task, s)
+        t, over = smoothed(gamma, beyond[0], mu)
+        value, product = _less_log(value + gamma * t, product * (t * over), mu)
+        slope = mu / over
+        add(stages, s, slope, slope, mu / (over * over + t * t), beyond)
+    return value - mu * log(product)
+
+
+@borrower
+def _ball(x: float, y: float, radius: float, mu: float, dual: float) -> tuple[float, Quadratic]:
     """The barrier of f1 or f2, -mu log(1 - |(x, y)|^2 / radius^2): what the log is taken of, gradient and Hessian."""
     inverse = 1.0 / (radius * radius)
     inside = 1.0 - inverse * (x * x + y * y)
     slope = 2.0 * inverse / inside
     first, second = mu * slope, dual * slope
     bend = second * slope
-    return inside, first * x, first * y, second + bend * x * x, bend * x * y, second + bend * y * y
+    return inside, (first * x, first * y, second + bend * x * x, bend * x * y, second + bend * y * y)
 
 
 @borrower
-def objective_of(task: Task, mu: float) -> float:
-    """f0 of eq. (2) or the objective of eq. (5); ``mu`` = 0 is the paper's own, mu > 0 smooths f6's kink."""
-    plan, stages = task.plan, task.stages
-    steps = plan.shape[0]
-    value = 0.0
-    if task.seeks:
-        for s in range(steps):
-            dx, dy = plan[s, _POSITION] - task.goal_x, plan[s, _POSITION + 1] - task.goal_y
-            value += dx * dx + dy * dy
-            add(stages, s, 2.0, 2.0, 0.0, dx, dy, 1.0, 0.0, 1.0)
-    if not task.informs:
-        return value
-    last = steps - 1
-    value, gx, gy, hxx, hxy, hyy = informed(
-        task.points, plan[last, _POSITION], plan[last, _POSITION + 1], task.variance
-    )
-    add(stages, last, 1.0, 1.0, 0.0, gx, gy, hxx, hxy, hyy)
-    gamma, product = task.penalty, 1.0
-    for s in range(steps):
-        g, gx, gy, hxx, hxy, hyy = stay_near(
-            plan[s, _POSITION], plan[s, _POSITION + 1], plan[s, _OBSTACLE], plan[s, _OBSTACLE + 1], task.reach
-        )
-        if mu == 0.0 or gamma == 0.0:
-            value += gamma * max(0.0, g)
-            continue
-        root = math.sqrt(gamma * g * gamma * g + 4.0 * mu * mu)
-        # t and t - g of the eliminated bound, written so that neither cancels.
-        if g > 0.0:
-            t = (gamma * g + 2.0 * mu + root) / (2.0 * gamma)
-            over = mu * t / (gamma * t - mu)
-        else:
-            over = (2.0 * mu - gamma * g + root) / (2.0 * gamma)
-            t = mu * over / (gamma * over - mu)
-        value += gamma * t
-        product *= t * over
-        if not 1e-100 < product < 1e100:
-            value -= mu * log(product)
-            product = 1.0
-        slope = mu / over
-        add(stages, s, slope, slope, mu / (over * over + t * t), gx, gy, hxx, hxy, hyy)
-    return value - mu * log(product)
-
-
-@borrower
-def evaluate(task: Task, phase: float, mu: float, dual: float, limit: float) -> float:
+def evaluate(task: Task, phase: Phase, mu: float, dual: float, limit: float) -> float:
     """The function the current phase minimises at the controls tried, with derivatives; inf outside its domain.
 
-    The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``_minimise``.  Where the
+    The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``barrier``.  Where the
     value is beyond ``limit``, it may be a smaller one that is so too.
     """
     plan, stages, constraints = task.plan, task.stages, task.constraints
     clear(stages)
     value, product = 0.0, 1.0  # of all arguments of logs: one log of a product for many of its factors
     for s in range(plan.shape[0]):
-        inside, gx, gy, hxx, hxy, hyy = _ball(plan[s, _TRIED], plan[s, _TRIED + 1], task.max_acceleration, mu, dual)
+        inside, barrier = _ball(plan[s, _TRIED], plan[s, _TRIED + 1], task.max_acceleration, mu, dual)
         if not inside > 0.0:
             return math.inf
         product *= inside
-        stages[s, CONTROL], stages[s, CONTROL + 1] = gx, gy
-        stages[s, CONTROL + 2], stages[s, CONTROL + 3], stages[s, CONTROL + 4] = hxx, hxy, hyy
+        put(stages, s, CONTROL, barrier)
         if s > 0:  # the speed at step 1 is decided already
-            inside, gx, gy, hxx, hxy, hyy = _ball(plan[s, _VELOCITY], plan[s, _VELOCITY + 1], task.max_speed, mu, dual)
+            inside, barrier = _ball(plan[s, _VELOCITY], plan[s, _VELOCITY + 1], task.max_speed, mu, dual)
             if not inside > 0.0:
                 return math.inf
             product *= inside
-            stages[s, VELOCITY], stages[s, VELOCITY + 1] = gx, gy
-            stages[s, VELOCITY + 2], stages[s, VELOCITY + 3], stages[s, VELOCITY + 4] = hxx, hxy, hyy
-        if product < 1e-100:
-            value -= mu * log(product)
-            product = 1.0
-    if phase == RESTORE:
-        for i in range(constraints.shape[0]):
-            s = int(constraints[i, WHEN])
-            if certainly_kept(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1]):
-                continue  # most are
-            h, gx, gy, hxx, hxy, hyy = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])
-            over = h - constraints[i, BOUND]
-            if not over <= 0.0:
-                value += 0.5 * over * over
-                add(stages, s, over, over, 1.0, gx, gy, hxx, hxy, hyy)
-                if value > limit:  # what is to come is not negative
-                    break
-        return value - mu * log(product)
+            put(stages, s, VELOCITY, barrier)
+        value, product = _less_log(value, product, mu)
     for i in range(constraints.shape[0]):
         s = int(constraints[i, WHEN])
-        h, gx, gy, hxx, hxy, hyy = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])
-        slack = constraints[i, BOUND] - h
-        if not slack > 0.0:
-            return math.inf
-        product *= slack
-        if not 1e-100 < product < 1e100:
-            value -= mu * log(product)
-            product = 1.0
-        slope = 1.0 / slack
-        add(stages, s, mu * slope, dual * slope, dual * slope * slope, gx, gy, hxx, hxy, hyy)
-    return value - mu * log(product) + objective_of(task, mu)
+        x, y = plan[s, _POSITION], plan[s, _POSITION + 1]
+        if phase == Phase.RESTORE and certainly_kept(constraints, i, x, y):
+            continue  # most are
+        kept = term(constraints, i, x, y)
+        slack = constraints[i, BOUND] - kept[0]
+        if phase == Phase.OPTIMISE:
+            if not slack > 0.0:
+                return math.inf
+            value, product = _less_log(value, product * slack, mu)
+            slope = 1.0 / slack
+            add(stages, s, mu * slope, dual * slope, dual * slope * slope, kept)
+        elif not slack >= 0.0:
+            value += 0.5 * slack * slack
+            add(stages, s, -slack, -slack, 1.0, kept)
+            if value > limit:  # what is to come is not negative
+                break
+    value -= mu * log(product)
+    return value + _add_objective(task, mu) if phase == Phase.OPTIMISE else value
 
 
 @borrower
@@ -252,7 +267,7 @@ def _squared(x: float, y: float) -> float:
 
 
 @borrower
-def longest_step(task: Task, phase: float) -> float:
+def longest_step(task: Task, phase: Phase) -> float:
     """How much of the step can be taken at most: all of it, or ``_SHARE`` of the way to the nearest limit.
 
     All limits are circles but the obstacle's, whose margin changes with the direction; it is left to the backtracking,
@@ -262,7 +277,7 @@ def longest_step(task: Task, phase: float) -> float:
     share = 1.0
     px = py = vx = vy = 0.0
     for s in range(plan.shape[0]):
-        plan[s, _MOVED], plan[s, _MOVED + 1] = px, py
+        plan[s, _SHIFT], plan[s, _SHIFT + 1] = px, py
         x, y = plan[s, _VELOCITY], plan[s, _VELOCITY + 1]
         if _squared(x + vx, y + vy) >= task.max_speed * task.max_speed and s > 0:
             share = min(share, _share(x, y, vx, vy, task.max_speed))
@@ -273,17 +288,15 @@ def longest_step(task: Task, phase: float) -> float:
             share = min(share, _share(x, y, dx, dy, task.max_acceleration))
         vx += h * dx
         vy += h * dy
-    if phase == OPTIMISE:
-        for i in range(constraints.shape[0]):
-            if constraints[i, MARGIN] != 0.0:
-                continue
-            s = int(constraints[i, WHEN])
-            x, y = plan[s, _POSITION] - constraints[i, PLACE], plan[s, _POSITION + 1] - constraints[i, PLACE + 1]
-            dx, dy = plan[s, _MOVED], plan[s, _MOVED + 1]
-            then, near = _squared(x + dx, y + dy), constraints[i, ROW] == 0.0
-            radius = constraints[i, NEED] + (constraints[i, BOUND] if near else -constraints[i, BOUND])
-            if then >= radius * radius if near else then <= radius * radius and radius > 0.0:
-                share = min(share, _share(x, y, dx, dy, radius))
+    for i in range(constraints.shape[0] if phase == Phase.OPTIMISE else 0):
+        if constraints[i, MARGIN] != 0.0:
+            continue
+        s = int(constraints[i, WHEN])
+        x, y = plan[s, _POSITION] - constraints[i, X], plan[s, _POSITION + 1] - constraints[i, Y]
+        dx, dy = plan[s, _SHIFT], plan[s, _SHIFT + 1]
+        then, (near, radius) = _squared(x + dx, y + dy), circle(constraints, i)
+        if then >= radius * radius if near else then <= radius * radius and radius > 0.0:
+            share = min(share, _share(x, y, dx, dy, radius))
     return 1.0 if share == 1.0 else _SHARE * share
 
 
@@ -291,13 +304,13 @@ def longest_step(task: Task, phase: float) -> float:
 def keeps_limits(task: Task) -> bool:
     """Whether the controls taken keep f1 and f2 strictly."""
     plan = task.plan
-    vx, vy = task.vx, task.vy
+    vx, vy = task.velocity
     for s in range(plan.shape[0]):
         ux, uy = plan[s, TAKEN], plan[s, TAKEN + 1]
-        if not ux * ux + uy * uy < task.max_acceleration * task.max_acceleration:
+        if not _squared(ux, uy) < task.max_acceleration * task.max_acceleration:
             return False
         vx += task.period * ux
         vy += task.period * uy
-        if s < plan.shape[0] - 1 and not vx * vx + vy * vy < task.max_speed * task.max_speed:
+        if s < plan.shape[0] - 1 and not _squared(vx, vy) < task.max_speed * task.max_speed:
             return False
     return True

@@ -1,13 +1,13 @@
-"""The constraint functions of eqs. (2)-(4) at one point: value, gradient and Hessian, all exact.
+"""The constraint functions of eqs. (2)-(4) at one point: value, gradient and Hessian, all exact; f6 without its kink.
 
-Each returns ``(value, d/dx, d/dy, d2/dxx, d2/dxy, d2/dyy)`` and is satisfied where its value is <= 0.
+Each constraint returns ``(value, d/dx, d/dy, d2/dxx, d2/dxy, d2/dyy)`` and is satisfied where its value is <= 0.
 """
 
 from __future__ import annotations
 
 import math
 
-from .compiled import kernel
+from .compiled import inlined, kernel
 
 Term = tuple[float, float, float, float, float, float]
 _TINY = 1e-9  # keeps the direction defined at distance zero
@@ -32,16 +32,8 @@ def keep_away(x: float, y: float, cx: float, cy: float, distance: float) -> Term
 
 @kernel
 def keep_away_uncertain(
-    x: float,
-    y: float,
-    cx: float,
-    cy: float,
-    cxx: float,
-    cxy: float,
-    cyy: float,
-    distance: float,
-    margin: float,
-) -> Term:
+    x: float, y: float, cx: float, cy: float, cxx: float, cxy: float, cyy: float, distance: float, margin: float,
+) -> Term:  # fmt: skip
     """f4 + alpha * sigma_4 of eqs. (2) and (4): the margin is the deviation along the line of sight.
 
     In polar coordinates around the obstacle, h(r, a) = distance - r + margin * sigma(a), where
@@ -72,3 +64,29 @@ def keep_away_uncertain(
         h_rt * (nx * ty + ny * tx) + h_tt * tx * ty,
         2.0 * h_rt * ny * ty + h_tt * ty * ty,
     )
+
+
+@inlined
+def smoothed(gamma: float, g: float, mu: float) -> tuple[float, float]:
+    """Where f6 = max(0, g) of eq. (5) goes on the central path: t, which stands for f6, and t - g.
+
+    f6 has a kink, and is the least t with t >= 0 and t >= g.  With both bounds in the barrier, its price becomes
+
+        F(g) = min over t of  gamma t - mu log t - mu log(t - g),
+
+    which tends to gamma f6 with the barrier parameter.  At the minimum, gamma = mu / t + mu / (t - g), that is
+    gamma t^2 - (gamma g + 2 mu) t + mu g = 0, whose larger root keeps both bounds:
+
+        t     = (2 mu + gamma g + root) / (2 gamma),  root = sqrt((gamma g)^2 + 4 mu^2)
+        t - g = (2 mu - gamma g + root) / (2 gamma)
+
+    Of the two, one adds up numbers that are all positive; the other one, whose digits would cancel, follows from it by
+    the condition of the minimum.  As t is optimal, F' = mu / (t - g); and as the condition says that
+    dt/dg = t^2 / (t^2 + (t - g)^2), F'' = mu / (t^2 + (t - g)^2).
+    """
+    root = math.sqrt(gamma * g * gamma * g + 4.0 * mu * mu)
+    if g > 0.0:
+        t = (gamma * g + 2.0 * mu + root) / (2.0 * gamma)
+        return t, mu * t / (gamma * t - mu)
+    over = (2.0 * mu - gamma * g + root) / (2.0 * gamma)
+    return mu * over / (gamma * over - mu), over

@@ -59,18 +59,38 @@ def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, A
 
 
 @inner
-def _turned(a: Array, b: Array) -> Array:
-    """a @ b @ a.T summed in index order, so that no BLAS decides the last bits."""
+def turned(a: Array, b: Array, onto: Array) -> Array:
+    """onto + a @ b @ a.T summed in index order, so that no BLAS decides the last bits."""
     size, inside = a.shape
-    half, result = np.zeros((size, inside)), np.zeros((size, size))
+    half, result = np.zeros((size, inside)), onto.copy()
     for i in range(size):
         for k in range(inside):
-            for j in range(inside):
-                half[i, j] += a[i, k] * b[k, j]
+            if a[i, k] != 0.0:
+                for j in range(inside):
+                    half[i, j] += a[i, k] * b[k, j]
     for i in range(size):
-        for k in range(inside):
-            for j in range(size):
+        for j in range(size):
+            for k in range(inside):
                 result[i, j] += half[i, k] * a[j, k]
+    return result
+
+
+@inner
+def _add_products(result: Array, weights: Array, a: Array, b: Array) -> None:
+    """Add sum_i weights_i a_i b_i^T."""
+    for i in range(weights.shape[0]):
+        for j in range(result.shape[0]):
+            for k in range(result.shape[1]):
+                result[j, k] += weights[i] * a[i, j] * b[i, k]
+
+
+@inner
+def mapped(a: Array, x: Array) -> Array:
+    """a @ x summed in index order."""
+    result = np.zeros(a.shape[0])
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            result[i] += a[i, j] * x[j]
     return result
 
 
@@ -96,16 +116,11 @@ def constant_velocity(period: float) -> Array:
 @kernel
 def predict(mean: Array, covariance: Array, transition: Array, process_noise: Array) -> tuple[Array, Array]:
     """One step of a linear model; the unscented transform of a linear map is exact, so it is written out."""
-    size = mean.shape[0]
-    predicted = np.zeros(size)
-    for i in range(size):
-        for j in range(size):
-            predicted[i] += transition[i, j] * mean[j]
-    spread = _turned(transition, covariance)
-    for i in range(size):
-        for j in range(size):
+    spread = turned(transition, covariance, np.zeros(covariance.shape))
+    for i in range(spread.shape[0]):
+        for j in range(spread.shape[1]):
             spread[i, j] += process_noise[i, j]
-    return predicted, _symmetric(spread)
+    return mapped(transition, mean), _symmetric(spread)
 
 
 @kernel
@@ -171,33 +186,28 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
                 images[i, row] = points[i, 0] - x
                 images[i, row + 1] = points[i, 1] - y
             row += 2
-    expected = np.zeros(rows)
+    for k in range(rows):  # from here on, all as seen from what is expected
+        expected = 0.0
+        for i in range(count):
+            expected += weights[i] * images[i, k]
+        observed[k] -= expected
+        for i in range(count):
+            images[i, k] -= expected
     for i in range(count):
-        for k in range(rows):
-            expected[k] += weights[i] * images[i, k]
-    innovation_covariance = noise.copy()
-    cross = np.zeros((size, rows))
-    for i in range(count):
-        for k in range(rows):
-            for j in range(rows):
-                innovation_covariance[k, j] += weights[i] * (images[i, k] - expected[k]) * (images[i, j] - expected[j])
-            for j in range(size):
-                cross[j, k] += weights[i] * (points[i, j] - mean[j]) * (images[i, k] - expected[k])
+        for j in range(size):
+            points[i, j] -= mean[j]
+    innovation_covariance, cross = noise.copy(), np.zeros((size, rows))
+    _add_products(innovation_covariance, weights, images, images)
+    _add_products(cross, weights, points, images)
     gain = _gain(innovation_covariance, cross)
     updated = mean.copy()
     for j in range(size):
         for k in range(rows):
-            updated[j] += gain[j, k] * (observed[k] - expected[k])
-    spread = _turned(gain, noise)
-    error = np.empty(size)
-    for i in range(count):
-        for j in range(size):
-            error[j] = points[i, j] - mean[j]
-            for k in range(rows):
-                error[j] -= gain[j, k] * (images[i, k] - expected[k])
-        for j in range(size):
-            for k in range(size):
-                spread[j, k] += weights[i] * error[j] * error[k]
+            updated[j] += gain[j, k] * observed[k]
+            for i in range(count):
+                points[i, j] -= gain[j, k] * images[i, k]
+    spread = turned(gain, noise, np.zeros((size, size)))
+    _add_products(spread, weights, points, points)
     return updated, _symmetric(spread)
 
 
@@ -214,14 +224,9 @@ def _finite(mean: Array, covariance: Array) -> bool:
 
 @kernel
 def predict_and_fuse(
-    mean: Array,
-    covariance: Array,
-    transition: Array,
-    process_noise: Array,
-    kappa: float,
-    measurements: Array,
+    mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
     averaged: bool,
-) -> tuple[Array, Array, bool]:
+) -> tuple[Array, Array, bool]:  # fmt: skip
     """``predict``, then ``update`` with measurements (m, 7), and whether anything was fused.
 
     All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  Where

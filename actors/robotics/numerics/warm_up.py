@@ -10,7 +10,7 @@ import numpy as np
 
 from .barrier import solve
 from .horizon import HorizonProblem
-from .reachability import expected_target, peer_tubes, standing_plan, tube_radius
+from .reachability import expected_target, peer_tubes, standing_plan
 from .ukf import constant_velocity, predict_and_fuse
 
 _LOGGER = logging.getLogger("epicycle")
@@ -40,7 +40,7 @@ def _call_every_kernel() -> None:
         mean, covariance, np.eye(4), False, 0.0, period, 0.0, steps
     )
     controls = np.zeros((steps, 2))
-    zero, tube = np.zeros(2), tube_radius(0.2, 0.4, 1.0, steps)
+    zero, tube = np.zeros(2), np.ones(steps)
     centre, radius, starts = standing_plan(zero, zero, controls, 0.0, tube, zero, 0.0, 1.0, period)
     peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), 0.0, period, tube, 0.4, 1.0, 1.0)
     posed = HorizonProblem(

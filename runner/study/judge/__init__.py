@@ -8,10 +8,9 @@ from .claims import (
     UNDECIDED,
     Finding,
     Judgement,
-    Standing,
     ranked,
 )
-from .guideline import Option, Recommendation
+from .guideline import Recommendation
 from .study_results import StudyResults, open_study
 
 __all__ = [
@@ -22,9 +21,7 @@ __all__ = [
     "UNDECIDED",
     "Finding",
     "Judgement",
-    "Option",
     "Recommendation",
-    "Standing",
     "StudyResults",
     "open_study",
     "ranked",

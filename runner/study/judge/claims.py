@@ -20,8 +20,9 @@ from epicycle.actors import EpicycleError
 from epicycle.actors.expression import Formula
 
 from ...language import ALWAYS, FALLS, GREATER, RISES, Claim, Factor, Selection, asks_for_none
+from ...shown import finite
 from ..inference import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
-from .samples import Levels, Place, Samples, finite, has_enough
+from .samples import Levels, Place, Samples, has_enough
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
 CONFIRMED, REVERSED = "confirmed", "reversed"

@@ -16,8 +16,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ...language import Factor, Guideline
+from ...shown import finite
 from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
-from .samples import Levels, Place, Samples, finite, has_enough
+from .samples import Levels, Place, Samples, has_enough
 
 RESAMPLES = 9_999
 

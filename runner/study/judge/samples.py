@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, cached_property
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from ...language import Factor, Selection, Study
 from ..plan import index_of
@@ -107,15 +107,6 @@ class Samples:
 def has_enough(count: int, missing: int) -> bool:
     """Whether so few numbers are missing that their mean says something."""
     return count > 1 and missing <= MISSING * (count + missing)
-
-
-def finite(value: Any) -> Any:
-    """For a JSON file: numbers that are not finite are None, at any depth."""
-    if isinstance(value, dict):
-        return {name: finite(each) for name, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _number(value: float | None) -> float | None:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
@@ -17,7 +17,7 @@ from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
 from ...catalogue import types_of_file
-from ...language import RESERVED, Dimension, Factor, Level, Setting, Study, StudyMetric, study_of_text
+from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
 from ...model import Model, load_model
 from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
 from .described import Column, columns_of
@@ -47,10 +47,13 @@ class Condition:
     """One combination of levels; ``key`` tells it from all others, whatever study it is in."""
 
     index: int
-    settings: tuple[Setting, ...]
-    disturb: tuple[str, ...]
-    values: dict[str, Factor]
+    level: Level  # of all dimensions together
     key: str
+
+    @property
+    def values(self) -> dict[str, Factor]:
+        """What the columns of the table say of it."""
+        return self.level.values
 
 
 class Plan:
@@ -112,14 +115,14 @@ class Plan:
                     None,
                     f"rename it in the study: metrics: {{my_name: {metric.name}}}",
                 )
-        if study.until is not None and study.until.metric not in (names := [metric.name for metric in metrics]):
-            wanted = study.until.metric
+        names = [metric.name for metric in metrics]
+        if study.until is not None and (wanted := study.until.metric) not in names:
             problems.add(
                 f"until: the study has no metric {wanted!r}{did_you_mean(wanted, names)}",
                 study.until.position,
                 f"its metrics: {', '.join(names) or 'none'}",
             )
-        study.questions.check([metric.name for metric in metrics], problems)
+        study.questions.check(names, problems)
         problems.raise_if_any()
         columns = columns_of(study.dimensions, metrics, read.models[0])
         if endless := read.models[0].endless:
@@ -152,7 +155,7 @@ class Plan:
         unlike = {
             "study": study.name != manifest["study"],
             "factors": study.factors != manifest["factors"],
-            "metrics": not _are_metrics(metrics, study),
+            "metrics": not _are_metrics(manifest["metrics"], study),
             "level_sources": len(extra) != len(study.dimensions),
         }
         if wrong := [name for name, is_wrong in unlike.items() if is_wrong]:
@@ -214,8 +217,7 @@ class Plan:
 
     def _worked_out(self, index: int) -> Condition:
         place = place_of(index, self.study.dimensions)
-        levels = _levels(self.study, place)
-        settings, disturb = _together(self.study, levels)
+        level = _together(self.study, place)
         sources = dict(self.sources)
         for extra, at in zip(self._extra, place, strict=True):
             sources.update(extra.get(at, {}))
@@ -223,15 +225,14 @@ class Plan:
             "epicycle": self.made_with,
             "model": Path(self.study.model).name,
             "sources": sorted(sources.items()),
-            "set": [[setting.path, plain(setting.node)] for setting in settings],
-            "disturb": [Path(name).name for name in disturb],
+            "set": [[setting.path, plain(setting.node)] for setting in level.settings],
+            "disturb": [Path(name).name for name in level.disturb],
             "metrics": [
                 [metric.name, metric.source, *([metric.unit, metric.to] if metric.to else [])]
                 for metric in self.metrics
             ],
         }
-        values = {name: value for level in levels for name, value in level.values.items()}
-        return Condition(index, settings, disturb, values, _hash(identity))
+        return Condition(index, level, _hash(identity))
 
     def find(self, key: str, values: Mapping[str, Factor]) -> int | None:
         """The number of the condition with this key, which has these values; None if the plan has none."""
@@ -261,18 +262,16 @@ class Plan:
 
     def load(self, condition: Condition) -> Model:
         """The model as it is in a condition; raises ``ModelError``."""
-        return _load(self.study, condition.settings, condition.disturb)
+        return _load(self.study, condition.level)
 
 
-def _are_metrics(found: list[StudyMetric], study: Study) -> bool:
+def _are_metrics(found: Mapping[str, str], study: Study) -> bool:
     """Whether these can be the metrics of a study, which declares some or takes those of its model."""
-    declared = study.metrics or [StudyMetric(metric.name, metric.name) for metric in found]
-    names = {metric.name for metric in found}
-    if study.until is not None and study.until.metric not in names:
-        return False
-    if [(metric.name, metric.source) for metric in found] != [(metric.name, metric.source) for metric in declared]:
-        return False
-    return not names & {*RESERVED, *study.factors}
+    declared = (
+        {name: name for name in found} if not study.metrics else {each.name: each.source for each in study.metrics}
+    )
+    decides = study.until is None or study.until.metric in found
+    return decides and list(found.items()) == list(declared.items()) and not found.keys() & {*RESERVED, *study.factors}
 
 
 def _hash(value: object) -> str:
@@ -297,10 +296,6 @@ def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
     return found
 
 
-def _levels(study: Study, place: Iterable[int]) -> list[Level]:
-    return [dimension.level(at) for dimension, at in zip(study.dimensions, place, strict=True)]
-
-
 def _spread(size: int) -> list[int]:
     """All indices but the first, or some of them from end to end."""
     if size <= MAX_TRIED:
@@ -308,16 +303,19 @@ def _spread(size: int) -> list[int]:
     return sorted({index * (size - 1) // (MAX_TRIED - 1) for index in range(1, MAX_TRIED)})
 
 
-def _together(study: Study, levels: list[Level]) -> tuple[tuple[Setting, ...], tuple[str, ...]]:
-    settings = [*study.fixed, *(setting for level in levels for setting in level.settings)]
-    return tuple(settings), tuple(name for level in levels for name in level.disturb)
-
-
-def _load(study: Study, settings: tuple[Setting, ...], disturb: tuple[str, ...]) -> Model:
-    types = [each for file in study.types for each in types_of_file(file)]
-    return load_model(
-        study.model, set=[replace(setting, used=False) for setting in settings], disturb=disturb, types=types
+def _together(study: Study, place: Iterable[int]) -> Level:
+    """What the study sets in all runs, and the levels of a condition."""
+    levels = [dimension.level(at) for dimension, at in zip(study.dimensions, place, strict=True)]
+    return Level(
+        (*study.fixed, *(setting for level in levels for setting in level.settings)),
+        {name: value for level in levels for name, value in level.values.items()},
+        tuple(name for level in levels for name in level.disturb),
     )
+
+
+def _load(study: Study, level: Level) -> Model:
+    types = [each for file in study.types for each in types_of_file(file)]
+    return load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
 
 
 @dataclass
@@ -333,13 +331,16 @@ def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> S
     """Load the model with these levels; the files that this reads."""
     with noting() as noted:
         try:
-            read.models.append(_load(study, *_together(study, _levels(study, place))))
+            read.models.append(_load(study, _together(study, place)))
         except ModelError as error:
             for problem in error.problems:
                 problems.add(problem.message, problem.position, *problem.help)
     home = Path(next(iter(noted.files), "")).resolve().parent
     found = {f"package {name}": version for name, version in noted.packages.items()}
-    for name, digest in [*noted.files.items(), *((str(file), _digest(file)) for file in study.types)]:
+    for name, digest in [
+        *noted.files.items(),
+        *((str(file), hashlib.sha256(file.read_bytes()).hexdigest()) for file in study.types),
+    ]:
         read.files[name] = None
         path = Path(name).resolve()
         # By names that stay when a study and its model are moved, or Epicycle is.
@@ -348,7 +349,3 @@ def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> S
         if path.suffix in (".yaml", ".yml"):
             read.texts[shown] = path.read_text(encoding="utf-8")
     return found
-
-
-def _digest(file: Path) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()

@@ -117,39 +117,34 @@ class Backlog:
 
     def finished(self, task: Task, done: Done) -> None:
         """A run is over."""
-        self.made[done.status] += 1
         opened = self._running.pop((task.condition, task.replication))
         opened.running -= 1
-        self._note(opened, task.replication, done)
-        self._close_if_over(opened)
+        self._note(opened, task.replication, done, self.made)
+        self._has_more(opened)
 
     def _next_of(self, opened: _Open) -> Task | None:
-        while True:
-            while opened.next < opened.limit:
-                replication = opened.next
-                opened.next += 1
-                key = self.plan.key(opened.condition, replication)
-                if (done := self.known.get(key)) is not None:
-                    self.there[done.status] += 1
-                    self._note(opened, replication, done)
-                    continue
+        """The next run of a condition; None if it waits for others, or is closed."""
+        index = opened.condition.index
+        while self._has_more(opened):
+            replication = opened.next
+            opened.next += 1
+            key = self.plan.key(opened.condition, replication)
+            if (done := self.known.get(key)) is None:
                 opened.running += 1
-                self._running[opened.condition.index, replication] = opened
-                seed = self.plan.seed(opened.condition, replication)
-                return Task(opened.condition.index, replication, seed, key)
-            if not self._close_if_over(opened):
-                return None
-            if opened not in self._open:
-                return None
+                self._running[index, replication] = opened
+                return Task(index, replication, self.plan.seed(opened.condition, replication), key)
+            self._note(opened, replication, done, self.there)
+        return None
 
-    def _note(self, opened: _Open, replication: int, done: Done) -> None:
+    def _note(self, opened: _Open, replication: int, done: Done, counts: Counter[str]) -> None:
+        counts[done.status] += 1
         if self.until is not None and done.status == OK and done.value is not None and math.isfinite(done.value):
             opened.values[replication] = done.value
 
-    def _close_if_over(self, opened: _Open) -> bool:
-        """Whether a batch was over: the condition is closed then, or goes on with the next one."""
-        if opened.running or opened.next < opened.limit:
-            return False
+    def _has_more(self, opened: _Open) -> bool:
+        """Whether there is a run to be made; if all of a batch is over, the next begins, or the condition is closed."""
+        if opened.next < opened.limit or opened.running:
+            return opened.next < opened.limit
         most = self.plan.replications
         if self.until is not None and opened.limit < most:
             values = [opened.values[each] for each in sorted(opened.values)]
@@ -158,4 +153,4 @@ class Backlog:
                 return True
             self.stopped_early += most - opened.limit
         self._open.remove(opened)
-        return True
+        return False

@@ -60,7 +60,7 @@ class Cluster:
         self._parcel = b""
         self._sent: dict[str, Any] = {}  # parcels, by worker
         self._batches = 0
-        self._running: dict[asyncio.Task[list[Outcome]], list[Task]] = {}
+        self._running: dict[asyncio.Future[list[Outcome]], list[Task]] = {}
         self._wanted = 1  # batches at a time
         self._seconds = _BATCH  # that a run takes, as far as known
         self._looked = 0.0
@@ -196,9 +196,9 @@ class Cluster:
         tasks = [astuple(each) for each in batch]
         given = {"study": self._study, "timeout": self._keeper.timeout, "tasks": tasks}
         (future,) = client.get({key: (call, make, json.dumps(given))}, [key], sync=False)
-        self._running[asyncio.ensure_future(_result_of(future))] = batch
+        self._running[asyncio.ensure_future(future.result())] = batch
 
-    def _end(self, over: asyncio.Task[list[Outcome]], batch: list[Task]) -> None:
+    def _end(self, over: asyncio.Future[list[Outcome]], batch: list[Task]) -> None:
         """A batch is over, or has ended its workers."""
         try:
             outcomes = over.result()
@@ -234,11 +234,6 @@ class Cluster:
         except EpicycleError:
             return
         raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
-
-
-async def _result_of(future: Any) -> list[Outcome]:
-    found: list[Outcome] = await future.result()
-    return found
 
 
 def _name(function: Callable[..., object]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,17 +70,24 @@ def _fits(value: Any, shape: Any) -> bool:
     return value is None if shape is None else type(value) is shape
 
 
+def columns_of_rows(factors: Mapping[str, str], metrics: Iterable[str]) -> dict[str, str]:
+    """The columns of a row, and what they hold."""
+    return {
+        **{"run": "text", "condition": "text", "replication": "int"},
+        **factors,
+        **{"seed": "int", "status": "text"},
+        **dict.fromkeys(metrics, "float"),
+        **{"events": "int", "digest": "text", "error": "text", "wall_time": "float"},
+    }
+
+
 def schema_of(manifest: Mapping[str, Any]) -> pa.Schema:
     """The columns of a part."""
     import pyarrow as pa
 
     kinds = {"bool": pa.bool_(), "int": pa.int64(), "float": pa.float64(), "text": pa.string()}
-    fields = [("run", pa.string()), ("condition", pa.string()), ("replication", pa.int64())]
-    fields += [(name, kinds[kind]) for name, kind in manifest["factors"].items()]
-    fields += [("seed", pa.int64()), ("status", pa.string())]
-    fields += [(name, pa.float64()) for name in manifest["metrics"]]
-    fields += [("events", pa.int64()), ("digest", pa.string()), ("error", pa.string()), ("wall_time", pa.float64())]
-    return pa.schema(fields)
+    columns = columns_of_rows(manifest["factors"], manifest["metrics"])
+    return pa.schema([(name, kinds[kind]) for name, kind in columns.items()])
 
 
 def checksum(data: bytes) -> str:

@@ -60,11 +60,14 @@ class _Process:
         )
         self._told: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         threading.Thread(target=self._listen, daemon=True).start()
+        self._first: object = begin, arguments
         self.is_ready = False
-        self._give((begin, arguments))
 
     def make(self, request: object, timeout: float | None, is_wanted: Callable[[], bool]) -> Outcome:
         """What becomes of a request; raises what the bench has raised, and ``UnwantedError``."""
+        if self._first is not None:
+            self._give(self._first)
+            self._first = None
         self._give(request)
         since = time.monotonic()
         while True:

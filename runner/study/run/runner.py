@@ -13,6 +13,7 @@ from ...engine import LogFilter, Results, Simulation
 from ...model import Model
 from ..plan import Condition, Plan, value_of
 from .backlog import FAILED, OK, Task
+from .manifest import columns_of_rows
 from .store import Row
 
 _MODELS_KEPT = 4
@@ -71,19 +72,9 @@ class Runner:
 def empty_row(plan: Plan, task: Task) -> Row:
     """What a row holds before the run."""
     condition = plan.condition(task.condition)
-    return {
-        "run": task.key,
-        "condition": condition.key,
-        "replication": task.replication,
-        **condition.values,
-        "seed": task.seed,
-        "status": "",
-        **dict.fromkeys((metric.name for metric in plan.metrics), None),
-        "events": None,
-        "digest": None,
-        "error": None,
-        "wall_time": None,
-    }
+    known = {"run": task.key, "condition": condition.key, "replication": task.replication, "seed": task.seed}
+    columns = columns_of_rows(plan.study.factors, (metric.name for metric in plan.metrics))
+    return dict.fromkeys(columns) | known | condition.values
 
 
 def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, Simulation, EpicycleError | None]:

@@ -133,8 +133,9 @@ connections: [t.output -> single.go]
 run: {stop: 3 s}
 """
     simulation, results = simulate(text)
-    aspects = simulation.model.aspects
-    assert {woven.name: woven.actors for woven in aspects} == {"single.slow": {"single.one": "single.one"}}
+    assert {woven.name: woven.actors for woven in simulation.model.aspects} == {
+        "single.slow": {"single.one": "single.one"}
+    }
     assert [time for time, _ in sent(results, "single.one")] == [1, 2, 3]
 
 

@@ -1,0 +1,165 @@
+"""The paper's equations as they are read there, one function for each; docs/paper.md says which kernel computes which.
+
+Nothing here is fast.  The compiled kernels are tested against it, and the solver ``Casadi`` makes its program of it:
+the functions take arrays of numbers and arrays of symbols.  Lengths are in metres, times in seconds, information in
+nats.  N is the number of prediction steps s = 1..N, a row of an array each; step s lies at t + tau, tau = s * period.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .horizon import REACH_GOAL, HorizonProblem
+from .typing import Array
+
+_TINY = 1e-18  # m^2; gives a root a slope at zero, too, and changes it by less than 1e-9 m
+
+
+def _norm(offsets: Any) -> Any:
+    """The Euclidean lengths of offsets (..., 2)."""
+    return np.sqrt((offsets * offsets).sum(axis=-1) + _TINY)
+
+
+def target_after(state: Any, period: float) -> Any:
+    """Eq. (1): the target's state (x, y, vx, vy) a period later, but for its process noise omega."""
+    position, velocity = state[:2], state[2:]
+    return np.concatenate([position + period * velocity, velocity])
+
+
+def measured_range(target: Any, robot: Any) -> Any:
+    """z_t of eq. (1), m: the ranges of targets (..., 2) from robots (..., 2), but for their noise eta."""
+    return _norm(target - robot)
+
+
+def dynamics(position: Any, velocity: Any, controls: Any, period: Any) -> tuple[Any, Any]:
+    """The equality constraint of eq. (2): positions and velocities (N, 2) at steps 1..N.
+
+    They begin with ``position`` Pr_{t+1} and ``velocity`` V_{t+1} (2,), which no unknown control can change; the row of
+    ``controls`` (N, 2) for step s is U_{t+s}, in m/s^2.
+    """
+    positions, velocities = [position], [velocity]
+    for control in controls[:-1]:
+        positions.append(positions[-1] + period * velocities[-1])
+        velocities.append(velocities[-1] + period * control)
+    return np.stack(positions), np.stack(velocities)
+
+
+def f0(positions: Any, goal: Any) -> Any:
+    """Eq. (2), (N,) in m^2: the squared distance to the goal, which the paper puts at the origin."""
+    offsets = positions - goal
+    return (offsets * offsets).sum(axis=-1)
+
+
+def f1(velocities: Any, max_speed: Any) -> Any:
+    """Eq. (2), (N,) in m^2/s^2: |V|^2 - Vmax^2."""
+    return (velocities * velocities).sum(axis=-1) - max_speed * max_speed
+
+
+def f2(controls: Any, max_acceleration: Any) -> Any:
+    """Eq. (2), (N,) in m^2/s^4: |U|^2 - Amax^2."""
+    return (controls * controls).sum(axis=-1) - max_acceleration * max_acceleration
+
+
+def f3(positions: Any, planned: Any, radius: Any) -> Any:
+    """Eq. (2), (N,) in m: the distance to the standing plan Rs (N, 2) less its ``radius`` sigma_r (N,)."""
+    return _norm(planned - positions) - radius
+
+
+def f4(positions: Any, obstacle: Any, safe_distance: Any) -> Any:
+    """Eq. (2), (N,) in m: Dmin less the distance to the obstacle Po (N, 2)."""
+    return safe_distance - _norm(obstacle - positions)
+
+
+def f5(positions: Any, peer: Any, safe_distance: Any) -> Any:
+    """Eq. (2), (N,) in m: Dmin less the distance to another robot Ro_i (N, 2)."""
+    return safe_distance - _norm(peer - positions)
+
+
+def sigma_r(initial: float, growth: float, tau: Array) -> Array:
+    """Eq. (3), (N,) in m: the radius of a reachability set, sigma_r0 + beta * tau."""
+    return initial + growth * tau
+
+
+def sigma_4(positions: Any, obstacle: Any, covariance: Any) -> Any:
+    """Eq. (4), (N,) in m: the standard deviation of f4, from C (N, 3) of the obstacle's position as (xx, xy, yy)."""
+    slope = (positions - obstacle) / _norm(positions - obstacle)[:, np.newaxis]  # d f4 / d Po
+    x, y, (xx, xy, yy) = slope[:, 0], slope[:, 1], covariance.T
+    return np.sqrt(x * xx * x + 2.0 * x * xy * y + y * yy * y + _TINY)
+
+
+def sigma_5(radius: Array, growth: float, lost: int) -> Array:
+    """Eq. (4), (N,) in m: sigma_r + beta * d_i, where d_i messages have been lost since the latest one."""
+    return radius + growth * lost
+
+
+def f6(positions: Any, obstacle: Any, reach: Any) -> Any:
+    """Eq. (5), (N,) in m: max(0, distance to the obstacle Po (N, 2) less Dmax)."""
+    return np.maximum(0.0, out_of_reach(positions, obstacle, reach))
+
+
+def out_of_reach(positions: Any, obstacle: Any, reach: Any) -> Any:
+    """Eq. (5), (N,) in m: what f6 compares with 0."""
+    return _norm(obstacle - positions) - reach
+
+
+def misfit(points: Any, robots: Any, variance: Any) -> Any:
+    """Eq. (5), (M, M): -log PDF(z_i; z_j, eta) for ranges of sigma points (M, 2) from robots (n, 2), of variance eta.
+
+    Without the constant of the normal density, which moves the information by a constant and no optimum.
+    """
+    z = measured_range(points[:, np.newaxis], robots)  # (M, n)
+    difference = z[:, np.newaxis] - z
+    return (difference * difference).sum(axis=-1) / (2.0 * variance)
+
+
+def mutual_information(own: Any, points: Any, weights: Any, variance: Any, others: Any) -> Any:
+    """I of eq. (5), nat, of the ranges from ``own`` (2,) and from other robots, whose ``misfit`` is ``others`` (M, M).
+
+    The sigma points (M, 2) at the end of the horizon have the ``weights`` (M,), all of them positive.
+    """
+    density = np.exp(-misfit(points, own[np.newaxis], variance) - others)  # PDF(z_i; z_j, eta)
+    return -(weights * np.log((weights * density).sum(axis=1))).sum()
+
+
+def objective(problem: HorizonProblem, positions: Any, beyond: Any = None) -> Any:
+    """What is minimised: the sum of f0 of eq. (2), in m^2; or eq. (5), in nats, which is 0 while no obstacle is known.
+
+    ``beyond`` (N,) stands for f6 where a solver has variables of its own for it.
+    """
+    if problem.objective == REACH_GOAL:
+        return f0(positions, problem.goal).sum()
+    if not len(problem.obstacle_mean):
+        return 0.0
+    points, weights, others = problem.sigma_positions, problem.sigma_weights, problem.others_distance
+    information = mutual_information(positions[-1], points, weights, problem.measurement_variance, others)
+    if beyond is None:
+        beyond = f6(positions, problem.obstacle_mean[0], problem.measurement_range)
+    return -information + (problem.range_penalty * beyond).sum()
+
+
+def constraints(problem: HorizonProblem, positions: Any) -> Any:
+    """f3, f4 of each obstacle and f5 of each peer with their margins alpha * sigma, in m: <= 0 is kept.
+
+    (1 + K + n, N - 2): the positions at steps 1 and 2 are decided before the first unknown control acts.
+    ``peer_distance`` of the problem is Dmin with the margin of f5.  sigma_1 to sigma_3 are zero.
+    """
+    rows = [f3(positions, problem.tube_centre, problem.tube_radius)]
+    for mean, covariance in zip(problem.obstacle_mean, problem.obstacle_covariance, strict=True):
+        margin = problem.margin * sigma_4(positions, mean, covariance)
+        rows.append(f4(positions, mean, problem.safe_distance) + margin)
+    for mean, distance in zip(problem.peer_mean, problem.peer_distance, strict=True):
+        rows.append(f5(positions, mean, distance))
+    return np.stack(rows)[:, 2:]
+
+
+def driven(problem: HorizonProblem, controls: Any) -> tuple[Any, Any]:
+    """The ``dynamics`` of a problem: positions and velocities (N, 2) at steps 1..N under controls (N, 2)."""
+    return dynamics(problem.position, problem.velocity, controls, problem.period)
+
+
+def violations(problem: HorizonProblem, controls: Array) -> Array:
+    """The ``constraints`` of a problem under controls (N, 2)."""
+    values: Array = constraints(problem, driven(problem, controls)[0])
+    return values

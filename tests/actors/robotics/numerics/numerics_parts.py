@@ -1,0 +1,113 @@
+"""What the tests of the kernels share: problems, their objective by definition, and derivatives by differences."""
+
+import importlib
+from collections.abc import Callable
+
+import numba
+import numpy as np
+import pytest
+
+PREFIX = "epicycle.actors.robotics.numerics."
+barrier = importlib.import_module(PREFIX + "barrier")
+definitions = importlib.import_module(PREFIX + "definitions")
+horizon = importlib.import_module(PREFIX + "horizon")
+reachability = importlib.import_module(PREFIX + "reachability")
+ukf = importlib.import_module(PREFIX + "ukf")
+
+# Called by kernels only; numba looks them up as globals.
+informed = importlib.import_module(PREFIX + "mutual_information").informed
+new_points = importlib.import_module(PREFIX + "mutual_information").new_points
+
+Six = tuple[float, float, float, float, float, float]
+
+
+def check_derivatives(function: Callable[[float, float], Six], x: float, y: float, tolerance: float = 1e-6) -> None:
+    """Gradient against differences of values, Hessian against differences of gradients."""
+    step = 1e-5
+    _, gx, gy, hxx, hxy, hyy = function(x, y)
+    by_x = (np.array(function(x + step, y)) - function(x - step, y)) / (2 * step)
+    by_y = (np.array(function(x, y + step)) - function(x, y - step)) / (2 * step)
+    scale = tolerance * (1.0 + max(map(abs, (gx, gy, hxx, hxy, hyy))))
+    assert [gx, gy] == pytest.approx([by_x[0], by_y[0]], abs=scale)
+    assert [hxx, hxy, hyy] == pytest.approx([by_x[1], by_x[2], by_y[2]], abs=scale)
+    assert by_x[2] == pytest.approx(by_y[1], abs=scale)
+
+
+@numba.njit
+def negative_information(
+    x: float, y: float, points: np.ndarray, weights: np.ndarray, others_distance: np.ndarray, variance: float
+) -> Six:
+    return informed(new_points(points, weights, others_distance), x, y, variance)
+
+
+def spread(random: np.random.Generator, size: int) -> np.ndarray:
+    root = random.normal(size=(size, size))
+    return root @ root.T + 0.05 * np.eye(size)
+
+
+def inform_problem(random: np.random.Generator, steps: int = 10, reach: float = 8.0) -> "horizon.HorizonProblem":
+    """A free robot that is to inform itself about a target near the origin."""
+    state, covariance = np.array([0.0, 0.0, 1.0, 0.5]), spread(random, 4)
+    points, weights = ukf.sigma_points(state, covariance, 0.0)
+    means, covariances = reachability.propagate(state, covariance, ukf.constant_velocity(0.1), np.zeros((4, 4)), steps)
+    points = np.ascontiguousarray(points[:, :2])
+    return horizon.HorizonProblem(
+        period=0.1,
+        position=np.array([6.0, 5.0]),
+        velocity=np.zeros(2),
+        max_speed=16.0,
+        max_acceleration=16.0,
+        tube_centre=np.zeros((steps, 2)),
+        tube_radius=np.full(steps, np.inf),
+        safe_distance=0.1,
+        margin=0.0,
+        obstacle_mean=means[np.newaxis],
+        obstacle_covariance=covariances[np.newaxis],
+        peer_mean=np.empty((0, steps, 2)),
+        peer_distance=np.empty((0, steps)),
+        objective=horizon.INFORM,
+        goal=np.zeros(2),
+        sigma_positions=points,
+        sigma_weights=weights,
+        others_distance=np.zeros((9, 9)),
+        measurement_variance=2.0,
+        range_penalty=0.001,
+        measurement_range=reach,
+    )
+
+
+def crowded_problem(random: np.random.Generator) -> "horizon.HorizonProblem":
+    """Peers, tube and obstacle at any distance."""
+    steps, peers = 10, 6
+    problem = inform_problem(random)
+    position, velocity = random.normal(scale=6.0, size=2), random.uniform(-5.5, 5.5, size=2)
+    coasting = position + 0.1 * np.arange(steps)[:, np.newaxis] * velocity
+    return problem._replace(
+        position=position,
+        velocity=velocity,
+        max_speed=8.0,
+        max_acceleration=8.0,
+        safe_distance=2.0,
+        margin=2.0,
+        tube_centre=coasting + random.normal(scale=0.3, size=2),
+        tube_radius=0.2 + 0.4 * np.arange(1, steps + 1),
+        peer_mean=random.normal(scale=12.0, size=(peers, 1, 2)) + np.zeros((peers, steps, 2)),
+        peer_distance=np.full((peers, steps), 3.0),
+        objective=horizon.REACH_GOAL,
+    )
+
+
+def objective_by_definition(problem: "horizon.HorizonProblem", controls: np.ndarray) -> float:
+    """Without the centre of the sigma points, which has no weight."""
+    heavy = problem.sigma_weights > 0.0
+    problem = problem._replace(
+        sigma_positions=problem.sigma_positions[heavy],
+        sigma_weights=problem.sigma_weights[heavy],
+        others_distance=problem.others_distance[np.ix_(heavy, heavy)],
+    )
+    return float(definitions.objective(problem, definitions.driven(problem, controls)[0]))
+
+
+def solve(problem: "horizon.HorizonProblem", start: np.ndarray | None = None) -> "barrier.Solution":
+    start = np.zeros((len(problem.tube_radius), 2)) if start is None else start
+    return barrier.solve(problem, start[np.newaxis].copy())

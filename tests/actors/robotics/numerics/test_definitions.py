@@ -1,0 +1,221 @@
+"""The compiled kernels against the paper's equations as ``definitions.py`` has them, and docs/paper.md's table."""
+
+import importlib
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+from tests.actors.robotics.numerics.numerics_parts import (
+    PREFIX,
+    inform_problem,
+    negative_information,
+    objective_by_definition,
+    solve,
+    spread,
+)
+
+constraints = importlib.import_module(PREFIX + "constraints")
+definitions = importlib.import_module(PREFIX + "definitions")
+horizon = importlib.import_module(PREFIX + "horizon")
+information = importlib.import_module(PREFIX + "mutual_information")
+reachability = importlib.import_module(PREFIX + "reachability")
+task = importlib.import_module(PREFIX + "task")
+terms = importlib.import_module(PREFIX + "terms")
+ukf = importlib.import_module(PREFIX + "ukf")
+# Called by kernels only; numba looks them up as globals.
+HorizonProblem, constraints_of, term = horizon.HorizonProblem, constraints.constraints_of, constraints.term
+ball, keeps_limits, new_task, smoothed, TAKEN = task._ball, task.keeps_limits, task.new_task, terms.smoothed, task.TAKEN
+
+PAPER = Path(__file__).parents[4] / "docs" / "paper.md"
+
+
+def test_the_target_s_model(random: np.random.Generator) -> None:
+    state = random.normal(size=4)
+    after = definitions.target_after(state, 0.1)
+    assert after == pytest.approx([state[0] + 0.1 * state[2], state[1] + 0.1 * state[3], state[2], state[3]])
+    assert ukf.constant_velocity(0.1) @ state == pytest.approx(after, abs=1e-15)
+
+
+def test_dynamics(random: np.random.Generator) -> None:
+    """Step 1 is given; the first unknown control moves the robot at step 3."""
+    position, velocity, controls = random.normal(size=2), random.normal(size=2), random.normal(size=(6, 2))
+    positions, velocities = definitions.dynamics(position, velocity, controls, 0.5)
+    assert positions[:3] == pytest.approx(
+        np.array([position, position + 0.5 * velocity, position + velocity + 0.25 * controls[0]])
+    )
+    assert velocities == pytest.approx(velocity + 0.5 * np.cumsum(np.vstack([np.zeros((1, 2)), controls[:-1]]), axis=0))
+    assert horizon.trajectory(position, velocity, controls, 0.5, 6) == pytest.approx(positions, abs=1e-14)
+
+
+@numba.njit
+def inside(x: float, y: float, radius: float) -> float:
+    return ball(x, y, radius, 1.0, 1.0)[0]
+
+
+def test_limits_of_speed_and_acceleration(random: np.random.Generator) -> None:
+    vectors = random.normal(scale=5.0, size=(200, 2))
+    found = [inside(x, y, 8.0) for x, y in vectors]
+    assert definitions.f1(vectors, 8.0) == pytest.approx(-64.0 * np.array(found), abs=1e-12)
+    assert definitions.f2(vectors, 8.0) == pytest.approx((vectors**2).sum(axis=1) - 64.0)
+
+
+@numba.njit
+def keeps(controls: np.ndarray, *fields: Any) -> bool:
+    posed = new_task(HorizonProblem(*fields), len(controls), len(controls), np.inf)
+    posed.plan[:, TAKEN : TAKEN + 2] = controls
+    return keeps_limits(posed)
+
+
+def test_who_keeps_the_limits(random: np.random.Generator) -> None:
+    """The speed at step 1 is decided already."""
+    kept = []
+    for _ in range(200):
+        problem = inform_problem(random)._replace(velocity=random.normal(scale=3.0, size=2), max_speed=5.0)
+        problem = problem._replace(max_acceleration=8.0)
+        controls = random.normal(scale=3.0, size=(10, 2))
+        velocities = definitions.driven(problem, controls)[1][1:]
+        worst = max(definitions.f1(velocities, 5.0).max(), definitions.f2(controls, 8.0).max())
+        assert keeps(controls, *problem) == (worst < 0.0)
+        kept.append(worst < 0.0)
+    assert 20 < sum(kept) < 180
+
+
+def test_distances_and_their_margins(random: np.random.Generator) -> None:
+    for _ in range(100):
+        x, y, cx, cy = random.normal(scale=5.0, size=4)
+        here, there, c = np.array([[x, y]]), np.array([[cx, cy]]), spread(random, 2)
+        distance = np.hypot(x - cx, y - cy)
+        sigma = definitions.sigma_4(here, there, np.array([[c[0, 0], c[0, 1], c[1, 1]]]))[0]
+        n = np.array([x - cx, y - cy]) / distance
+        assert sigma == pytest.approx(np.sqrt(n @ c @ n))
+        assert definitions.f3(here, there, 1.5)[0] == pytest.approx(distance - 1.5)
+        assert definitions.f4(here, there, 1.5)[0] == pytest.approx(1.5 - distance)
+        assert terms.stay_near(x, y, cx, cy, 1.5)[0] == pytest.approx(definitions.f3(here, there, 1.5)[0], abs=1e-12)
+        assert terms.keep_away(x, y, cx, cy, 1.5)[0] == pytest.approx(definitions.f5(here, there, 1.5)[0], abs=1e-12)
+        robust = terms.keep_away_uncertain(x, y, cx, cy, c[0, 0], c[0, 1], c[1, 1], 2.0, 3.0)[0]
+        assert robust == pytest.approx(definitions.f4(here, there, 2.0)[0] + 3.0 * sigma, abs=1e-12)
+
+
+def test_radii_of_reachability_sets() -> None:
+    steps = np.arange(1, 11)
+    assert definitions.sigma_r(0.2, 0.4, steps)[[0, 9]] == pytest.approx([0.6, 4.2])
+    assert definitions.sigma_r(0.2, 0.4, 0.1 * steps)[[0, 9]] == pytest.approx([0.24, 0.6])
+
+
+@pytest.mark.parametrize("lost", [0, 1, 7])
+def test_a_peer_that_is_not_heard_is_given_more_room(lost: int) -> None:
+    radius = definitions.sigma_r(0.2, 0.4, np.arange(1, 11))
+    table = np.array([[0.0, 0.0, 0.0, 0.0, 7.0 - 0.1 * (1 + lost), 0.0]])  # of the period before, when none is lost
+    distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0)[1]
+    assert distances[0] == pytest.approx(2.0 + 3.0 * definitions.sigma_5(radius, 0.4, lost))
+
+
+@pytest.mark.parametrize("kappa", [0.0, 1.0])
+def test_mutual_information(random: np.random.Generator, kappa: float) -> None:
+    for _ in range(50):
+        points, weights = ukf.sigma_points(random.normal(scale=3.0, size=4), spread(random, 4), kappa)
+        points, heavy = np.ascontiguousarray(points[:, :2]), weights > 0.0
+        others = random.normal(scale=10.0, size=(int(random.integers(0, 4)), 2))
+        own = random.normal(scale=10.0, size=2)
+        distance = information.pairwise_distance(points, others[:, np.newaxis], 2.0)
+        assert distance == pytest.approx(definitions.misfit(points, others, 2.0), abs=1e-12)
+        found = negative_information(*own, points, weights, distance, 2.0)[0]
+        expected = definitions.mutual_information(
+            own, points[heavy], weights[heavy], 2.0, distance[np.ix_(heavy, heavy)]
+        )
+        assert found == pytest.approx(-expected, abs=1e-12)
+        # As eq. (5) is written, for all robots at once, variance 2 and without the density's constant.
+        ranges = np.linalg.norm(points[:, np.newaxis] - np.vstack([own[np.newaxis], others]), axis=2)
+        squares = ((ranges[:, np.newaxis] - ranges) ** 2).sum(axis=2)
+        written = (weights * np.log((weights * np.exp(-squares / 4.0)).sum(axis=1)))[heavy].sum()
+        assert expected == pytest.approx(-written, abs=1e-9)
+
+
+@numba.njit
+def excess(gamma: float, g: float, mu: float) -> tuple[float, float]:
+    return smoothed(gamma, g, mu)
+
+
+@pytest.mark.parametrize("g", [-30.0, -1.0, -1e-9, 0.0, 1e-9, 1.0, 30.0])
+@pytest.mark.parametrize("gamma", [1e-3, 1.0])
+def test_f6_without_its_kink(gamma: float, g: float) -> None:
+    """It is where the barriers of both its bounds have their minimum, and tends to max(0, g)."""
+    for mu in (1.0, 1e-4, 1e-8):
+        t, over = excess(gamma, g, mu)
+        assert t > 0.0
+        assert over > 0.0
+        assert t - over == pytest.approx(g, abs=1e-6 * max(t, over))
+        assert mu / t + mu / over == pytest.approx(gamma)
+        assert 0.0 <= t - max(0.0, g) <= 2.0 * mu / gamma
+    here, there = np.array([[40.0 + g, 0.0]]), np.zeros((1, 2))
+    assert definitions.f6(here, there, 40.0) == pytest.approx([max(0.0, g)], abs=1e-12)
+    assert definitions.out_of_reach(here, there, 40.0) == pytest.approx([g], abs=1e-12)
+
+
+@numba.njit
+def all_values(positions: np.ndarray, rows: int, *fields: Any) -> np.ndarray:
+    table = constraints_of(HorizonProblem(*fields), np.inf)
+    found = np.full((rows, len(positions)), np.nan)
+    for i in range(len(table)):
+        s = int(table[i, 1])
+        found[int(table[i, 0]), s] = term(table, i, positions[s, 0], positions[s, 1])[0]
+    return found
+
+
+def test_constraints_with_their_margins(random: np.random.Generator) -> None:
+    problem = inform_problem(random)._replace(
+        safe_distance=2.0,
+        margin=2.0,
+        peer_mean=random.normal(size=(2, 10, 2)),
+        peer_distance=np.full((2, 10), 3.0),
+        tube_centre=random.normal(size=(10, 2)),
+        tube_radius=np.linspace(0.6, 4.2, 10),
+    )
+    controls = random.normal(size=(10, 2))
+    places = definitions.driven(problem, controls)[0]
+    away = places - problem.obstacle_mean[0]
+    n = away / np.linalg.norm(away, axis=1)[:, np.newaxis]
+    xx, xy, yy = problem.obstacle_covariance[0].T
+    sigma = np.sqrt(n[:, 0] ** 2 * xx + 2 * n[:, 0] * n[:, 1] * xy + n[:, 1] ** 2 * yy)
+    written = [
+        np.linalg.norm(places - problem.tube_centre, axis=1) - problem.tube_radius,
+        2.0 - np.linalg.norm(away, axis=1) + 2.0 * sigma,
+        *(3.0 - np.linalg.norm(places - mean, axis=1) for mean in problem.peer_mean),
+    ]
+    expected = definitions.violations(problem, controls)
+    assert expected == pytest.approx(np.array(written)[:, 2:], abs=1e-12)
+    found = all_values(places, 4, *problem)
+    assert np.isnan(found[:, :2]).all()  # decided before the first control acts
+    assert found[:, 2:] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("reach", [8.0, 3.0])
+def test_the_reported_objective(random: np.random.Generator, reach: float) -> None:
+    for _ in range(10):
+        problem = inform_problem(random, reach=reach)
+        solution = solve(problem)
+        expected = objective_by_definition(problem, solution.controls)
+        assert solution.objective == pytest.approx(expected, abs=1e-9)
+        goal = problem._replace(objective=horizon.REACH_GOAL, goal=random.normal(size=2))
+        solution = solve(goal)
+        places = definitions.driven(goal, solution.controls)[0]
+        assert objective_by_definition(goal, solution.controls) == pytest.approx(((places - goal.goal) ** 2).sum())
+        assert solution.objective == pytest.approx(definitions.f0(places, goal.goal).sum(), abs=1e-9)
+
+
+def test_the_table_of_the_equations() -> None:
+    """Every definition is in it, and what it names is there."""
+    rows = re.findall(r"^\| \(\d\).*? \| `(\w+)` \| (.*) \| (.*) \|$", PAPER.read_text("utf-8"), flags=re.MULTILINE)
+    written = {name for name, each in vars(definitions).items() if inspect.isfunction(each) and name[0] != "_"}
+    assert {name for name, _, _ in rows} == written
+    for _, kernels, tests in rows:
+        for module, name in re.findall(r"`(\w+)\.(\w+)`", kernels):
+            assert hasattr(importlib.import_module(PREFIX + module), name), f"{module}.{name}"
+        named = re.findall(r"`(test_\w+)`", tests)
+        assert named
+        assert all(name in globals() for name in named), named
