@@ -44,8 +44,7 @@ class ExecutionTime(ExecutionAspect):
     scale = Parameter(float, 1.0, min=0.0, unit="1", doc="how many times slower the processor is than what was given")
     busy = Parameter(str, WAIT, choices=(WAIT, SKIP), doc="what becomes of a firing while another takes its time")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if self.measure and (self.time != 0.0 or self.times is not None):
             raise EpicycleError("it cannot measure execution times where they are given: leave one or the other out")
         self._measured = None if self.times is None else MeasuredTimes(self.times)
