@@ -298,31 +298,25 @@ class Ways:
         """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
         path = point.port
 
+        is_always_active = aspect.is_always_active
+
         def through(passing: T) -> None:
+            doing = name
             try:
+                if not is_always_active:
+                    doing = "is_due()"
+                    if not (aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)):
+                        doing = "pass_by()"
+                        aspect.pass_by(passing, point)
+                        return
+                    doing = name
                 act(passing, point)
-            except (ActorError, LoopError):  # of what comes behind it
-                raise
-            except Exception as error:
-                raise self._error(woven, f"{name} at {path}", error) from error
-
-        if aspect.is_always_active:
-            return through
-
-        def through_if_active(passing: T) -> None:
-            doing = "is_due()"
-            try:
-                if aspect.is_due(point.tag.time) and self._holds(woven, aspect, point):
-                    through(passing)
-                else:
-                    doing = "pass_by()"
-                    aspect.pass_by(passing, point)
             except (ActorError, LoopError):  # of what comes behind it
                 raise
             except Exception as error:
                 raise self._error(woven, f"{doing} at {path}", error) from error
 
-        return through_if_active
+        return through
 
     def _answer(self, woven: WovenAspect, request: Any) -> None:
         """Let a token go on that has come through an aspect's composite."""
