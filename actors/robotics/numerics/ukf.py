@@ -17,8 +17,8 @@ RANGE = 1
 _KIND = 0
 _OBSERVER = 1  # x, y
 _VALUE = 3  # x, y from there to the target, or the range and anything
-_ALONG = 5  # standard deviations along the line of sight
-_ACROSS = 6  # and across it; no part of a range
+_ALONG = 5  # standard deviation along the line of sight
+_ACROSS = 6  # standard deviation across the line of sight; no part of a range
 
 
 @inner
