@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from .combining import present, rounds
-from .core import Actor, InputPort, OutputPort, Parameter, elementary, to_seconds
+from .core import Actor, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
 
 
 class Counter(Actor):
@@ -14,9 +11,9 @@ class Counter(Actor):
     The number is sent once per tag at which it was counted.  Ptolemy: ``Counter``.
     """
 
-    increment: InputPort[Any] = InputPort(Any, multi=True, required=False, doc="each token counts one up")
-    decrement: InputPort[Any] = InputPort(Any, multi=True, required=False, doc="each token counts one down")
-    reset: InputPort[Any] = InputPort(Any, required=False, doc="sets the number back, before the tag is counted")
+    increment = InputPort(multi=True, required=False, doc="each token counts one up")
+    decrement = InputPort(multi=True, required=False, doc="each token counts one down")
+    reset = InputPort(required=False, doc="sets the number back, before the tag is counted")
     output = OutputPort(int, doc="the number")
 
     initial = Parameter(int, 0, doc="the number at the start and after a reset")
@@ -38,7 +35,7 @@ class Accumulator(Actor):
     """
 
     input = InputPort(float, multi=True, doc="what is added up")
-    reset: InputPort[Any] = InputPort(Any, required=False, doc="sets the sum back, before the tag is added")
+    reset = InputPort(required=False, doc="sets the sum back, before the tag is added")
     output = OutputPort(float, doc="the sum; sent for each round of tokens, and at a reset")
 
     initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
@@ -67,7 +64,7 @@ class Integrator(Actor):
     """
 
     input = InputPort(float, doc="the signal")
-    trigger: InputPort[Any] = InputPort(Any, required=False, doc="asks for the integral at other times")
+    trigger = InputPort(required=False, doc="asks for the integral at other times")
     output = OutputPort(float, doc="the integral up to now")
 
     method = Parameter(str, "hold", choices=("hold", "trapezoid"), doc="what the signal does between two tokens")

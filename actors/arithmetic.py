@@ -10,8 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from .combining import present, rounds
-from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter, elementary
+from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter, elementary, present, rounds
 
 
 class AddSubtract(Actor):

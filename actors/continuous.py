@@ -22,7 +22,7 @@ from .core import (
 from .expression import Formula, FormulaParameter, operand
 from .expression.enclosure import bounds_of
 from .integration import STEPPERS, Bounds, State
-from .segment import Crossing, Equations, Guard, Segment, sign_of
+from .solution import Crossing, Equations, Guard, Solution, sign_of
 
 _MAX_STEPS = 10_000
 _AHEAD = 64  # parts of a step that are searched for crossings at once
@@ -70,7 +70,7 @@ class ODE(Actor):
 
     is_source: ClassVar[bool] = True
 
-    trigger: InputPort[Any] = InputPort(Any, required=False, doc="asks for the states")
+    trigger = InputPort(required=False, doc="asks for the states")
 
     initial = MappingParameter(Parameter(float), doc="the states and their values at the start")
     derivatives = MappingParameter(FormulaParameter(), doc="how fast each state changes, per s")
@@ -87,15 +87,14 @@ class ODE(Actor):
     relative_tolerance = Parameter(
         float, 1e-10, unit="1", min=1e-13, max=0.1, doc="error per step, relative to each state"
     )
-    absolute_tolerance = Parameter(float, 1e-12, min=1e-300, doc="error per step, added to the relative one")
+    absolute_tolerance = Parameter(float, 1e-12, above=0, doc="error per step, added to the relative one")
     max_step = Parameter(
-        float, None, unit="s", min=1e-9, max=1e6,
+        float, None, unit="s", above=0, max=1e6,
         doc="longest step; if left out, 1 s, or what the tolerances allow where nothing can hide in it",
     )  # fmt: skip
-    min_interval = Parameter(float, 1e-6, unit="s", min=1e-9, doc="what crossings of one kind keep between them")
+    min_interval = Parameter(float, 1e-6, unit="s", above=0, doc="what crossings of one kind keep between them")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self._states = tuple(self.initial)
         self._guards: list[Guard] = []
         if not self._states:
@@ -123,7 +122,7 @@ class ODE(Actor):
                 if name in self.crossings:
                     raise ParameterError(f"{formula} asks for {name!r}, which is a crossing and has no value")
                 if name not in ("time", *ports):
-                    ports[name] = InputPort(Any, doc="an input, held from token to token")
+                    ports[name] = InputPort(doc="an input, held from token to token")
         return ports
 
     # -- the run --------------------------------------------------------------------------------------------------
@@ -140,7 +139,7 @@ class ODE(Actor):
             for (name, formula), way in zip(self.crossings.items(), ways, strict=True)
         ]
         self._begin(self.tag.time, 0.0, [self.initial[name] for name in self._states])
-        for guard, side in zip(self._guards, self._signs(0.0, self._segment.at(0.0)), strict=True):
+        for guard, side in zip(self._guards, self._signs(0.0, self._solution.at(0.0)), strict=True):
             guard.side = side
         if self._guards:
             self.wake_in(0)
@@ -148,7 +147,7 @@ class ODE(Actor):
     def _begin(self, time: int, fraction: float, state: State) -> None:
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s: no rounding adds up over crossings."""
         self._time, self._fraction = time, fraction
-        self._segment = Segment(
+        self._solution = Solution(
             Equations(self._rates, self._bounds_of_rates),
             state,
             self._guards,
@@ -158,11 +157,11 @@ class ODE(Actor):
         )
 
     def _at(self, at: float) -> float:
-        """The time in the model at a time of the present segment."""
+        """The time in the model at a time of the present solution."""
         return self._time / NANOSECONDS_PER_SECOND + (self._fraction + at)
 
     def _names(self, at: float, state: State) -> dict[str, Any]:
-        """What expressions know at a time of the present segment."""
+        """What expressions know at a time of the present solution."""
         names = {**self._held, **dict(zip(self._states, state, strict=True))}
         names["time"] = self._at(at)
         return names
@@ -183,17 +182,17 @@ class ODE(Actor):
         return [bounds_of(self.derivatives[name], known) for name in self._states]
 
     def _known_bounds(self, left: float, right: float, states: Sequence[Bounds]) -> dict[str, Bounds]:
-        """What the names in expressions lie between, from one time of the present segment to another."""
+        """What the names in expressions lie between, from one time of the present solution to another."""
         numbers = {name: (value, value) for name, value in self._held.items() if isinstance(value, (int, float))}
         return {**numbers, **dict(zip(self._states, states, strict=True)), "time": (self._at(left), self._at(right))}
 
     def fire(self) -> None:
         now = self._elapsed()
         if self._guards:
-            self._segment.search(now)
+            self._solution.search(now)
         crossed = dict(self._jumps)
         self._jumps.clear()
-        crossing = self._segment.crossing
+        crossing = self._solution.crossing
         if crossing is not None and self._moment(crossing.time) <= self.tag.time:
             crossed = {**crossed, **crossing.sides}
             self._cross(crossing, crossed)
@@ -201,7 +200,7 @@ class ODE(Actor):
             self._cross(Crossing(now, crossed), crossed)
         if crossed or self.trigger.present:
             at = 0.0 if crossed else now
-            for name, value in zip(self._states, self._segment.at(at), strict=True):
+            for name, value in zip(self._states, self._solution.at(at), strict=True):
                 self.outputs[name].send(value)
         self._take_inputs()
         self._plan()
@@ -211,13 +210,13 @@ class ODE(Actor):
         return max(0.0, (self.tag.time - self._time) / NANOSECONDS_PER_SECOND - self._fraction)
 
     def _moment(self, at: float) -> int:
-        """The nanosecond that is nearest to a time of the present segment."""
+        """The nanosecond that is nearest to a time of the present solution."""
         return self._time + round((self._fraction + at) * NANOSECONDS_PER_SECOND)
 
     def _cross(self, crossing: Crossing, crossed: Mapping[int, int]) -> None:
         """Send the crossings, reset what they reset, and begin a new solution."""
-        at, state = crossing.time, self._segment.at(crossing.time)
-        self._segment.rewind(at)
+        at, state = crossing.time, self._solution.at(crossing.time)
+        self._solution.rewind(at)
         before, names = self._signs(at, state), self._names(at, state)
         after = dict(zip(self._states, state, strict=True))
         for number, name in enumerate(self.crossings):
@@ -256,8 +255,8 @@ class ODE(Actor):
         if not changed:
             return
         now = self._elapsed()
-        state = self._segment.at(now)
-        self._segment.rewind(now)
+        state = self._solution.at(now)
+        self._solution.rewind(now)
         before = self._signs(now, state)
         self._held.update(changed)
         self._begin(self.tag.time, 0.0, state)
@@ -287,16 +286,16 @@ class ODE(Actor):
             return
         if not self._guards:
             return
-        segment, parts = self._segment, 0
-        while segment.crossing is None and self._moment(segment.searched) <= self.tag.time:
-            segment.look()
+        solution, parts = self._solution, 0
+        while solution.crossing is None and self._moment(solution.searched) <= self.tag.time:
+            solution.look()
             parts += 1
             if parts > _MAX_STEPS:
                 raise EpicycleError(f"the solver takes more than {_MAX_STEPS:,} steps within a nanosecond")
-        while segment.crossing is None and segment.searched < segment.end and parts < _AHEAD:
-            segment.look()
+        while solution.crossing is None and solution.searched < solution.end and parts < _AHEAD:
+            solution.look()
             parts += 1
-        moment = self._moment(segment.searched if segment.crossing is None else segment.crossing.time)
+        moment = self._moment(solution.searched if solution.crossing is None else solution.crossing.time)
         self._wake = self.context.wake(self, moment)
 
 

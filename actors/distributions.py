@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Configurable, Parameter, ParameterError, Stream, array_parameter, counted
-from .core.laws import cumulated, weighted
-from .tokens import token_type
+from .core import Configurable, EpicycleError, Parameter, ParameterError, Stream, array_parameter, counted, token_type
+from .core.choices import cumulated, weighted
 
 
 class Distribution(Configurable):
@@ -21,9 +20,16 @@ class Distribution(Configurable):
         """A value, from the stream given."""
         raise NotImplementedError(f"{type(self).__name__} has no draw()")
 
+    def draw_time(self, random: Stream, what: str = "a time") -> float:
+        """A value that is how long something takes, in s; raises ``EpicycleError`` if it cannot be that."""
+        time = self.draw(random)
+        if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
+            raise EpicycleError(f"{time!r} drawn from {self!r} is not {what} in s, a number >= 0")
+        return float(time)
+
 
 class Constant(Distribution):
-    """Always the same value."""
+    """Always the same value; the actor that sends one is ``Const``."""
 
     value = Parameter(float, doc="the value")
 
@@ -37,8 +43,7 @@ class Uniform(Distribution):
     low = Parameter(float, 0.0, doc="the least number")
     high = Parameter(float, 1.0, doc="the bound above, not drawn itself")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         _check_order("low", self.low, "high", self.high)
 
     def draw(self, random: Stream) -> float:
@@ -77,13 +82,8 @@ class Exponential(Distribution):
 class Gamma(Distribution):
     """The gamma distribution; with a whole ``shape`` the Erlang distribution."""
 
-    shape = Parameter(float, 1.0, unit="1", min=0, doc="the shape k; k = 1 is the exponential distribution")
+    shape = Parameter(float, 1.0, unit="1", above=0, doc="the shape k; k = 1 is the exponential distribution")
     mean = Parameter(float, 1.0, min=0, doc="the mean, shape times scale")
-
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
-        if self.shape == 0:
-            raise ParameterError("Gamma.shape: 0 is not above 0")
 
     def draw(self, random: Stream) -> float:
         return random.gamma(self.shape, self.mean / self.shape)
@@ -96,8 +96,7 @@ class Triangular(Distribution):
     mode = Parameter(float, 0.5, doc="the likeliest number")
     high = Parameter(float, 1.0, doc="the greatest number")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         _check_order("low", self.low, "mode", self.mode)
         _check_order("mode", self.mode, "high", self.high)
 
@@ -124,8 +123,7 @@ class RandomInteger(Distribution):
     low = Parameter(int, 0, doc="the least integer")
     high = Parameter(int, 1, doc="the greatest integer")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         _check_order("low", self.low, "high", self.high)
 
     def draw(self, random: Stream) -> int:
@@ -140,8 +138,7 @@ class Choice(Distribution):
         (None,), None, unit="1", min=0, doc="how likely each is, relative to the others; all alike if left out"
     )
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if not self.values:
             raise ParameterError("Choice.values: the list is empty, there is nothing to choose from")
         self.token_type = token_type(self.values)

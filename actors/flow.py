@@ -1,4 +1,4 @@
-"""Actors that hand tokens on: Merge, Router, Switch, BooleanSwitch, Select, Repeat."""
+"""Where tokens go and when: Merge, Router, Switch, BooleanSwitch, Select, Repeat, Sampler, MostRecent, Synchronizer."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class Merge(Actor):
     ``discard`` the others are lost.  Ptolemy: ``Merge``.
     """
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="the streams")
-    output: OutputPort[Any] = OutputPort(Any, doc="one token at a time")
+    input = InputPort(multi=True, doc="the streams")
+    output = OutputPort(doc="one token at a time")
 
     discard = Parameter(bool, False, doc="whether all but the first token of a tag are lost")
 
@@ -38,15 +38,21 @@ class Merge(Actor):
 
 
 class Router(Actor):
-    """Sends each token to one channel of its output: to each in turn, or to one at random.
+    """Sends each token to one channel of its output: round robin, or at random.
 
     Ptolemy: ``Distributor``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
-    output: OutputPort[Any] = OutputPort(Any, multi=True, doc="a channel for each connection, in their order")
+    input = InputPort(doc="what is handed on")
+    output = OutputPort(multi=True, doc="a channel for each connection, in their order")
 
-    policy = Parameter(str, "in turn", choices=("in turn", "random"), doc="how the channel is chosen")
+    policy = Parameter(
+        str,
+        "round robin",
+        choices=("round robin", "random"),
+        renamed={"in turn": "round robin"},
+        doc="how the channel is chosen",
+    )
 
     def initialize(self) -> None:
         self._next = 0
@@ -67,9 +73,9 @@ class Switch(Actor):
     Ptolemy: ``Switch``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
+    input = InputPort(doc="what is handed on")
     control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
-    output: OutputPort[Any] = OutputPort(Any, multi=True, doc="a channel for each connection, in their order")
+    output = OutputPort(multi=True, doc="a channel for each connection, in their order")
 
     def initialize(self) -> None:
         self._channel = 0
@@ -87,10 +93,10 @@ class BooleanSwitch(Actor):
     Ptolemy: ``BooleanSwitch``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is handed on")
+    input = InputPort(doc="what is handed on")
     control = InputPort(bool, doc="where to; false until a token comes")
-    true_output: OutputPort[Any] = OutputPort(Any, doc="the tokens that come while control is true")
-    false_output: OutputPort[Any] = OutputPort(Any, doc="the tokens that come while control is false")
+    true_output = OutputPort(doc="the tokens that come while control is true")
+    false_output = OutputPort(doc="the tokens that come while control is false")
 
     def initialize(self) -> None:
         self._control = False
@@ -105,12 +111,13 @@ class BooleanSwitch(Actor):
 class Select(Actor):
     """Hands on the tokens of the channel that the latest ``control`` token names; those of the others are lost.
 
-    Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1); its ``Select`` keeps the others.
+    Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1).  Its ``Select`` is another actor: there the
+    tokens of the other channels wait until they are chosen.
     """
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="a channel for each connection, in their order")
+    input = InputPort(multi=True, doc="a channel for each connection, in their order")
     control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
-    output: OutputPort[Any] = OutputPort(Any, doc="the tokens of the channel chosen")
+    output = OutputPort(doc="the tokens of the channel chosen")
 
     def initialize(self) -> None:
         self._channel = 0
@@ -128,8 +135,8 @@ class Repeat(Actor):
     Ptolemy: ``Repeat``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is repeated")
-    output: OutputPort[Any] = OutputPort(Any, doc="each token, as often as told")
+    input = InputPort(doc="what is repeated")
+    output = OutputPort(doc="each token, as often as told")
 
     times = PortParameter(int, 2, min=0, doc="how often each token is sent")
 
@@ -137,6 +144,85 @@ class Repeat(Actor):
         for token in self.input.tokens:
             for _ in range(self.times):
                 self.output.send(token)
+
+
+class _ByChannel(Actor):
+    """What these actors share: an input and an output with channels that belong together."""
+
+    input = InputPort(multi=True, doc="the streams")
+    output = OutputPort(multi=True, doc="channel by channel what the input gets")
+
+    def initialize(self) -> None:
+        wanted, found = self.input.width, self.output.width
+        if wanted > 1 and found not in (0, wanted):
+            raise PortError(
+                f"{self.input.path} has {wanted} channels and {self.output.path} has {found}; they must have "
+                "equally many, for each channel of the input leads to one of the output"
+            )
+
+    def _send(self, token: Any, channel: int) -> None:
+        if self.input.width == 1 or self.output.width == 0:
+            self.output.send(token)
+        else:
+            self.output.send(token, channel)
+
+
+class Sampler(_ByChannel):
+    """Hands on what comes at the same tag as a trigger; all other tokens are lost.
+
+    Ptolemy: ``Sampler``.
+    """
+
+    trigger = InputPort(doc="when to hand on")
+
+    def fire(self) -> None:
+        if self.trigger.present:
+            for channel, tokens in enumerate(self.input.by_channel()):
+                for token in tokens:
+                    self._send(token, channel)
+
+
+class MostRecent(_ByChannel):
+    """Sends the latest token of each channel whenever it is triggered, as often as that happens.
+
+    A channel on which no token has come yet sends ``initial``, or nothing if that is not given.
+    Ptolemy: ``MostRecent``.
+    """
+
+    trigger = InputPort(doc="when to send")
+
+    initial: Parameter[Any] = Parameter(object, None, doc="what is sent for a channel before its first token")
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._latest: list[Any] = [self.initial] * self.input.width
+
+    def fire(self) -> None:
+        for channel, tokens in enumerate(self.input.by_channel()):
+            if tokens:
+                self._latest[channel] = tokens[-1]
+        for _ in self.trigger.tokens:
+            for channel, token in enumerate(self._latest):
+                if token is not None:
+                    self._send(token, channel)
+
+
+class Synchronizer(_ByChannel):
+    """Waits until there is a token on every channel, and then sends one of each at the same tag.
+
+    Tokens wait in the order of their arrival.  Ptolemy: ``Synchronizer``.
+    """
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+
+    def fire(self) -> None:
+        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
+            queue.extend(tokens)
+        while all(self._waiting):
+            for channel, queue in enumerate(self._waiting):
+                self._send(queue.popleft(), channel)
 
 
 def _channel(number: int, control: InputPort[Any], width: int, name: str) -> int:

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from .combining import Latest
 from .core import (
     Actor,
     EpicycleError,
     InputPort,
+    Latest,
     OutputPort,
     Parameter,
     ParameterError,
@@ -25,9 +25,9 @@ from .core import (
     counted,
     declared_parameters,
     did_you_mean,
+    token_type,
 )
 from .expression import FormulaParameter, operand
-from .tokens import token_type
 
 FUNCTION_GROUP = "epicycle.functions"
 _KINDS: dict[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
@@ -56,14 +56,13 @@ class Expression(Actor):
     )
     hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self._kind = self.gives or ("truth value" if self.expression.is_condition else "number")
         self.output.type = _KINDS[self._kind]
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         names = [name for name in self.expression.names if name != "time"]
-        return {name: InputPort(Any, doc="a name of the expression") for name in names}
+        return {name: InputPort(doc="a name of the expression") for name in names}
 
     def initialize(self) -> None:
         self._latest = Latest(list(self.inputs.values()), hold=self.hold)
@@ -134,7 +133,7 @@ class Function(Actor):
     ``load_model("m.yaml", types=[Function.knowing(magnitude)])``.
     """
 
-    output: OutputPort[Any] = OutputPort(Any, doc="what the function returns")
+    output = OutputPort(doc="what the function returns")
 
     function = FunctionParameter({}, doc="which function, by its name or as package.module:name")
     hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
@@ -150,8 +149,7 @@ class Function(Actor):
         parameter = FunctionParameter(given, doc=before.doc)
         return type(cls.__name__, (cls,), {"function": parameter, "__doc__": cls.__doc__, "__module__": cls.__module__})
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self.output.type = _port_type(_hints(self.function).get("return"))
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
@@ -208,7 +206,7 @@ class LookupTable(Actor):
     """
 
     input = InputPort(float, doc="an index, or an argument if 'at' is given")
-    output: OutputPort[Any] = OutputPort(Any, doc="the value that belongs to it")
+    output = OutputPort(doc="the value that belongs to it")
 
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="the table")
     at: Parameter[Any] = array_parameter((None,), None, doc="the arguments of the values, ascending")
@@ -216,8 +214,7 @@ class LookupTable(Actor):
         str, "error", choices=("error", "nearest", "nothing"), doc="what is sent for an input beyond the table's ends"
     )
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if not self.values:
             raise ParameterError("values: the table is empty")
         self.output.type = token_type(self.values)

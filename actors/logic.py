@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from .combining import ABSENT, Latest, present, rounds
-from .core import Actor, InputPort, OutputPort, Parameter
+from .core import ABSENT, Actor, InputPort, Latest, OutputPort, Parameter, present, rounds
 
 GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
     "and": all,

@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, ParameterError, PortParameter, to_nanoseconds, to_seconds
+from .core import (
+    Actor,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    Pending,
+    PortParameter,
+    to_nanoseconds,
+    to_seconds,
+)
 from .distributions import Distribution
-from .pending import Pending
 
 
 class Queue(Actor):
@@ -16,11 +25,11 @@ class Queue(Actor):
     At one tag tokens come in before triggers let them out.  Ptolemy: ``Queue``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what comes in")
-    trigger: InputPort[Any] = InputPort(Any, doc="lets the first token go; does nothing if there is none")
-    output: OutputPort[Any] = OutputPort(Any, doc="the tokens in the order in which they came")
+    input = InputPort(doc="what comes in")
+    trigger = InputPort(doc="lets the first token go; does nothing if there is none")
+    output = OutputPort(doc="the tokens in the order in which they came")
     size = OutputPort(int, doc="how many tokens are in it, whenever that changes")
-    rejected: OutputPort[Any] = OutputPort(Any, depends_on=("input",), doc="the tokens that found it full")
+    rejected = OutputPort(depends_on=("input",), doc="the tokens that found it full")
 
     capacity: Parameter[int | None] = Parameter(
         int, None, min=1, doc="how many tokens it holds; any number if left out"
@@ -56,13 +65,11 @@ class Server(Actor):
     Ptolemy: ``Server``, which has a single server and no capacity in Kendall's sense.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is to be served")
-    output: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="each token when its service is over")
+    input = InputPort(doc="what is to be served")
+    output = OutputPort(depends_on=(), doc="each token when its service is over")
     # What comes in is dealt with when its service time is known, so what is said of it waits for both.
     size = OutputPort(int, depends_on=("input", "service_time"), doc="how many are in it, whenever that changes")
-    rejected: OutputPort[Any] = OutputPort(
-        Any, depends_on=("input", "service_time"), doc="the tokens that found no place"
-    )
+    rejected = OutputPort(depends_on=("input", "service_time"), doc="the tokens that found no place")
 
     service_time = PortParameter(float, 1.0, unit="s", min=0, doc="how long a service takes")
     distribution: Parameter[Distribution | None] = Parameter(
@@ -75,8 +82,7 @@ class Server(Actor):
         int, None, min=1, doc="how many may wait and be served in all; any number if left out"
     )
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if self.capacity is not None and (self.servers is None or self.capacity < self.servers):
             servers = "any number of" if self.servers is None else self.servers
             raise ParameterError(
@@ -117,7 +123,4 @@ class Server(Actor):
     def _draw(self) -> float:
         if self.distribution is None:
             return self.service_time
-        time = self.distribution.draw(self.random)
-        if not isinstance(time, (int, float)) or not time >= 0:
-            raise ValueError(f"{time!r} drawn from {self.distribution!r} is not a service time in s, a number >= 0")
-        return float(time)
+        return self.distribution.draw_time(self.random, "a service time")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from bisect import bisect_left
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from .core import (
     Actor,
@@ -14,6 +13,7 @@ from .core import (
     OutputPort,
     Parameter,
     ParameterError,
+    did_you_mean,
     read_table,
     texts_parameter,
     to_nanoseconds,
@@ -32,16 +32,13 @@ class Replay(Actor):
     lies in or below the folder of the YAML file that names it.
     """
 
-    is_source: ClassVar[bool] = True
-
-    output: OutputPort[Any] = OutputPort(Any, doc="the value of a row, or a mapping of its values")
+    output = OutputPort(doc="the value of a row, or a mapping of its values")
 
     file = Parameter(Path, doc="a .csv file with a header line, or a .parquet file")
     time = Parameter(str, "time", doc="the column of times, in s, ascending from 0 on")
     columns: Parameter[Any] = texts_parameter(None, doc="the columns to send; all but the time if left out")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if self.file.suffix.lower() not in (".csv", ".parquet"):
             raise ParameterError(f"file: {self.file.name!r} ends neither in .csv nor in .parquet")
 
@@ -74,9 +71,8 @@ class Replay(Actor):
         columns = [name for name in names if name != self.time] if self.columns is None else list(self.columns)
         for name in (self.time, *columns):
             if name not in names:
-                near = difflib.get_close_matches(name, names, n=1)
-                hint = f", did you mean {near[0]!r}?" if near else ""
-                raise self._error(f"there is no column {name!r}{hint}; columns: {', '.join(names)}")
+                guess = did_you_mean(name, names)
+                raise self._error(f"there is no column {name!r}{guess}; columns: {', '.join(names)}")
         if not columns:
             raise self._error(f"there is no column of values beside {self.time!r}")
         times = self._check_times(table.column(self.time).to_pylist())

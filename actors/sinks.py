@@ -26,25 +26,21 @@ _DISPLAY = logging.getLogger("epicycle.display")
 
 
 class Recorder(Actor):
-    """Keeps what comes, for Python to read after the run: ``model.graph.actors["path"].tokens``.
+    """Keeps what comes, for Python to read after the run: ``simulation["path"].tokens``.
 
     In a model file ``run: {record: [port]}`` does the same without an actor.  Ptolemy: ``Recorder``.
     """
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="what is kept")
+    input = InputPort(multi=True, doc="what is kept")
 
     capacity: Parameter[int | None] = Parameter(
         int, None, min=0, doc="how many of the latest tokens are kept; all if left out"
     )
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def initialize(self) -> None:
         self.tags: list[Tag] = []
         self.tokens: list[Any] = []
         self.seen = 0
-
-    def initialize(self) -> None:
-        self.tags, self.tokens, self.seen = [], [], 0
 
     def fire(self) -> None:
         tokens = self.input.tokens
@@ -73,7 +69,7 @@ class Display(Actor):
     Ptolemy: ``Display``, ``Discard`` with a face.
     """
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="what is shown")
+    input = InputPort(multi=True, doc="what is shown")
 
     title = Parameter(str, "", doc="what stands in the line in place of the path")
 
@@ -94,19 +90,17 @@ class Histogram(Actor):
     """
 
     input = InputPort(float, multi=True, doc="what is counted")
-    trigger: InputPort[Any] = InputPort(Any, required=False, doc="asks for the counts")
+    trigger = InputPort(required=False, doc="asks for the counts")
     output: OutputPort[Any] = OutputPort(list[int], doc="the counts of the bins so far, for each trigger")
 
     low = Parameter(float, doc="where the first bin begins")
     high = Parameter(float, doc="where the last bin ends")
     bins = Parameter(int, 20, min=1, max=1_000_000, doc="how many bins there are")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if not -math.inf < self.low < self.high < math.inf:
             raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must be below high")
         self.edges: NDArray[np.float64] = np.linspace(self.low, self.high, self.bins + 1)
-        self.initialize()
 
     def initialize(self) -> None:
         self.counts: NDArray[np.int64] = np.zeros(self.bins, dtype=np.int64)
@@ -137,7 +131,7 @@ class Test(Actor):
 
     __test__: ClassVar[bool] = False  # for pytest, which would take it for a class of tests
 
-    input: InputPort[Any] = InputPort(Any, multi=True, doc="what is compared")
+    input = InputPort(multi=True, doc="what is compared")
 
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is expected, in order")
     times: Parameter[Any] = array_parameter(
@@ -146,8 +140,7 @@ class Test(Actor):
     tolerance = Parameter(float, 1e-9, min=0, doc="by how much a number, or a time in s, may differ")
     complete = Parameter(bool, True, doc="whether all values must have come when the run ends")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if self.times is not None and len(self.times) != len(self.values):
             raise ParameterError(f"{counted(len(self.times), 'time')} for {counted(len(self.values), 'value')}")
 

@@ -23,8 +23,7 @@ class _Window(Actor):
         float, None, unit="s", min=0, doc="how old a token may be to count; a token of exactly this age still does"
     )
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         if self.size is None and self.span is None:
             raise ParameterError("give the window: 'size', a number of tokens, or 'span', a time, or both")
 

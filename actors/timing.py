@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, PortParameter, Tag, Wake, to_seconds
-from .pending import Pending
-from .tokens import token_type
+from .core import Actor, InputPort, OutputPort, Parameter, Pending, PortParameter, Tag, Wake, to_seconds, token_type
 
 
 class TimeDelay(Actor):
@@ -16,8 +14,8 @@ class TimeDelay(Actor):
     on the inputs at once: the actor may stand in a loop.  Ptolemy: ``TimeDelay``, ``TimedDelay``, ``VariableDelay``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="what is delayed")
-    output: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="each token after its delay")
+    input = InputPort(doc="what is delayed")
+    output = OutputPort(depends_on=(), doc="each token after its delay")
 
     delay = PortParameter(float, 1.0, unit="s", min=0, doc="how long each token is held")
 
@@ -35,12 +33,11 @@ class _Timing(Actor):
     """What timers share: they tell that a time is over by sending a value."""
 
     input = InputPort(float, doc="after how many s to send")
-    output: OutputPort[Any] = OutputPort(Any, depends_on=(), doc="the value, when the time is over")
+    output = OutputPort(depends_on=(), doc="the value, when the time is over")
 
     value: Parameter[Any] = Parameter(object, True, doc="what is sent")
 
-    def __init__(self, path: str, **parameters: object) -> None:
-        super().__init__(path, **parameters)
+    def check(self) -> None:
         self.output.type = token_type([self.value])
 
 
@@ -88,7 +85,7 @@ class TimeGap(Actor):
     Ptolemy: ``TimeGap``.
     """
 
-    input: InputPort[Any] = InputPort(Any, doc="the tokens between which time is taken")
+    input = InputPort(doc="the tokens between which time is taken")
     output = OutputPort(float, doc="time since the token before, in s")
 
     def initialize(self) -> None:

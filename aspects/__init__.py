@@ -2,22 +2,44 @@
 
 from .clock import ClockAspect, ClockDrift, ClockOffset
 from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
-from .composite import CompositeAspect, CompositeExecutionAspect, FiringRequest, Request
 from .core import (
+    STAMP,
+    ActorPoint,
     Aspect,
+    AspectContext,
+    ByActorParameter,
     CommunicationAspect,
+    CompositeAspect,
+    CompositeExecutionAspect,
+    Decoration,
+    Duration,
+    DurationParameter,
+    ExecutionAspect,
+    FieldError,
+    FiringRequest,
+    FiringTime,
+    FiringTimeParameter,
+    GroupsParameter,
+    Job,
     JoinPoint,
+    JoinPointAspect,
+    LossAspect,
     MeasurementAspect,
     ObservationAspect,
+    PortAspect,
+    PortsParameter,
+    RandomLoss,
     Reading,
+    Request,
     Selection,
-    Weaver,
+    SelectionParameter,
+    Unit,
+    aspect_stream,
+    class_decorations,
+    decorations,
+    time_needed,
 )
-from .crash import CrashRestart
-from .decoration import Decoration, class_decorations, decorations
-from .duration import Duration, DurationParameter, FiringTime, FiringTimeParameter, time_needed
-from .execution import ActorPoint, ExecutionAspect, Job, Unit
-from .firing import ExecutionTime, SkipFiring
+from .execution import CrashRestart, ExecutionTime, Processor, SkipFiring
 from .measurement import (
     Alteration,
     Bias,
@@ -30,19 +52,16 @@ from .measurement import (
     StuckAt,
     Transform,
 )
-from .media import Bus, Medium
+from .media import Bus, Medium, RadioMedium
 from .observation import Assert, Count, InvariantError, Probe
-from .processor import Processor
-from .radio import RadioMedium
-from .selection import ByActorParameter, GroupsParameter, PortsParameter, SelectionParameter
 from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
-from .tokens import STAMP, FieldError
 
 __all__ = [
     "STAMP",
     "ActorPoint",
     "Alteration",
     "Aspect",
+    "AspectContext",
     "Assert",
     "Bias",
     "Bus",
@@ -72,7 +91,9 @@ __all__ = [
     "InvariantError",
     "Job",
     "JoinPoint",
+    "JoinPointAspect",
     "Latency",
+    "LossAspect",
     "MeasurementAspect",
     "MeasurementFailure",
     "Medium",
@@ -83,11 +104,13 @@ __all__ = [
     "Outage",
     "Outlier",
     "PacketLoss",
+    "PortAspect",
     "PortsParameter",
     "Probe",
     "Processor",
     "Quantise",
     "RadioMedium",
+    "RandomLoss",
     "RangeLoss",
     "Reading",
     "Reorder",
@@ -101,7 +124,7 @@ __all__ = [
     "Throttle",
     "Transform",
     "Unit",
-    "Weaver",
+    "aspect_stream",
     "class_decorations",
     "decorations",
     "time_needed",

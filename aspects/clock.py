@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from fractions import Fraction
 from typing import ClassVar
 
-from epicycle.actors import EpicycleError, Parameter, Stream, to_nanoseconds
+from epicycle.actors import Parameter, Stream, to_nanoseconds
 
 from .core import Aspect
 
 
-class ClockAspect(Aspect, ABC):
+class ClockAspect(Aspect):
     """Base of the aspects that change what actors see as the time: write ``error``.
 
     ``now`` and the tags that an actor sees, its wake-ups and the waits of a process go by its clock.  The model around
@@ -19,13 +19,10 @@ class ClockAspect(Aspect, ABC):
     one clock: all the actors of a composite.  Several errors of one clock add up.
     """
 
-    stands_at: ClassVar[frozenset[str]] = frozenset({"actor"})
-
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
-        given = {"from": self.from_ or None, "until": self.until, "every": self.every, "when": self.when}
-        if windows := [name for name, value in given.items() if value is not None]:
-            raise EpicycleError(f"a clock is wrong from the beginning of a run to its end: leave out {windows[0]!r}")
+    refused: ClassVar[dict[str, str]] = {
+        name: f"a clock is wrong from the beginning of a run to its end: leave out {name!r}"
+        for name in ("from", "until", "every", "when")
+    }
 
     @abstractmethod
     def error(self, random: Stream) -> tuple[int, Fraction]:

@@ -7,36 +7,29 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Parameter, Stream, texts_parameter
+from epicycle.actors import Exponential, Normal, Parameter, Stream, Uniform, texts_parameter
 
-from .core import CommunicationAspect, JoinPoint
-from .loss import is_bad, loses
-from .tokens import altered
+from .core import CommunicationAspect, JoinPoint, LawParameter, RandomLoss, altered, is_bad, law
 
-UNIFORM, NORMAL, EXPONENTIAL = "uniform", "normal", "exponential"
+LAWS = {"uniform": Uniform(low=-1.0), "normal": Normal(), "exponential": Exponential()}
 GAUSSIAN, BIT_FLIP = "gaussian", "bit_flip"
 DROP, DELAY = "drop", "delay"
 
 
-class PacketLoss(CommunicationAspect):
+class PacketLoss(RandomLoss, CommunicationAspect):
     """Drops each message with a fixed probability, independently per receiver and message (Bernoulli).
 
+    It is to messages what ``MeasurementFailure`` is to measurements; for bursts of losses, see ``GilbertElliott``.
     Event: ``dropped``.  Paper: the communication error of the disturbance level, section III.A.
     """
 
-    events: ClassVar[tuple[str, ...]] = ("dropped",)
-
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is lost")
-    spare_first = Parameter(bool, False, doc="messages of the first tag at which any arrives always pass")
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        if loses(point, self.probability, self.spare_first):
-            point.act("dropped", token)
-        else:
-            point.forward(token)
+    def draw(self, point: JoinPoint) -> bool:
+        return bool(point.random.random() < self.probability)
 
 
-class GilbertElliott(CommunicationAspect):
+class GilbertElliott(RandomLoss, CommunicationAspect):
     """Drops messages in bursts: a channel that is good or bad, and changes between the two from message to message.
 
     In the stationary law the channel is bad with probability p / (p + r); it stays bad for 1 / r messages in the mean
@@ -44,27 +37,21 @@ class GilbertElliott(CommunicationAspect):
     ``r: 0.25, p: 0.0833``.  Event: ``dropped``.  Source: Gilbert, Bell Syst. Tech. J. 39, 1960; Elliott, 42, 1963.
     """
 
-    events: ClassVar[tuple[str, ...]] = ("dropped",)
-
     p = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a good channel turns bad, per message")
     r = Parameter(float, 1.0, min=0.0, max=1.0, unit="1", doc="probability that a bad channel recovers, per message")
     loss_bad = Parameter(float, 1.0, min=0.0, max=1.0, unit="1", doc="probability of loss while the channel is bad")
     loss_good = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability of loss while it is good")
-    spare_first = Parameter(bool, False, doc="messages of the first tag at which any arrives always pass")
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        bad = is_bad(point, self.p, self.r)
-        if loses(point, self.loss_bad if bad else self.loss_good, self.spare_first):
-            point.act("dropped", token)
-        else:
-            point.forward(token)
+    def draw(self, point: JoinPoint) -> bool:
+        probability = self.loss_bad if is_bad(point, self.p, self.r) else self.loss_good
+        return bool(point.random.random() < probability)
 
 
 class Latency(CommunicationAspect):
-    """Delays each message by ``delay`` and a random part.
+    """Delays each message by ``delay`` and a random part: ``jitter`` times what is drawn from the distribution.
 
-    uniform: ``delay`` + U(-jitter, jitter); normal: ``delay`` + N(0, jitter^2); both cut off at 0.
-    exponential: ``delay`` + Exp(mean ``jitter``).  One number is drawn for every message.
+    uniform: ``delay`` + U(-jitter, jitter); normal: ``delay`` + N(0, jitter^2); exponential: ``delay`` + Exp(mean
+    ``jitter``); all cut off at 0.  One value is drawn for every message, whatever the jitter.
     Unless ``reordering`` is allowed, a message waits for the one before it.  Event: ``delayed``, with the seconds.
     """
 
@@ -72,17 +59,11 @@ class Latency(CommunicationAspect):
 
     delay = Parameter(float, 0.0, min=0.0, unit="s", doc="fixed part of the delay")
     jitter = Parameter(float, 0.0, min=0.0, unit="s", doc="size of the random part, see the distribution")
-    distribution = Parameter(str, UNIFORM, choices=(UNIFORM, NORMAL, EXPONENTIAL), doc="law of the random part")
+    distribution = LawParameter(LAWS, "uniform", doc="law of the random part, in units of the jitter")
     reordering = Parameter(bool, False, doc="whether a message may overtake an earlier one")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        if self.distribution == UNIFORM:
-            extra = point.random.uniform(-1.0, 1.0)
-        elif self.distribution == NORMAL:
-            extra = point.random.standard_normal()
-        else:
-            extra = point.random.standard_exponential()
-        delay = max(0.0, self.delay + self.jitter * extra)
+        delay = max(0.0, self.delay + self.jitter * law(self.distribution, LAWS).draw(point.random))
         if not self.reordering:
             delay = max(delay, point.memory.get("last", 0.0) - point.now)
             point.memory["last"] = point.now + delay
@@ -184,7 +165,7 @@ class Throttle(CommunicationAspect):
 
     events: ClassVar[tuple[str, ...]] = ("dropped", "delayed")
 
-    rate = Parameter(float, min=1e-9, unit="1/s", doc="messages a second")
+    rate = Parameter(float, above=0, unit="1/s", doc="messages a second")
     burst = Parameter(int, 1, min=1, doc="messages that may pass at once")
     excess = Parameter(str, DROP, choices=(DROP, DELAY), doc="what happens to a message beyond that")
 

@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import EpicycleError, Parameter, texts_parameter
+from epicycle.actors import Distribution, EpicycleError, Normal, Parameter, Stream, Uniform, texts_parameter
 from epicycle.actors.expression import PortFormulaParameter
 
-from .core import JoinPoint, MeasurementAspect
-from .loss import is_bad, loses, spared
-from .tokens import altered, stamped_as
+from .core import JoinPoint, LawParameter, MeasurementAspect, RandomLoss, altered, is_bad, law, stamped_as
 
-NORMAL, UNIFORM, LAPLACE = "normal", "uniform", "laplace"
+
+class _Laplace(Distribution):
+    """Exponential to both sides, with mean 0 and variance 1."""
+
+    def draw(self, random: Stream) -> float:
+        return random.laplace(scale=math.sqrt(0.5))
+
+
+LAWS = {  # with mean 0 and variance 1
+    "normal": Normal(),
+    "uniform": Uniform(low=-math.sqrt(3.0), high=math.sqrt(3.0)),
+    "laplace": _Laplace(),
+}
 Numbers = NDArray[np.float64]
 
 
-class MeasurementFailure(MeasurementAspect):
+class MeasurementFailure(RandomLoss, MeasurementAspect):
     """Suppresses measurements with a fixed probability, before anybody receives them.
 
-    Without ``burst`` each fails independently (Bernoulli).  With it, failures come in runs of that mean length (a
-    Markov chain over the measurements: failing ends with probability r = 1 / burst and begins with
-    p = r * probability / (1 - probability)).
+    Without ``burst`` each fails independently (Bernoulli), as messages are lost by ``PacketLoss``.  With it, failures
+    come in runs of that mean length: a sensor that fails and works like the channel of ``GilbertElliott`` with
+    r = 1 / burst and p = r * probability / (1 - probability).
     Event: ``failed``.  Paper: the sensor error of the disturbance level, section III.A.
     """
 
@@ -35,7 +45,6 @@ class MeasurementFailure(MeasurementAspect):
     burst: Parameter[float | None] = Parameter(
         float, None, unit="1", min=1.0, doc="mean number of failures in a row; none: independent failures"
     )
-    spare_first = Parameter(bool, False, doc="measurements of the first tag always pass")
 
     def __init__(self, **values: object) -> None:
         super().__init__(**values)
@@ -46,20 +55,40 @@ class MeasurementFailure(MeasurementAspect):
                 + ("infinite" if self.probability == 1.0 else f">= {self.probability / (1.0 - self.probability):g}")
             )
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
+    def draw(self, point: JoinPoint) -> bool:
         if self.burst is None:
-            failed = loses(point, self.probability, self.spare_first)
+            return bool(point.random.random() < self.probability)
+        recovers = 1.0 / self.burst
+        return is_bad(point, recovers * self.probability / (1.0 - self.probability), recovers)
+
+
+class StuckAt(MeasurementAspect):
+    """Repeats the last good measurement while the sensor is stuck, with the time of the one that it should be.
+
+    From measurement to measurement a working sensor gets stuck with probability ``p`` and a stuck one comes free with
+    probability ``r``, as the channel of ``GilbertElliott`` turns bad and recovers; the first measurement is always
+    good.  Event: ``replaced``, with the old measurement.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("replaced",)
+
+    p = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability of getting stuck, per measurement")
+    r = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability of coming free, per measurement")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        stuck = point.memory.setdefault("bad", False)
+        if "good" in point.memory:
+            stuck = is_bad(point, self.p, self.r)
+        if stuck:
+            old = stamped_as(point.memory["good"], token)
+            point.act("replaced", token, old)
+            point.forward(old)
         else:
-            recovers = 1.0 / self.burst
-            worsens = recovers * self.probability / (1.0 - self.probability)
-            failed = spared(point, is_bad(point, worsens, recovers), self.spare_first)
-        if failed:
-            point.act("failed", token)
-        else:
+            point.memory["good"] = token
             point.forward(token)
 
 
-class Alteration(MeasurementAspect, ABC):
+class Alteration(MeasurementAspect):
     """Base of the aspects that replace the numbers in a measurement, or a parameter: write ``alter``.
 
     Event: ``replaced``, with the new measurement.  A measurement that stays the same leaves no trace.
@@ -92,23 +121,21 @@ class Alteration(MeasurementAspect, ABC):
 
 
 class Noise(Alteration):
-    """Adds independent random errors of mean 0 and the given standard deviation."""
+    """Adds independent random errors: ``deviation`` times what is drawn from the distribution.
+
+    normal, uniform and laplace are laws with mean 0 and variance 1, so ``deviation`` is the standard deviation.
+    """
 
     deviation = Parameter(float, min=0.0, doc="standard deviation, in the number's own unit")
-    distribution = Parameter(str, NORMAL, choices=(NORMAL, UNIFORM, LAPLACE), doc="law of the error")
+    distribution = LawParameter(LAWS, "normal", doc="law of the error, in units of the deviation")
 
     def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
-        if self.distribution == NORMAL:
-            errors = point.random.normal(size=numbers.shape)
-        elif self.distribution == UNIFORM:
-            errors = point.random.uniform(-math.sqrt(3.0), math.sqrt(3.0), numbers.shape)
-        else:
-            errors = point.random.laplace(scale=math.sqrt(0.5), size=numbers.shape)
-        return numbers + self.deviation * errors
+        errors = law(self.distribution, LAWS)
+        return numbers + self.deviation * np.array([errors.draw(point.random) for _ in numbers])
 
 
 class Bias(Alteration):
-    """Adds a constant error."""
+    """Adds a constant error: a ``Transform`` to value + ``by``."""
 
     by = Parameter(float, doc="what is added to each number, in its own unit")
 
@@ -200,28 +227,3 @@ class Saturate(Alteration):
 
     def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
         return np.clip(numbers, self.low, self.high)
-
-
-class StuckAt(MeasurementAspect):
-    """Repeats the last good measurement while the sensor is stuck, with the time of the one that it should be.
-
-    From measurement to measurement a working sensor gets stuck with probability ``p`` and a stuck one comes free with
-    probability ``r``; the first measurement is always good.  Event: ``replaced``, with the old measurement.
-    """
-
-    events: ClassVar[tuple[str, ...]] = ("replaced",)
-
-    p = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability of getting stuck, per measurement")
-    r = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability of coming free, per measurement")
-
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        stuck = point.memory.setdefault("bad", False)
-        if "good" in point.memory:
-            stuck = is_bad(point, self.p, self.r)
-        if stuck:
-            old = stamped_as(point.memory["good"], token)
-            point.act("replaced", token, old)
-            point.forward(old)
-        else:
-            point.memory["good"] = token
-            point.forward(token)

@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 from epicycle.actors import EpicycleError, Parameter
 from epicycle.actors.expression import PortFormulaParameter, text_of
 
-from .core import JoinPoint, ObservationAspect
+from .core import TOKEN, JoinPoint, ObservationAspect
 
-TOKEN = "token"
 NOTE, STOP, FAIL = "note", "stop", "fail"
 MOST_VALUES = 100  # that Count tells apart: the summary is for people
 

@@ -7,25 +7,55 @@ a port sends positions in m, as arrays, lists or (on a line) numbers, or tokens 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
+from collections.abc import Iterable
+from itertools import takewhile
 from typing import Any, ClassVar
 
 from epicycle.actors import EpicycleError, Parameter, elementary
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand
 
-from .core import Aspect, CommunicationAspect, JoinPoint, MeasurementAspect
-from .observation import TOKEN
-from .selection import GroupsParameter, PortsParameter
+from .core import (
+    TOKEN,
+    CommunicationAspect,
+    GroupsParameter,
+    JoinPoint,
+    LossAspect,
+    MeasurementAspect,
+    PortsParameter,
+)
 
 Position = list[float]
-SENDER = "expression for the path of who sent the message, such as token.robot; none: whose port the connection leaves"
 
 
 class SituationError(EpicycleError):
     """Something of which cannot be told where or who it is."""
 
 
-class _Situated(Aspect):
-    """An aspect that knows where bodies are."""
+class _SenderParameter(PortFormulaParameter):
+    """Who sent a message."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            None,
+            given=(TOKEN,),
+            doc="expression for the path of who sent the message, such as token.robot; none: whose port the connection "
+            "leaves",
+        )
+
+
+def _sender(token: Any, sender: PortFormula | None, point: JoinPoint) -> str:
+    """The path of who sent a token, by a ``_SenderParameter``."""
+    if sender is None:
+        return point.source.rpartition(".")[0]
+    path = point.value_of(sender, token=token)
+    if not isinstance(path, str) or not path:
+        raise SituationError(f"sender: {sender.source} is {path!r}, but the path of the sender is needed")
+    return path
+
+
+class _SituatedLoss(LossAspect):
+    """A loss that depends on where bodies are."""
 
     positions = PortsParameter(doc="output ports that send where the bodies are, one for each")
 
@@ -44,11 +74,8 @@ class _Situated(Aspect):
             known[path] = nearest[0]
         return known[path]
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        raise NotImplementedError(f"{type(self).__name__} has no pass_token()")
 
-
-class RangeLoss(_Situated, CommunicationAspect):
+class RangeLoss(_SituatedLoss, CommunicationAspect):
     """Drops messages that come from afar: log-distance path loss with log-normal shadowing.
 
     At the distance d from sender to receiver the received power is 10 * exponent * log10(range / d) + X dB above what
@@ -60,33 +87,27 @@ class RangeLoss(_Situated, CommunicationAspect):
     Communications, 2nd ed., section 4.9; correlation: Gudmundson, Electronics Letters 27, 1991.
     """
 
-    events: ClassVar[tuple[str, ...]] = ("dropped",)
-
-    sender = PortFormulaParameter(None, given=(TOKEN,), doc=SENDER)
-    range = Parameter(float, min=1e-9, unit="m", doc="distance at which half of the messages are lost")
+    sender = _SenderParameter()
+    range = Parameter(float, above=0, unit="m", doc="distance at which half of the messages are lost")
     exponent = Parameter(
         float, 3.0, min=0.0, unit="1", doc="path-loss exponent: 2 in free space, 3 to 5 around obstacles"
     )
     shadowing = Parameter(float, 4.0, min=0.0, unit="1", doc="standard deviation of the received power, in dB")
     correlation: Parameter[float | None] = Parameter(
-        float, None, min=1e-9, unit="m", doc="way over which shadowing changes; none: from message to message"
+        float, None, above=0, unit="m", doc="way over which shadowing changes; none: from message to message"
     )
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
+    def loses(self, token: Any, point: JoinPoint) -> bool:
         draw = point.random.standard_normal()
-        sender = self.body(_sender(self.sender, token, point), point)
-        here, there = _latest(sender, point), _latest(self.body(point.owner, point), point)
+        sender = self.body(_sender(token, self.sender, point), point)
+        here, there = _position(sender, point), _position(self.body(point.owner, point), point)
         if here is None or there is None:
-            point.forward(token)
-            return
+            return False
         if self.correlation is not None:
             draw = self._correlated(draw, here + there, point.memory.setdefault("links", {}), sender)
         distance = elementary.distance(here, there)
         margin = math.inf if distance == 0.0 else 10.0 * self.exponent * elementary.log10(self.range / distance)
-        if margin + self.shadowing * draw < 0.0:
-            point.act("dropped", token)
-        else:
-            point.forward(token)
+        return bool(margin + self.shadowing * draw < 0.0)
 
     def _correlated(self, draw: float, ends: Position, links: dict[str, tuple[float, Position]], sender: str) -> float:
         """A standard normal number that has to do with the last one of this link."""
@@ -101,27 +122,40 @@ class RangeLoss(_Situated, CommunicationAspect):
         return draw
 
 
-class OutOfRange(_Situated, MeasurementAspect):
+class _SightLoss(_SituatedLoss, MeasurementAspect):
+    """A sensor, where the body is to which it belongs, and its target: write ``hides``."""
+
+    target = PortsParameter(single=True, doc="output port that sends where the target is")
+
+    @abstractmethod
+    def hides(self, sensor: Position, target: Position, others: Iterable[Position]) -> bool:
+        """Whether the sensor does not see the target; ``others`` are where all other bodies are."""
+
+    def loses(self, token: Any, point: JoinPoint) -> bool:
+        own, targets = self.body(point.owner, point), _ports(point, "target")
+        sensor, target = _position(own, point), next((_position(port, point) for port in targets), None)
+        if sensor is None or target is None:
+            return False
+        others = (_position(port, point) for port in _ports(point, "positions") if port not in (own, *targets))
+        return self.hides(sensor, target, (place for place in others if place is not None))
+
+
+class OutOfRange(_SightLoss):
     """Lets measurements fail while the target is farther away than the sensor sees.
 
-    The sensor is where the body is to which it belongs.  Before both places are known, measurements pass.
-    Event: ``failed``.
+    The sensor is where the body is to which it belongs.  Before both places are known, measurements pass.  It is to
+    measurements what a ``RangeLoss`` without shadowing is to messages.  Event: ``failed``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("failed",)
 
-    target = PortsParameter(single=True, doc="output port that sends where the target is")
     range = Parameter(float, min=0.0, unit="m", doc="greatest distance that can be measured")
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        sensor, target = _latest(self.body(point.owner, point), point), _target(point)
-        if sensor is not None and target is not None and elementary.distance(sensor, target) > self.range:
-            point.act("failed", token)
-        else:
-            point.forward(token)
+    def hides(self, sensor: Position, target: Position, others: Iterable[Position]) -> bool:
+        return elementary.distance(sensor, target) > self.range
 
 
-class Occlusion(_Situated, MeasurementAspect):
+class Occlusion(_SightLoss):
     """Lets measurements fail while another body stands in the line of sight.
 
     Every body that ``positions`` names but the sensor's own and the target is opaque within ``radius``: it occludes
@@ -130,42 +164,26 @@ class Occlusion(_Situated, MeasurementAspect):
 
     events: ClassVar[tuple[str, ...]] = ("occluded",)
 
-    target = PortsParameter(single=True, doc="output port that sends where the target is")
     radius = Parameter(float, min=0.0, unit="m", doc="radius of the bodies; 0 occludes nothing")
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        own = self.body(point.owner, point)
-        sensor, target = _latest(own, point), _target(point)
-        if sensor is None or target is None:
-            point.forward(token)
-            return
-        others = (port for port in _ports(point, "positions") if port not in (own, *_ports(point, "target")))
-        places = (place for port in others if (place := _latest(port, point)) is not None)
-        if any(_distance(place, sensor, target) < self.radius for place in places):
-            point.act("occluded", token)
-        else:
-            point.forward(token)
+    def hides(self, sensor: Position, target: Position, others: Iterable[Position]) -> bool:
+        return any(_distance(place, sensor, target) < self.radius for place in others)
 
 
-class Outage(CommunicationAspect):
+class Outage(LossAspect, CommunicationAspect):
     """Cuts a network in parts: drops every message from a member of one group to a member of another alone.
 
     Who is in several groups talks with all of them; who is in none hears, and is heard by, everybody.  ``from``,
     ``until`` and ``every`` say when.  Event: ``dropped``.
     """
 
-    events: ClassVar[tuple[str, ...]] = ("dropped",)
-
-    sender = PortFormulaParameter(None, given=(TOKEN,), doc=SENDER)
+    sender = _SenderParameter()
     groups = GroupsParameter(doc="the parts: {name: [actors or composites, as patterns], ...}")
 
-    def pass_token(self, token: Any, point: JoinPoint) -> None:
-        sender = self._groups_of(_sender(self.sender, token, point), point)
+    def loses(self, token: Any, point: JoinPoint) -> bool:
+        sender = self._groups_of(_sender(token, self.sender, point), point)
         receiver = self._groups_of(point.owner, point)
-        if sender and receiver and not sender & receiver:
-            point.act("dropped", token)
-        else:
-            point.forward(token)
+        return bool(sender and receiver and not sender & receiver)
 
     def _groups_of(self, path: str, point: JoinPoint) -> frozenset[str]:
         """The groups that an actor or composite, or what it stands in, belongs to."""
@@ -182,26 +200,12 @@ class Outage(CommunicationAspect):
         return known[path]
 
 
-def _sender(formula: PortFormula | None, token: Any, point: JoinPoint) -> str:
-    """The path of who sent a token."""
-    if formula is None:
-        return point.source.rpartition(".")[0]
-    path = point.value_of(formula, token=token)
-    if not isinstance(path, str) or not path:
-        raise SituationError(f"sender: {formula.source} is {path!r}, but the path of the sender is needed")
-    return path
-
-
 def _ports(point: JoinPoint, parameter: str) -> list[str]:
     """All ports that the patterns in a parameter select, once each."""
     return list(dict.fromkeys(port for ports in point.selected(parameter).values() for port in ports))
 
 
-def _target(point: JoinPoint) -> Position | None:
-    return next((_latest(port, point) for port in _ports(point, "target")), None)
-
-
-def _latest(port: str, point: JoinPoint) -> Position | None:
+def _position(port: str, point: JoinPoint) -> Position | None:
     """Where a body is, by what its port has sent last; None before that."""
     token = operand(point.latest(port))
     if token is None:
@@ -219,12 +223,8 @@ def _is_number(value: object) -> bool:
 
 def _common(path: str, other: str) -> int:
     """How many segments two paths begin with in common."""
-    count = 0
-    for one, two in zip(path.split("."), other.split("."), strict=False):
-        if one != two:
-            break
-        count += 1
-    return count
+    pairs = zip(path.split("."), other.split("."), strict=False)
+    return len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
 
 
 def _distance(place: Position, start: Position, end: Position) -> float:

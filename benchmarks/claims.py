@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from epicycle.runner import StudyResults, open_study
-from epicycle.runner.study.claims import (
+from epicycle.runner.language import ALWAYS
+from epicycle.runner.study import (
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,
@@ -26,10 +27,9 @@ from epicycle.runner.study.claims import (
     UNDECIDED,
     Finding,
     Judgement,
+    Recommendation,
     ranked,
 )
-from epicycle.runner.study.guideline import Recommendation
-from epicycle.runner.study.questions import ALWAYS
 
 SHORT = {REPRODUCED: "**yes**", NOT_REPRODUCED: "no", UNDECIDED: "open"}
 

@@ -6,9 +6,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .engine import ActorError, Results, Signal, Simulation
-    from .model import Composite, Model, ModelError, load_composite, load_model
+    from .engine import ActorError, Simulation
+    from .model import Composite, Model, load_composite, load_model
+    from .results import Results, Signal
     from .study import StudyResults, open_study
+    from .text import ModelError
     from .trial import Trial
 
 __all__ = [
@@ -29,12 +31,12 @@ __all__ = [
 _HOMES = {
     "ActorError": "engine",
     "Composite": "model",
-    "Results": "engine",
-    "Signal": "engine",
+    "Results": "results",
+    "Signal": "results",
     "Simulation": "engine",
     "Trial": "trial",
     "Model": "model",
-    "ModelError": "model",
+    "ModelError": "text",
     "load_composite": "model",
     "load_model": "model",
     "StudyResults": "study",

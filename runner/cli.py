@@ -32,13 +32,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.debug:
             complain_traceback(error)
         from .engine import ActorError, LoopError  # here, for many commands do without the engine
+        from .text import ModelError
 
-        if isinstance(error, (ActorError, LoopError)):
-            complain(f"error: {error}")
-            return FAILED
-        text = str(error)
-        complain(text if ": error: " in text or text.startswith("error: ") else f"error: {text}")
-        return BAD_INPUT
+        complain(str(error) if isinstance(error, ModelError) else f"error: {error}")
+        return FAILED if isinstance(error, (ActorError, LoopError)) else BAD_INPUT
     except BrokenPipeError:
         # Whoever read our output has gone; point stdout elsewhere so that Python's own flush stays quiet.
         sys.stdout = None

@@ -11,12 +11,13 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
 WIDTH = 120  # of what goes into a pipe, which has none of its own; the usual 80 would fold tables
 
@@ -101,6 +102,19 @@ def console(*, stderr: bool = False) -> Console:
     found = Clean(stderr=stderr, markup=False, emoji=False, highlight=False)
     if not found.is_terminal:
         found.width = WIDTH
+    return found
+
+
+def columns(head: Iterable[str], rows: Iterable[Iterable[str]], *, whole: Container[str] = ()) -> Table:
+    """A table of rich's without lines; columns whose titles are ``whole`` are not broken."""
+    from rich.table import Table
+    from rich.text import Text
+
+    found = Table(box=None, pad_edge=False, header_style="dim")
+    for title in head:
+        found.add_column(title, overflow="fold", no_wrap=title in whole)
+    for row in rows:
+        found.add_row(*map(Text, row))
     return found
 
 

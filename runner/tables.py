@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from html import escape
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
 from epicycle.actors import EpicycleError, visible
+
+from .html import table, tag
 
 MAX_ROWS = 40
 
@@ -23,62 +21,32 @@ class Table:
     head: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
 
-    def shown(self) -> tuple[list[tuple[str, ...]], str]:
-        """The rows that are shown, and what is said of the others."""
-        if len(self.rows) <= MAX_ROWS:
-            return list(self.rows), ""
-        return list(self.rows[:MAX_ROWS]), f"... and {len(self.rows) - MAX_ROWS:,} more"
+    @property
+    def more(self) -> str:
+        """What is said of the rows that are not shown."""
+        return f"... and {len(self.rows) - MAX_ROWS:,} more" if len(self.rows) > MAX_ROWS else ""
 
 
 def as_text(caption: str, tables: Iterable[Table]) -> str:
     """The caption and the tables below each other, in columns; tables without rows are left out."""
     parts = [visible(caption)]
-    for table in tables:
-        if not table.rows:
-            continue
-        shown, more = table.shown()
-        rows = [tuple(map(visible, row)) for row in shown]
-        widths = [max(len(row[column]) for row in (table.head, *rows)) for column in range(len(table.head))]
-        lines = [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-            for row in (table.head, *rows)
-        ]
-        parts.append("\n".join([*lines, more] if more else lines))
+    for each in tables:
+        if each.rows:
+            rows = [each.head, *(tuple(map(visible, row)) for row in each.rows[:MAX_ROWS])]
+            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+            lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+            parts.append("\n".join([*lines, each.more] if each.more else lines))
     return "\n\n".join(parts)
 
 
 def as_html(caption: str, tables: Iterable[Table]) -> str:
     """The same for a notebook, in plain HTML that takes on the notebook's own style."""
-    parts = [f"<p>{escape(caption)}</p>"]
-    for table in tables:
-        if not table.rows:
-            continue
-        rows, more = table.shown()
-        head = "".join(f"<th>{escape(cell)}</th>" for cell in table.head)
-        body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-        parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
-        if more:
-            parts.append(f"<p>{escape(more)}</p>")
-    return f"<div>{''.join(parts)}</div>"
-
-
-def short(value: Any) -> str:
-    """A value in one short line; numbers to six digits."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if isinstance(value, (list, tuple)):
-        text = f"[{', '.join(short(item) for item in value[:20])}]"
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        inner = ", ".join(
-            f"{name}={short(getattr(value, name))}" for name in (each.name for each in dataclasses.fields(value))
-        )
-        text = f"{type(value).__name__}({inner})"
-    else:
-        text = value if isinstance(value, str) else repr(value)
-    text = " ".join(text.split())
-    return text if len(text) <= 100 else text[:97] + "..."
+    parts = [tag("p", caption)]
+    for each in tables:
+        if each.rows:
+            parts.append(table(each.head, each.rows[:MAX_ROWS], names=0, scopes=False))
+            parts += [tag("p", each.more)] if each.more else []
+    return tag("div", parts)
 
 
 def pandas_module() -> Any:

@@ -37,12 +37,13 @@ class Trial:
         return self._plain
 
     def _run(self, woven: tuple[Woven, ...]) -> list[Record]:
-        before = list(self.model.aspects)
+        names = []
         try:
             for each in woven:
-                self.model.weave(each.name, each.aspect, at=each.at)
+                names.append(self.model.weave(each.name, each.aspect, at=each.at).name)
             simulation = Simulation(self.model, seed=self.seed, keep_log=True)
             simulation.run(until=self.until)
             return simulation.log.records
         finally:
-            self.model.aspects[:] = before
+            for name in names:
+                self.model.unweave(name)

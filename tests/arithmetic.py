@@ -52,16 +52,16 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "actors/robotics/numerics/definitions.py": ((".sum()", "numpy.exp", "numpy.log"), PAPER),
     "actors/robotics/messages.py": (("sum",), "only asks whether a sum is finite"),
     "actors/statistics.py": (("**",), FRACTIONS),
-    "aspects/crash.py": (("sum",), WHOLE),
-    "aspects/tokens.py": (("sum",), WHOLE),
+    "aspects/core/fields.py": (("sum",), WHOLE),
+    "aspects/execution/crash.py": (("sum",), WHOLE),
     "runner/engine/statistic.py": (("sum",), WHOLE),
-    "runner/engine/encoding.py": (("sum",), "only asks whether a sum is NaN"),
+    "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/model/checks.py": (("sum",), WHOLE),
     "runner/model/problems.py": (("sum",), WHOLE),
-    "runner/columns.py": (("numpy.cumsum",), WHOLE),
+    "runner/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
-    "runner/study/claims.py": (("sum",), WHOLE),
-    "runner/study/cluster.py": (("sum",), WHOLE),
+    "runner/study/judge/claims.py": (("sum",), WHOLE),
+    "runner/study/run/cluster.py": (("sum",), WHOLE),
 }
 
 

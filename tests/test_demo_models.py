@@ -13,8 +13,8 @@ import simpy
 
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.engine import LoopError, Results
-from epicycle.runner.model import Problems
-from epicycle.runner.show import figures_of
+from epicycle.runner.model import figures_of
+from epicycle.runner.text import Problems
 
 
 def run(name: str, seed: int = 1, until: float | None = None, keep_log: bool = False, **settings: Any) -> Results:

@@ -23,10 +23,10 @@ from typing import Any, NamedTuple
 import pytest
 
 from epicycle.runner import ModelError, Simulation, load_model
+from epicycle.runner.catalogue import TAKES, TIME, TOKENS, built_in
 from epicycle.runner.cli import main
-from epicycle.runner.model.catalogue import built_in
-from epicycle.runner.model.measure import TAKES, TIME, TOKENS
-from epicycle.runner.study import Plan, read_study
+from epicycle.runner.language import read_study
+from epicycle.runner.study import Plan
 
 ROOT = Path(__file__).parent.parent
 TUTORIALS = sorted((ROOT / "docs" / "tutorial").glob("*.md"))

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.model import packaged_models
+from epicycle.runner.catalogue import packaged_models
 
 
 @pytest.mark.parametrize("name", sorted(packaged_models()))

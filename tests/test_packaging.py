@@ -145,7 +145,7 @@ def test_imports_go_one_way() -> None:
         ("actors/flow.py", "from .. import aspects", "epicycle.aspects"),
         ("actors/__init__.py", "from ..runner import run", "epicycle.runner.run"),
         ("actors/core/ports.py", "from ...aspects.core import Aspect", "epicycle.aspects.core.Aspect"),
-        ("aspects/core.py", "from epicycle.runner.engine import Director", "epicycle.runner.engine.Director"),
+        ("aspects/core/port.py", "from epicycle.runner.engine import Director", "epicycle.runner.engine.Director"),
         ("runner/cli.py", "import actors", "actors"),
         ("runner/cli.py", "from models import robots", "models.robots"),
     ],
@@ -159,7 +159,7 @@ def test_an_import_the_wrong_way_is_found(file: str, line: str, name: str) -> No
     [
         ("actors/core/ports.py", "from ..core import Tag"),
         ("actors/core/ports.py", "from . import Tag"),
-        ("aspects/core.py", "from epicycle.actors import Actor"),
+        ("aspects/core/port.py", "from epicycle.actors import Actor"),
         ("runner/cli.py", "from .model import actors"),
         ("runner/model/load.py", "from epicycle.aspects import Aspect"),
     ],

@@ -1,87 +1,55 @@
 """What every actor is made of: ports, parameters, time, random streams, and the firing contract."""
 
-from . import elementary
+from . import elementary, paths
 from .actor import Actor, Context, Wake, declared_ports, has_own_ports
+from .authoring import ABSENT, Latest, Pending, present, rounds
 from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
 from .laws import normal_quantile, normal_share
-from .mapping import MappingParameter
-from .nearest import did_you_mean, nearest
+from .messages import (
+    abridged,
+    brief,
+    counted,
+    cut,
+    did_you_mean,
+    digits,
+    nearest,
+    readable,
+    shortened,
+    visible,
+    visible_character,
+    visible_lines,
+)
 from .parameter import (
     REQUIRED,
     Configurable,
+    MappingParameter,
     Parameter,
     ParameterError,
     array_parameter,
+    bounds_text,
     declared_parameters,
     texts_parameter,
     unknown_parameter,
     variants,
 )
 from .port_parameter import PortParameter
-from .ports import Emit, InputPort, OutputPort, PortError, accepts, shaped, type_name
+from .port_types import accepts, shaped, token_type, type_name
+from .ports import Emit, InputPort, OutputPort, PortError
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
-from .visible import abridged, readable, shortened, visible, visible_character, visible_lines
-from .words import counted
 
 __all__ = [
-    "MAX_DEPTH",
-    "NANOSECONDS_PER_SECOND",
-    "REQUIRED",
-    "Actor",
-    "Configurable",
-    "Context",
-    "Emit",
-    "EpicycleError",
-    "InputPort",
-    "MappingParameter",
-    "OutputPort",
-    "Parameter",
-    "ParameterError",
-    "PortError",
-    "PortParameter",
-    "Process",
-    "Quantity",
-    "Stream",
-    "Tag",
-    "UnitError",
-    "Wake",
-    "abridged",
-    "accepts",
-    "array_parameter",
-    "convert",
-    "counted",
-    "counted_in_si",
-    "declared_parameters",
-    "declared_ports",
-    "did_you_mean",
-    "elementary",
-    "has_own_ports",
-    "irregular",
-    "is_too_deep",
-    "nearest",
-    "normal_quantile",
-    "normal_share",
-    "open_regular",
-    "parse_unit",
-    "plain",
-    "random_stream",
-    "read_regular",
-    "read_table",
-    "readable",
-    "shaped",
-    "shortened",
-    "texts_parameter",
-    "to_nanoseconds",
-    "to_seconds",
-    "type_name",
-    "unknown_parameter",
-    "variants",
-    "visible",
-    "visible_character",
-    "visible_lines",
-]
+    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "REQUIRED", "Actor", "Configurable", "Context", "Emit",
+    "EpicycleError", "InputPort", "Latest", "MappingParameter", "OutputPort", "Parameter", "ParameterError",
+    "Pending", "PortError", "PortParameter", "Process", "Quantity", "Stream", "Tag", "UnitError", "Wake",
+    "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut",
+    "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "irregular",
+    "is_too_deep", "nearest", "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths", "plain",
+    "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened",
+    "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "type_name", "unknown_parameter", "variants",
+    "visible", "visible_character", "visible_lines",
+]  # fmt: skip

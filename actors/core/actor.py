@@ -22,14 +22,15 @@ cancelled; asking twice for one tag fires once.
 ``wrapup`` is called once after the last tag, also when the run failed.  Nothing may be sent.
 
 An actor keeps all its state in itself, draws random numbers from ``random`` alone, and never looks at another actor:
-so it cannot know which aspects stand around it, and a run is a function of model and seed.
+so it cannot know which aspects stand around it, and a run is a function of model and seed.  Each run has actors of its
+own, copies of those in the model, and a snapshot of a run has copies of these.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
 from .parameter import Configurable, ParameterError
@@ -88,6 +89,15 @@ class _NoContext:
         raise RuntimeError(f"{self._actor.path} is not part of a running model")
 
 
+class _SourceByPorts:
+    """What ``Actor.is_source`` is for a class that does not say: what has no inputs can only be woken by itself."""
+
+    def __get__(self, instance: object, owner: type[Actor]) -> bool:
+        ports = declared_ports(owner).values()
+        takes_tokens = any(isinstance(port, InputPort) and not isinstance(port, ParameterPort) for port in ports)
+        return not takes_tokens and not has_own_ports(owner)
+
+
 class Actor(Configurable):
     """Base of all actors: declare ``InputPort``, ``OutputPort`` and ``Parameter`` in the class, write ``fire``.
 
@@ -101,8 +111,9 @@ class Actor(Configurable):
     ...             self.output.send(self.factor * token)
     """
 
-    # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.
-    is_source: ClassVar[bool] = False
+    # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.  It follows from
+    # the class's having no input beside parameters; one that has inputs and starts by itself says True.
+    is_source: ClassVar[bool] = cast(bool, _SourceByPorts())
 
     @property
     def is_endless(self) -> bool:
@@ -111,7 +122,7 @@ class Actor(Configurable):
 
     def __init__(self, path: str, **parameters: object) -> None:
         try:
-            super().__init__(**parameters)
+            self._configure(parameters)
         except ParameterError as error:
             raise ParameterError(f"{path}: {error}") from None
         self.path = path
@@ -130,6 +141,15 @@ class Actor(Configurable):
                 self.outputs[name] = bound
         for name, port in self.own_ports().items():
             self._add_own(name, port)
+        self.check()
+
+    if not TYPE_CHECKING:  # or else every name would be there
+
+        def __getattr__(self, name: str) -> Any:
+            missing = f"{type(self).__name__!r} object has no attribute {name!r}"
+            if vars(self).get("home") is not None and isinstance(vars(self).get("context"), _NoContext):
+                missing += f": {self.path} is the model's, and each run has its own, simulation[{self.path!r}]"
+            raise AttributeError(missing, name=name, obj=self)
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         """Ports that this instance has beside those of its class, by name; they follow from its parameters.
@@ -149,6 +169,16 @@ class Actor(Configurable):
             self.inputs[name] = bound
         else:
             self.outputs[name] = bound
+
+    def twin(self, known: dict[int, Any]) -> Self:
+        """Engine: the beginning of a copy that is part of no run: its ports.  ``known`` gets what is copied, by id."""
+        made = object.__new__(type(self))
+        made.path = self.path
+        for side in (self.inputs, self.outputs):
+            known[id(side)] = bound = {name: port.bind(made) for name, port in side.items()}
+            known.update((id(port), bound[name]) for name, port in side.items())
+        known[id(self.context)] = _NoContext(made)
+        return made
 
     def move(self, path: str) -> None:
         """Engine: the actor gets its full path in the model that it is added to."""

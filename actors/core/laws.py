@@ -7,10 +7,8 @@ takes one word of the stream and grows with it.  The others draw until a value i
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable
 from functools import cache
-from itertools import accumulate
 from typing import Final, Protocol
 
 from .elementary import acos, cos, exp, expm1, log, log1p, tan
@@ -53,6 +51,11 @@ def _probability(p: float) -> None:
 
 
 # -- closed inverses --------------------------------------------------------------------------------------------------
+
+
+def uniform(bits: Bits, low: float = 0.0, high: float = 1.0) -> float:
+    """Uniform in [low, high)."""
+    return low + (high - low) * ((bits.word() >> 11) * (0.5 * _STEP))
 
 
 def standard_normal(bits: Bits) -> float:
@@ -108,81 +111,81 @@ def normal_share(x: float) -> float:
     return 0.5 + found * exp(-0.5 * x * x - 0.91893853320467274178)
 
 
-def normal(bits: Bits, loc: float, scale: float) -> float:
-    """Mean ``loc``, standard deviation ``scale``."""
+def normal(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
+    """Normal (Gaussian) with mean ``loc`` and standard deviation ``scale``."""
     if not scale >= 0.0:
         _not_negative(scale=scale)
     return loc + scale * standard_normal(bits)
 
 
-def lognormal(bits: Bits, mean: float, sigma: float) -> float:
-    """e to the power of a normal number."""
+def lognormal(bits: Bits, mean: float = 0.0, sigma: float = 1.0) -> float:
+    """Positive, with a normal logarithm of this mean and standard deviation."""
     return exp(normal(bits, mean, sigma))
 
 
 def standard_exponential(bits: Bits) -> float:
-    """Mean 1."""
+    """Exponential with mean 1."""
     return -log(1.0 - ((bits.word() >> 12) + 0.5) * _STEP)
 
 
-def exponential(bits: Bits, scale: float) -> float:
-    """Mean ``scale``."""
+def exponential(bits: Bits, scale: float = 1.0) -> float:
+    """Exponential with mean ``scale``."""
     if not scale >= 0.0:
         _not_negative(scale=scale)
     return scale * -log(1.0 - ((bits.word() >> 12) + 0.5) * _STEP)
 
 
 def weibull(bits: Bits, a: float) -> float:
-    """Shape ``a``, scale 1."""
+    """Weibull with shape ``a`` and scale 1."""
     _positive(a=a)
     return power_of(standard_exponential(bits), 1.0 / a)
 
 
 def pareto(bits: Bits, a: float) -> float:
-    """Lomax, from 0 on."""
+    """Lomax (Pareto II) with shape ``a``, from 0 on; add 1 for the classical law from 1 on."""
     _positive(a=a)
     return expm1(standard_exponential(bits) / a)
 
 
 def power(bits: Bits, a: float) -> float:
-    """Density a x^(a - 1)."""
+    """In [0, 1], with density ``a * x^(a - 1)``."""
     _positive(a=a)
     return power_of(between(bits), 1.0 / a)
 
 
-def rayleigh(bits: Bits, scale: float) -> float:
-    """The length of a plane normal vector."""
+def rayleigh(bits: Bits, scale: float = 1.0) -> float:
+    """Rayleigh: the length of a plane vector of two normal numbers with deviation ``scale``."""
     _not_negative(scale=scale)
     return scale * math.sqrt(2.0 * standard_exponential(bits))
 
 
-def laplace(bits: Bits, loc: float, scale: float) -> float:
-    """Exponential to both sides."""
+def laplace(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
+    """Laplace (double exponential) with variance ``2 * scale^2``."""
     _not_negative(scale=scale)
     share = between(bits)
     return loc + scale * log(2.0 * share) if share < 0.5 else loc - scale * log(2.0 * (1.0 - share))
 
 
-def logistic(bits: Bits, loc: float, scale: float) -> float:
-    """The logit of a uniform number."""
+def logistic(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
+    """Logistic."""
     _not_negative(scale=scale)
     share = between(bits)
     return loc + scale * log(share / (1.0 - share))
 
 
-def gumbel(bits: Bits, loc: float, scale: float) -> float:
-    """The greatest of many."""
+def gumbel(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
+    """Gumbel's law of greatest values."""
     _not_negative(scale=scale)
     return loc - scale * log(-log(between(bits)))
 
 
 def standard_cauchy(bits: Bits) -> float:
-    """Mode 0, half width 1."""
+    """Cauchy with mode 0."""
     return tan(math.pi * (between(bits) - 0.5))
 
 
 def triangular(bits: Bits, left: float, mode: float, right: float) -> float:
-    """Rises from ``left`` to ``mode``, falls to ``right``."""
+    """Triangular over [left, right] with its top at ``mode``."""
     if not left <= mode <= right:
         raise ValueError(f"left = {left:g}, mode = {mode:g} and right = {right:g} are not in order")
     share, width = between(bits), right - left
@@ -192,7 +195,7 @@ def triangular(bits: Bits, left: float, mode: float, right: float) -> float:
 
 
 def geometric(bits: Bits, p: float) -> int:
-    """The first success, from 1 on."""
+    """How many trials it takes until one of probability ``p`` succeeds: 1, 2, ..."""
     if not 0.0 < p <= 1.0:
         raise ValueError(f"p = {p:g} is not above 0 and at most 1")
     share = between(bits)
@@ -203,7 +206,10 @@ def geometric(bits: Bits, p: float) -> int:
 
 
 def standard_gamma(bits: Bits, shape: float) -> float:
-    """Scale 1.  Source: Marsaglia and Tsang, A Simple Method for Generating Gamma Variables, ACM TOMS 26, 2000."""
+    """Gamma with scale 1.
+
+    Source: Marsaglia and Tsang, A Simple Method for Generating Gamma Variables, ACM TOMS 26, 2000.
+    """
     _not_negative(shape=shape)
     if shape < 1.0:
         return standard_gamma(bits, shape + 1.0) * power_of(between(bits), 1.0 / shape) if shape else 0.0
@@ -219,20 +225,23 @@ def standard_gamma(bits: Bits, shape: float) -> float:
             return d * v
 
 
-def gamma(bits: Bits, shape: float, scale: float) -> float:
-    """Mean shape * scale."""
+def gamma(bits: Bits, shape: float, scale: float = 1.0) -> float:
+    """Gamma with mean ``shape * scale``; with a whole shape it is Erlang's law."""
     _not_negative(scale=scale)
     return scale * standard_gamma(bits, shape)
 
 
 def chisquare(bits: Bits, df: float) -> float:
-    """The squared length of a normal vector."""
+    """Chi-square with ``df`` degrees of freedom."""
     _positive(df=df)
     return 2.0 * standard_gamma(bits, 0.5 * df)
 
 
 def beta(bits: Bits, a: float, b: float) -> float:
-    """Mean a / (a + b).  Source: M. D. Jöhnk, Metrika 8, 1964, for small parameters; else a share of two gammas."""
+    """Beta over [0, 1] with mean ``a / (a + b)``.
+
+    Source: M. D. Jöhnk, Metrika 8, 1964, for small parameters; else a share of two gammas.
+    """
     _positive(a=a, b=b)
     if a > 1.0 or b > 1.0:
         x = standard_gamma(bits, a)
@@ -246,18 +255,21 @@ def beta(bits: Bits, a: float, b: float) -> float:
 
 
 def standard_t(bits: Bits, df: float) -> float:
-    """A normal number over the root of its estimated variance."""
+    """Student's t with ``df`` degrees of freedom."""
     _positive(df=df)
     return standard_normal(bits) / math.sqrt(chisquare(bits, df) / df)
 
 
 def f(bits: Bits, dfnum: float, dfden: float) -> float:
-    """The ratio of two mean squares."""
+    """Fisher's F with these degrees of freedom."""
     return chisquare(bits, dfnum) / dfnum / (chisquare(bits, dfden) / dfden)
 
 
 def vonmises(bits: Bits, mu: float, kappa: float) -> float:
-    """An angle in [-pi, pi].  Source: Best and Fisher, Efficient Simulation of the von Mises Distribution, 1979."""
+    """An angle in [-pi, pi] with mean direction ``mu`` and concentration ``kappa``.
+
+    Source: Best and Fisher, Efficient Simulation of the von Mises Distribution, 1979.
+    """
     _not_negative(kappa=kappa)
     if kappa > 1e6:  # normal to all digits that count, while the ratios below lose theirs
         return math.remainder(mu + standard_normal(bits) / math.sqrt(kappa), 2.0 * math.pi)
@@ -276,7 +288,7 @@ def vonmises(bits: Bits, mu: float, kappa: float) -> float:
 
 
 def wald(bits: Bits, mean: float, scale: float) -> float:
-    """Inverse Gaussian.  Source: Michael, Schucany and Haas, The American Statistician 30, 1976."""
+    """Wald (inverse Gaussian).  Source: Michael, Schucany and Haas, The American Statistician 30, 1976."""
     _positive(mean=mean, scale=scale)
     x = standard_normal(bits)
     t = mean * x * x / (2.0 * scale)
@@ -284,8 +296,11 @@ def wald(bits: Bits, mean: float, scale: float) -> float:
     return small if between(bits) * (mean + small) <= mean else mean / small * mean
 
 
-def poisson(bits: Bits, lam: float) -> int:
-    """Mean lam.  Source for large ones: W. Hörmann, Insurance: Mathematics and Economics 12, 1993 (PTRS)."""
+def poisson(bits: Bits, lam: float = 1.0) -> int:
+    """How many events of a Poisson process come, if ``lam`` do on the average.
+
+    Source for large ones: W. Hörmann, Insurance: Mathematics and Economics 12, 1993 (PTRS).
+    """
     if not 0.0 <= lam <= 1e18:
         raise ValueError(f"lam = {lam:g} is not between 0 and 1e18")
     if lam < 10.0:
@@ -312,7 +327,10 @@ def poisson(bits: Bits, lam: float) -> int:
 
 
 def binomial(bits: Bits, n: int, p: float) -> int:
-    """Mean n p.  Source for large ones: W. Hörmann, J. Statistical Computation and Simulation 46, 1993 (BTRS)."""
+    """How many of ``n`` trials of probability ``p`` succeed.
+
+    Source for large ones: W. Hörmann, J. Statistical Computation and Simulation 46, 1993 (BTRS).
+    """
     n = int(n)
     if not 0 <= n <= _LARGEST:
         raise ValueError(f"n = {n} is not between 0 and 2^63 - 1")
@@ -344,10 +362,17 @@ def binomial(bits: Bits, n: int, p: float) -> int:
 
 
 def negative_binomial(bits: Bits, n: float, p: float) -> int:
-    """A Poisson number whose mean is a gamma number."""
+    """How many trials of probability ``p`` fail before the ``n``-th success."""
     _positive(n=n, p=p)
     _probability(p)
     return poisson(bits, gamma(bits, n, (1.0 - p) / p))
+
+
+OF_ONE_VALUE: Final[tuple[Callable[..., float], ...]] = (
+    uniform, standard_normal, normal, lognormal, standard_exponential, exponential, weibull, pareto, power, rayleigh,
+    laplace, logistic, gumbel, standard_cauchy, triangular, geometric, standard_gamma, gamma, chisquare, beta,
+    standard_t, f, vonmises, wald, poisson, binomial, negative_binomial,
+)  # fmt: skip
 
 
 def _log_binomial(k: int, n: int, p: float) -> float:
@@ -380,96 +405,3 @@ def _stirling(k: int) -> float:
         return _few(k)
     square = float(k) * k
     return (1 / 12 - (1 / 360 - (1 / 1260 - 1 / 1680 / square) / square) / square) / k
-
-
-# -- choices and vectors ----------------------------------------------------------------------------------------------
-
-
-def cumulated(weights: Sequence[float]) -> list[float]:
-    """The sums of weights up to each; raises ``ValueError`` where they are no weights."""
-    sums = list(accumulate(weights))
-    if not sums or not all(weight >= 0.0 for weight in weights) or not 0.0 < sums[-1] < math.inf:
-        raise ValueError(f"weights {list(weights)} are not all 0 or more with a finite sum above 0")
-    return sums
-
-
-def weighted(bits: Bits, sums: Sequence[float]) -> int:
-    """An index, as likely as its weight; ``sums`` are ``cumulated``."""
-    place = bisect_right(sums, between(bits) * sums[-1])
-    # Rounding may have reached the whole sum, which lies beyond the last weight that is not 0.
-    return place if place < len(sums) else bisect_right(sums, math.nextafter(sums[-1], 0.0))
-
-
-def without_replacement(bits: Bits, count: int, wanted: int, weights: Sequence[float] | None) -> list[int]:
-    """Different indices, in the order in which they are drawn."""
-    possible = count if weights is None else sum(weight > 0.0 for weight in weights)
-    if wanted > possible:
-        raise ValueError(f"{wanted} different elements are asked for, and there are {possible}")
-    drawn: list[int] = []
-    if weights is None:
-        moved: dict[int, int] = {}  # of a shuffle whose untouched places are not written down
-        for last in range(count - 1, count - 1 - wanted, -1):
-            place = bits.below(last + 1)
-            drawn.append(moved.get(place, place))
-            moved[place] = moved.get(last, last)
-        return drawn
-    left = list(weights)
-    for _ in range(wanted):
-        drawn.append(weighted(bits, cumulated(left)))
-        left[drawn[-1]] = 0.0
-    return drawn
-
-
-def multinomial(bits: Bits, n: int, weights: Sequence[float]) -> list[int]:
-    """How often each outcome comes: one binomial number after the other, of what is left."""
-    share, counts = 1.0, []
-    for weight in weights[:-1]:
-        counts.append(binomial(bits, n, min(1.0, weight / share)) if n and weight else 0)
-        n, share = n - counts[-1], share - weight
-        if share < -1e-12 or weight < 0.0:
-            raise ValueError(f"pvals {list(weights)} are no probabilities, or add up to more than 1")
-    return [*counts, n]
-
-
-def dirichlet(bits: Bits, shapes: Sequence[float]) -> list[float]:
-    """Shares that add up to 1: each is a beta share of what the ones before it have left."""
-    left, shares = 1.0, []
-    rests = list(accumulate(reversed(shapes)))[::-1]
-    for shape, rest in zip(shapes[:-1], rests[1:], strict=True):
-        share = beta(bits, shape, rest)
-        shares.append(left * share)
-        left *= 1.0 - share
-    return [*shares, left]
-
-
-def square_root(covariance: Sequence[Sequence[float]]) -> list[list[float]]:
-    """A lower triangle L with L L^T the covariance (Cholesky); a direction without variance gets zeros."""
-    size = len(covariance)
-    if any(len(row) != size for row in covariance):
-        raise ValueError("cov is not square")
-    root = [[0.0] * size for _ in range(size)]
-    for i in range(size):
-        for j in range(i + 1):
-            if not abs(covariance[i][j] - covariance[j][i]) <= 1e-8 * (1.0 + abs(covariance[i][j])):
-                raise ValueError("cov is not symmetric")
-            rest = covariance[i][j]
-            for k in range(j):
-                rest -= root[i][k] * root[j][k]
-            if i != j:
-                root[i][j] = rest / root[j][j] if root[j][j] else 0.0
-            elif rest < -1e-8 * (1.0 + covariance[i][i]):
-                raise ValueError("cov is not positive semidefinite")
-            else:
-                root[i][i] = math.sqrt(rest) if rest > 1e-14 * covariance[i][i] else 0.0
-    return root
-
-
-def multivariate_normal(bits: Bits, means: Sequence[float], root: Sequence[Sequence[float]]) -> list[float]:
-    """means + root z, with independent standard normal numbers z."""
-    draws = [standard_normal(bits) for _ in means]
-    values = []
-    for mean, row in zip(means, root, strict=True):
-        for factor, draw in zip(row, draws, strict=True):
-            mean += factor * draw
-        values.append(mean)
-    return values

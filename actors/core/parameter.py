@@ -5,17 +5,17 @@ from __future__ import annotations
 import copy
 import math
 import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar, overload
+from typing import Any, ClassVar, Generic, TypeVar, cast, overload
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import EpicycleError
-from .nearest import did_you_mean
+from .messages import brief, did_you_mean, digits
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
 
@@ -64,6 +64,8 @@ class Parameter(Generic[T]):
     units; the ``unit`` of a ``Configurable`` class is that of the parameters in it that have none of their own.
     ``shape`` makes it an array of floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and
     ``object``, ``(None,)`` a tuple.  ``int | float`` is a number that stays an integer if it is one.
+    A text is one of ``choices``; ``renamed`` tells the present names of former ones.
+    Numbers are ``min`` or more, or else greater than ``above``, and ``max`` or less.
     A parameter that takes values of several kinds names one parameter for each kind as its ``forms``.
     """
 
@@ -76,8 +78,10 @@ class Parameter(Generic[T]):
         *,
         unit: str = "",
         min: float | None = None,
+        above: float | None = None,
         max: float | None = None,
         choices: Sequence[str] = (),
+        renamed: Mapping[str, str] = types.MappingProxyType({}),
         shape: tuple[int | None, ...] | None = None,
         optional: bool = False,
         doc: str = "",
@@ -86,8 +90,10 @@ class Parameter(Generic[T]):
         self.default = default
         self.unit = unit
         self.min = min
+        self.above = above
         self.max = max
         self.choices = tuple(choices)
+        self.renamed = renamed
         self.shape = shape
         self.optional = optional or default is None
         self.doc = doc
@@ -152,14 +158,16 @@ class Parameter(Generic[T]):
             if self.optional:
                 return None
             raise ParameterError(f"a value is missing, expected {self._expected()}")
+        result: Any
         if isinstance(self.type, type) and issubclass(self.type, Configurable):
-            return build_variant(self.type, value, self.unit)  # type: ignore[return-value]
-        if self.shape is not None and self.type in (str, object):
-            items = [value] if self.type is str and isinstance(value, str) else self._rows(value, self.shape, value)
-            return tuple(items)  # type: ignore[arg-type, return-value]
-        if self.shape is not None:
-            return self._array(value)  # type: ignore[return-value]
-        result: Any = self._scalar(value)
+            result = build_variant(self.type, value, self.unit)
+        elif self.shape is None:
+            result = self._scalar(value)
+        elif self.type in (str, object):
+            is_single = self.type is str and isinstance(value, str)
+            result = (value,) if is_single else tuple(self._rows(value, self.shape, value))
+        else:
+            result = self._array(value)
         return result  # type: ignore[no-any-return]
 
     def _expected(self) -> str:
@@ -171,12 +179,8 @@ class Parameter(Generic[T]):
         if self.unit and self.unit != "1":
             text += f" in {self.unit}"
         if self.min is not None and self.max is not None:
-            text += f" from {_digits(self.min)} to {_digits(self.max)}"
-        elif self.min is not None:
-            text += f" >= {_digits(self.min)}"
-        elif self.max is not None:
-            text += f" <= {_digits(self.max)}"
-        return text
+            return f"{text} from {digits(self.min)} to {digits(self.max)}"
+        return text + bounds_text(self.min, self.above, self.max, digits)
 
     def _scalar(self, value: object) -> object:
         if self.type is object:
@@ -191,12 +195,14 @@ class Parameter(Generic[T]):
                 return bool(value)
         elif self.type is str:
             if isinstance(value, str):
+                if value in self.renamed:
+                    raise ParameterError(f"{value!r} is called {self.renamed[value]!r} now")
                 if self.choices and value not in self.choices:
                     raise ParameterError(f"{value!r} is not {self._expected()}{did_you_mean(value, self.choices)}")
                 return value
         elif isinstance(value, (int, float, np.integer, np.floating, str)) and not isinstance(value, bool):
             return self._bounded(self._number(value))
-        raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+        raise ParameterError(f"{brief(value)} is not {self._expected()}")
 
     def _number(self, value: Any) -> float | int:
         unit = self.unit or ("1" if self.type is int and isinstance(value, Quantity) else "")
@@ -204,7 +210,7 @@ class Parameter(Generic[T]):
             if isinstance(value, str):
                 found = self._read(value)
                 if found is None:
-                    raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+                    raise ParameterError(f"{brief(value)} is not {self._expected()}")
                 value = found
             elif isinstance(value, Quantity):
                 value = value.to(unit) if unit else value.si
@@ -213,11 +219,11 @@ class Parameter(Generic[T]):
         try:
             number = float(value)
         except OverflowError:
-            raise ParameterError(f"{_shown(value)} is too large, expected {self._expected()}") from None
+            raise ParameterError(f"{brief(value)} is too large, expected {self._expected()}") from None
         if self.type is float or (self.type is not int and not isinstance(value, (int, np.integer))):
             return number
         if not number.is_integer():  # nor are nan and the infinities
-            raise ParameterError(f"{_shown(value)} is not {self._expected()}")
+            raise ParameterError(f"{brief(value)} is not {self._expected()}")
         return int(value)
 
     def _read(self, text: str) -> float | None:
@@ -231,9 +237,19 @@ class Parameter(Generic[T]):
     def _bounded(self, value: float | int) -> float | int:
         if math.isnan(value):
             raise ParameterError(f"nan is not {self._expected()}")
-        if (self.min is not None and value < self.min) or (self.max is not None and value > self.max):
-            raise ParameterError(f"{_digits(value)} is out of bounds, expected {self._expected()}")
+        if not self._holds(value, value):
+            raise ParameterError(f"{digits(value)} is out of bounds, expected {self._expected()}")
+        if self.above == 0 and self.unit == "s" and value < 1e-9:
+            raise ParameterError(f"{digits(value)} s is shorter than a nanosecond, which is the shortest time")
         return value
+
+    def _holds(self, low: float, high: float) -> bool:
+        """Whether all from one number to another is within bounds."""
+        return (
+            (self.min is None or low >= self.min)
+            and (self.above is None or low > self.above)
+            and (self.max is None or high <= self.max)
+        )
 
     def _array(self, value: object) -> NDArray[np.float64]:
         assert self.shape is not None
@@ -252,16 +268,14 @@ class Parameter(Generic[T]):
             return False
         if any(isinstance(each, int) and abs(each) > _EXACT for each in value) or any(map(math.isnan, value)):
             return False
-        low, high = min(value), max(value)
-        return (self.min is None or low >= self.min) and (self.max is None or high <= self.max)
+        return self._holds(min(value), max(value))
 
-    def _rows(self, value: object, shape: tuple[int | None, ...], whole: object) -> object:
+    def _rows(self, value: Any, shape: tuple[int | None, ...], whole: object) -> Any:
         if not shape:
             return self._scalar(value)
-        wrong = not isinstance(value, (list, tuple, np.ndarray))
-        if wrong or (shape[0] is not None and len(value) != shape[0]):  # type: ignore[arg-type]
-            raise ParameterError(f"{_shown(whole)} is not {self._expected()}")
-        return [self._rows(item, shape[1:], whole) for item in value]  # type: ignore[attr-defined]
+        if not isinstance(value, (list, tuple, np.ndarray)) or shape[0] not in (None, len(value)):
+            raise ParameterError(f"{brief(whole)} is not {self._expected()}")
+        return [self._rows(item, shape[1:], whole) for item in value]
 
 
 def array_parameter(
@@ -270,22 +284,46 @@ def array_parameter(
     *,
     unit: str = "",
     min: float | None = None,
+    above: float | None = None,
     max: float | None = None,
     doc: str = "",
 ) -> Parameter[NDArray[np.float64]]:
     """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
-    parameter: Parameter[Any] = Parameter(float, None, unit=unit, min=min, max=max, shape=shape, doc=doc)
-    parameter.optional = default is None
-    parameter.default = default
-    return parameter
+    given: Any = default
+    return Parameter(cast(Any, float), given, unit=unit, min=min, above=above, max=max, shape=shape, doc=doc)
 
 
 def texts_parameter(default: object = REQUIRED, *, doc: str = "") -> Parameter[tuple[str, ...]]:
     """A parameter whose value is a list of texts; a single text counts as a list of one."""
-    parameter: Parameter[Any] = Parameter(str, shape=(None,), doc=doc)
-    parameter.optional = default is None
-    parameter.default = default
-    return parameter
+    given: Any = default
+    return Parameter(cast(Any, str), given, shape=(None,), doc=doc)
+
+
+class MappingParameter(Parameter[Any]):
+    """A parameter such as ``initial: {height: 10, speed: 0}``: names of the model's own, each with a value of ``item``.
+
+    Reads as a dict in the order in which the names are written.
+    """
+
+    def __init__(self, item: Parameter[Any], default: Any = REQUIRED, *, doc: str = "") -> None:
+        super().__init__(object, default, doc=doc)
+        self.item = item
+
+    def describe_type(self) -> str:
+        return f"mapping of names to {self.item.describe_type()}"
+
+    def convert(self, value: object) -> dict[str, Any] | None:
+        if value is None and self.optional:
+            return None
+        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+            raise ParameterError(f"{value!r} is not a {self.describe_type()}")
+        converted = {}
+        for name, each in value.items():
+            try:
+                converted[name] = self.item.convert(each)
+            except ParameterError as error:
+                raise ParameterError(f"{name}: {error}", (name, *error.keys), of_key=error.of_key) from None
+        return converted
 
 
 class Configurable:
@@ -293,8 +331,22 @@ class Configurable:
 
     # Names that the YAML uses beside parameters, which no parameter may take.
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
+    # What is said of names that one might take for parameters, and are none.
+    refused: ClassVar[Mapping[str, str]] = {}
+    # Attributes that its copies, for a run or a snapshot, have in common with it.
+    copies_share: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, **values: object) -> None:
+        self._configure(values)
+        self.check()
+
+    def check(self) -> None:
+        """Called when each parameter is valid by itself; raises ``ParameterError`` where they do not go together.
+
+        What follows from them may be set here: the type of a port for example.
+        """
+
+    def _configure(self, values: Mapping[str, object]) -> None:
         declared = declared_parameters(type(self))
         for name in values:
             if name not in declared:
@@ -347,6 +399,8 @@ def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
 
 def unknown_parameter(cls: type, name: str) -> str:
     """The message for a parameter that the class does not have."""
+    if issubclass(cls, Configurable) and name in cls.refused:
+        return cls.refused[name]
     return f"{cls.__name__} has no parameter {name!r}{did_you_mean(name, declared_parameters(cls))}"
 
 
@@ -371,12 +425,12 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
     known = variants(base)
     valid = ", ".join(sorted(known))
     if not isinstance(value, Mapping):
-        raise ParameterError(f"{_shown(value)} is not a mapping like {{type: ...}}, with one of {valid}")
+        raise ParameterError(f"{brief(value)} is not a mapping like {{type: ...}}, with one of {valid}")
     if "type" not in value:
-        raise ParameterError(f"{_shown(value)} has no 'type', which is one of {valid}")
+        raise ParameterError(f"{brief(value)} has no 'type', which is one of {valid}")
     name = value["type"]
     if not isinstance(name, str) or name not in known:
-        raise ParameterError(f"{_shown(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
+        raise ParameterError(f"{brief(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
     values = {key: item for key, item in value.items() if key != "type"}
     declared = declared_parameters(known[name])
     for key in [key for key in values if unit and key in declared]:
@@ -392,14 +446,8 @@ def _within(cls: type, name: str, error: ParameterError) -> ParameterError:
     return ParameterError(f"{cls.__name__}.{name}: {error}", (name, *error.keys), of_key=error.of_key)
 
 
-def _digits(number: float) -> str:
-    """A number as people write it: whole ones without an exponent, unless they get too long to be read."""
-    in_full = float(number).is_integer() and abs(number) < (10**20 if type(number) is int else 1e15)
-    return str(int(number)) if in_full else f"{float(number):g}"
-
-
-def _shown(value: object) -> str:
-    if value is None or isinstance(value, bool):
-        return {None: "null", True: "true", False: "false"}[value]
-    text = repr(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+def bounds_text(least: float | None, above: float | None, most: float | None, written: Callable[[float], str]) -> str:
+    """The bounds of a number as they stand behind it: `` >= 0``, `` > 0 and <= 1``."""
+    ends = ((">=", least), (">", above), ("<=", most))
+    told = " and ".join(f"{sign} {written(end)}" for sign, end in ends if end is not None)
+    return f" {told}" if told else ""

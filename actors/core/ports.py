@@ -7,16 +7,23 @@ An output port hands a token on at once; who gets it, and through which delays a
 from __future__ import annotations
 
 import types
-import typing
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Generic, Protocol, TypeVar, overload
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Generic, Protocol
 
 from .errors import EpicycleError
+from .port_types import shaped, type_name
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    T = TypeVar("T", default=Any)
+else:
+    from typing import TypeVar
+
+    T = TypeVar("T")
+
+_ANY: Any = Any
 
 
 class Emit(Protocol):
@@ -62,7 +69,7 @@ class _Port(Generic[T]):
 
 
 class InputPort(_Port[T]):
-    """Where tokens arrive.
+    """Where tokens arrive: of any type if none is given.
 
     ``shape`` is that of a ``numpy`` array, as for parameters: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
     ``required``: the model is wrong when nothing is connected to it.  ``multi``: any number of connections, each a
@@ -72,30 +79,9 @@ class InputPort(_Port[T]):
 
     direction = "input"
 
-    @overload
     def __init__(
         self,
-        type: type[T],
-        *,
-        shape: tuple[int | None, ...] | None = ...,
-        multi: bool = ...,
-        required: bool = ...,
-        triggers: bool = ...,
-        doc: str = ...,
-    ) -> None: ...
-    @overload  # unions and other types that are no classes
-    def __init__(
-        self: InputPort[Any],
-        type: object,
-        *,
-        multi: bool = ...,
-        required: bool = ...,
-        triggers: bool = ...,
-        doc: str = ...,
-    ) -> None: ...
-    def __init__(
-        self,
-        type: Any,
+        type: type[T] | types.UnionType = _ANY,
         *,
         shape: tuple[int | None, ...] | None = None,
         multi: bool = False,
@@ -178,7 +164,7 @@ class InputPort(_Port[T]):
 
 
 class OutputPort(_Port[T]):
-    """Where tokens leave.
+    """Where tokens leave: of any type if none is given.
 
     ``depends_on`` names the inputs that a token may depend on within the same tag; ``None`` means all of them, ``()``
     none (an actor that delays), which lets the port stand in a loop.
@@ -186,28 +172,9 @@ class OutputPort(_Port[T]):
 
     direction = "output"
 
-    @overload
     def __init__(
         self,
-        type: type[T],
-        *,
-        shape: tuple[int | None, ...] | None = ...,
-        multi: bool = ...,
-        depends_on: tuple[str, ...] | None = ...,
-        doc: str = ...,
-    ) -> None: ...
-    @overload
-    def __init__(
-        self: OutputPort[Any],
-        type: object,
-        *,
-        multi: bool = ...,
-        depends_on: tuple[str, ...] | None = ...,
-        doc: str = ...,
-    ) -> None: ...
-    def __init__(
-        self,
-        type: Any,
+        type: type[T] | types.UnionType = _ANY,
         *,
         shape: tuple[int | None, ...] | None = None,
         multi: bool = False,
@@ -232,65 +199,3 @@ class OutputPort(_Port[T]):
         """Engine: from now on nothing can be sent."""
         with suppress(AttributeError):
             del self.send
-
-
-def shaped(type: Any, shape: tuple[int | None, ...]) -> Any:
-    """The type of arrays of one shape; ``None`` is any length.  In a union: ``float | shaped(np.ndarray, (2,))``."""
-    return typing.Annotated.__class_getitem__((type, shape))  # type: ignore[attr-defined]
-
-
-def _shape(declared: Any) -> tuple[int | None, ...] | None:
-    """The shape that a type says, if it does."""
-    if typing.get_origin(declared) is not typing.Annotated:
-        return None
-    said = declared.__metadata__[0]
-    return said if isinstance(said, tuple) else None
-
-
-def type_name(declared: Any) -> str:
-    """A port type as a person would write it."""
-    if declared is object or declared is Any:
-        return "any"
-    if declared is np.ndarray:
-        return "array"
-    if (shape := _shape(declared)) is not None:
-        return f"{type_name(declared.__origin__)}[{', '.join('n' if size is None else str(size) for size in shape)}]"
-    arguments = typing.get_args(declared)
-    if isinstance(declared, types.UnionType) or typing.get_origin(declared) is typing.Union:
-        return " | ".join(type_name(argument) for argument in arguments)
-    if arguments:
-        return f"{type_name(typing.get_origin(declared))}[{', '.join(type_name(a) for a in arguments)}]"
-    return getattr(declared, "__name__", str(declared))
-
-
-def accepts(wanted: Any, given: Any) -> bool:
-    """Whether every token of type ``given`` may enter a port of type ``wanted``; an int passes for a float.
-
-    ``Any`` is for actors that hand on what they get: it goes with everything.  An array of any length does not fit
-    where one length is wanted; one whose shape is not said at all goes with every shape.
-    """
-    if wanted in (object, Any) or given is Any or wanted == given:
-        return True
-    if isinstance(given, types.UnionType) or typing.get_origin(given) is typing.Union:
-        return all(accepts(wanted, each) for each in typing.get_args(given))
-    if isinstance(wanted, types.UnionType) or typing.get_origin(wanted) is typing.Union:
-        return any(accepts(each, given) for each in typing.get_args(wanted))
-    shapes = _shape(wanted), _shape(given)
-    if shapes != (None, None):
-        kinds = [
-            each if shape is None else each.__origin__ for each, shape in zip((wanted, given), shapes, strict=True)
-        ]
-        return _fits(*shapes) and accepts(*kinds)
-    if wanted is float and given is int:
-        return True
-    inner, outer = typing.get_origin(given) or given, typing.get_origin(wanted) or wanted
-    if isinstance(inner, type) and isinstance(outer, type) and issubclass(inner, outer):
-        wanted_arguments, given_arguments = typing.get_args(wanted), typing.get_args(given)
-        return not wanted_arguments or wanted_arguments == given_arguments
-    return False
-
-
-def _fits(wanted: tuple[int | None, ...] | None, given: tuple[int | None, ...] | None) -> bool:
-    if wanted is None or given is None:
-        return True
-    return len(wanted) == len(given) and all(w in (None, g) for w, g in zip(wanted, given, strict=True))

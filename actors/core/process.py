@@ -32,8 +32,10 @@ class Process(Actor):
 
     def initialize(self) -> None:
         self._waits: list[tuple[Wake, Event]] = []
-        # Weak, so that a read that lost a race is forgotten as soon as the process has.
+        # Weak, so that a read that nobody has waited for is forgotten as soon as the process has; one that is waited
+        # for is kept, for nobody else may know the process that waits.
         self._reads: list[tuple[str, ReferenceType[Event]]] = []
+        self._awaited: set[Event] = set()
         self._queued: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
         self.failure: BaseException | None = None
         start = self.wait(0.0)
@@ -75,7 +77,7 @@ class Process(Actor):
         if queue:
             _settle(event, queue.popleft())
         else:
-            event.callbacks = _Listeners()
+            event.callbacks = _Listeners(ref(event), self._awaited)
             self._reads.append((port.name, ref(event)))
         return event
 
@@ -100,6 +102,7 @@ class Process(Actor):
             event = reference()
             if event is not None and self._queued[name] and not getattr(event.callbacks, "deserted", False):
                 del self._reads[index]
+                self._awaited.discard(event)
                 return name, event
         return None
 
@@ -112,13 +115,21 @@ class _Listeners(list[Any]):
 
     deserted = False
 
+    def __init__(self, event: ReferenceType[Event], awaited: set[Event]) -> None:
+        super().__init__()
+        self._event, self._awaited = event, awaited
+
     def append(self, callback: Any) -> None:
         self.deserted = False
         super().append(callback)
+        if (event := self._event()) is not None:
+            self._awaited.add(event)
 
     def remove(self, callback: Any) -> None:
         super().remove(callback)
         self.deserted = not self
+        if self.deserted and (event := self._event()) is not None:
+            self._awaited.discard(event)
 
 
 def _settle(event: Event, value: object) -> None:

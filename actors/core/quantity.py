@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -10,6 +12,10 @@ from .elementary import power as power_of
 from .units import UnitError, between, is_compound, parse_unit
 
 MAX_DEPTH = 100  # of lists and mappings in each other, in files and in what expressions make of them
+
+
+def _compared(compare: Callable[[float, float], bool]) -> Callable[[Quantity, float], bool]:
+    return lambda quantity, other: compare(float(quantity), quantity._beside(other))
 
 
 class Quantity(float):
@@ -110,17 +116,10 @@ class Quantity(float):
     def __abs__(self) -> Quantity:
         return Quantity(abs(float(self)), self.unit)
 
-    def __lt__(self, other: float) -> bool:
-        return float(self) < self._beside(other)
-
-    def __le__(self, other: float) -> bool:
-        return float(self) <= self._beside(other)
-
-    def __gt__(self, other: float) -> bool:
-        return float(self) > self._beside(other)
-
-    def __ge__(self, other: float) -> bool:
-        return float(self) >= self._beside(other)
+    __lt__ = _compared(operator.lt)
+    __le__ = _compared(operator.le)
+    __gt__ = _compared(operator.gt)
+    __ge__ = _compared(operator.ge)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, (int, float)) and float(self) == self._beside(other)
@@ -177,21 +176,19 @@ def is_too_deep(value: object) -> bool:
 
 def plain(value: object) -> object:
     """The value with every ``Quantity`` in it, at any depth, as a plain float."""
-    if isinstance(value, Quantity):
-        return float(value)
-    if isinstance(value, list):
-        return [plain(item) for item in value]
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    return value
+    return _each_quantity(float, value)
 
 
 def counted_in_si(value: object) -> object:
     """The value with every ``Quantity`` in it, at any depth, as a plain float in SI units."""
+    return _each_quantity(lambda quantity: quantity.si, value)
+
+
+def _each_quantity(change: Callable[[Quantity], float], value: object) -> object:
     if isinstance(value, Quantity):
-        return value.si
+        return change(value)
     if isinstance(value, list):
-        return [counted_in_si(item) for item in value]
+        return [_each_quantity(change, item) for item in value]
     if isinstance(value, dict):
-        return {key: counted_in_si(item) for key, item in value.items()}
+        return {key: _each_quantity(change, item) for key, item in value.items()}
     return value

@@ -9,7 +9,9 @@ them.  So only the bits are NumPy's (PCG64); every law is our own (``laws``), an
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import inspect
 import math
 from collections.abc import Callable, MutableSequence, Sequence
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -17,8 +19,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import laws
-from .nearest import did_you_mean
+from . import choices, laws
+from .messages import did_you_mean
 
 Size = int | Sequence[int] | None
 
@@ -158,15 +160,15 @@ class RandomStream:
         weights = None if p is None else np.asarray(p, float).ravel().tolist()
         if weights is not None and len(weights) != count:
             raise ValueError(f"{len(weights)} weights are given for {count} elements")
-        sums = None if weights is None else laws.cumulated(weights)
+        sums = None if weights is None else choices.cumulated(weights)
         if size is None:
-            return items[self.below(count) if sums is None else laws.weighted(self, sums)]
+            return items[self.below(count) if sums is None else choices.weighted(self, sums)]
         shape = _shape(size)
         wanted = math.prod(shape)
         if not replace:
-            draws = laws.without_replacement(self, count, wanted, weights)
+            draws = choices.without_replacement(self, count, wanted, weights)
         else:
-            draws = [self.below(count) if sums is None else laws.weighted(self, sums) for _ in range(wanted)]
+            draws = [self.below(count) if sums is None else choices.weighted(self, sums) for _ in range(wanted)]
         chosen = np.asarray(items)[np.array(draws, np.int64)]
         return chosen.reshape(*shape, *chosen.shape[1:])
 
@@ -188,141 +190,24 @@ class RandomStream:
         self.shuffle(order)
         return np.array(order, np.int64)
 
-    # -- laws with a closed inverse: one word a value -----------------------------------------------------------------
-
-    def uniform(self, low: ArrayLike = 0.0, high: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Uniform in [low, high)."""
-        return self._drawn(lambda low, high: low + (high - low) * ((self.word() >> 11) * _STEP), size, low, high)
-
-    def standard_normal(self, size: Size = None) -> Any:
-        """Normal with mean 0 and variance 1."""
-        return self._law(laws.standard_normal, size)
-
-    def normal(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Normal (Gaussian) with mean ``loc`` and standard deviation ``scale``."""
-        return self._law(laws.normal, size, loc, scale)
-
-    def lognormal(self, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Positive, with a normal logarithm of this mean and standard deviation."""
-        return self._law(laws.lognormal, size, mean, sigma)
-
-    def standard_exponential(self, size: Size = None) -> Any:
-        """Exponential with mean 1."""
-        return self._law(laws.standard_exponential, size)
-
-    def exponential(self, scale: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Exponential with mean ``scale``."""
-        return self._law(laws.exponential, size, scale)
-
-    def weibull(self, a: ArrayLike, size: Size = None) -> Any:
-        """Weibull with shape ``a`` and scale 1."""
-        return self._law(laws.weibull, size, a)
-
-    def pareto(self, a: ArrayLike, size: Size = None) -> Any:
-        """Lomax (Pareto II) with shape ``a``, from 0 on; add 1 for the classical law from 1 on."""
-        return self._law(laws.pareto, size, a)
-
-    def power(self, a: ArrayLike, size: Size = None) -> Any:
-        """In [0, 1], with density ``a * x^(a - 1)``."""
-        return self._law(laws.power, size, a)
-
-    def rayleigh(self, scale: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Rayleigh: the length of a plane vector of two normal numbers with deviation ``scale``."""
-        return self._law(laws.rayleigh, size, scale)
-
-    def laplace(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Laplace (double exponential) with variance ``2 * scale^2``."""
-        return self._law(laws.laplace, size, loc, scale)
-
-    def logistic(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Logistic."""
-        return self._law(laws.logistic, size, loc, scale)
-
-    def gumbel(self, loc: ArrayLike = 0.0, scale: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Gumbel's law of greatest values."""
-        return self._law(laws.gumbel, size, loc, scale)
-
-    def standard_cauchy(self, size: Size = None) -> Any:
-        """Cauchy with mode 0."""
-        return self._law(laws.standard_cauchy, size)
-
-    def triangular(self, left: ArrayLike, mode: ArrayLike, right: ArrayLike, size: Size = None) -> Any:
-        """Triangular over [left, right] with its top at ``mode``."""
-        return self._law(laws.triangular, size, left, mode, right)
-
-    def geometric(self, p: ArrayLike, size: Size = None) -> Any:
-        """How many trials it takes until one of probability ``p`` succeeds: 1, 2, ..."""
-        return self._law(laws.geometric, size, p, dtype=np.int64)
-
-    # -- laws that draw until a value is accepted ---------------------------------------------------------------------
-
-    def standard_gamma(self, shape: ArrayLike, size: Size = None) -> Any:
-        """Gamma with scale 1."""
-        return self._law(laws.standard_gamma, size, shape)
-
-    def gamma(self, shape: ArrayLike, scale: ArrayLike = 1.0, size: Size = None) -> Any:
-        """Gamma with mean ``shape * scale``; with a whole shape it is Erlang's law."""
-        return self._law(laws.gamma, size, shape, scale)
-
-    def chisquare(self, df: ArrayLike, size: Size = None) -> Any:
-        """Chi-square with ``df`` degrees of freedom."""
-        return self._law(laws.chisquare, size, df)
-
-    def beta(self, a: ArrayLike, b: ArrayLike, size: Size = None) -> Any:
-        """Beta over [0, 1] with mean ``a / (a + b)``."""
-        return self._law(laws.beta, size, a, b)
-
-    def standard_t(self, df: ArrayLike, size: Size = None) -> Any:
-        """Student's t with ``df`` degrees of freedom."""
-        return self._law(laws.standard_t, size, df)
-
-    def f(self, dfnum: ArrayLike, dfden: ArrayLike, size: Size = None) -> Any:
-        """Fisher's F with these degrees of freedom."""
-        return self._law(laws.f, size, dfnum, dfden)
-
-    def vonmises(self, mu: ArrayLike, kappa: ArrayLike, size: Size = None) -> Any:
-        """An angle in [-pi, pi] with mean direction ``mu`` and concentration ``kappa``."""
-        return self._law(laws.vonmises, size, mu, kappa)
-
-    def wald(self, mean: ArrayLike, scale: ArrayLike, size: Size = None) -> Any:
-        """Wald (inverse Gaussian)."""
-        return self._law(laws.wald, size, mean, scale)
-
-    def poisson(self, lam: ArrayLike = 1.0, size: Size = None) -> Any:
-        """How many events of a Poisson process come, if ``lam`` do on the average."""
-        return self._law(laws.poisson, size, lam, dtype=np.int64)
-
-    def binomial(self, n: ArrayLike, p: ArrayLike, size: Size = None) -> Any:
-        """How many of ``n`` trials of probability ``p`` succeed."""
-        return self._law(laws.binomial, size, n, p, dtype=np.int64)
-
-    def negative_binomial(self, n: ArrayLike, p: ArrayLike, size: Size = None) -> Any:
-        """How many trials of probability ``p`` fail before the ``n``-th success."""
-        return self._law(laws.negative_binomial, size, n, p, dtype=np.int64)
-
     # -- vectors -------------------------------------------------------------------------------------------------------
 
     def multinomial(self, n: int, pvals: ArrayLike, size: Size = None) -> Any:
         """How often each outcome comes in ``n`` trials with these probabilities; the last one takes what is left."""
         weights = np.asarray(pvals, float).ravel().tolist()
-        return self._vectors(lambda: laws.multinomial(self, n, weights), len(weights), size, np.int64)
+        return self._vectors(lambda: choices.multinomial(self, n, weights), len(weights), size, np.int64)
 
     def dirichlet(self, alpha: ArrayLike, size: Size = None) -> Any:
         """Shares that add up to 1, with concentrations ``alpha``."""
         shapes = np.asarray(alpha, float).ravel().tolist()
-        return self._vectors(lambda: laws.dirichlet(self, shapes), len(shapes), size, float)
+        return self._vectors(lambda: choices.dirichlet(self, shapes), len(shapes), size, float)
 
     def multivariate_normal(self, mean: ArrayLike, cov: ArrayLike, size: Size = None) -> Any:
         """A normal vector with this mean and covariance (symmetric, positive semidefinite)."""
-        means, root = np.asarray(mean, float).tolist(), laws.square_root(np.asarray(cov, float).tolist())
-        return self._vectors(lambda: laws.multivariate_normal(self, means, root), len(means), size, float)
+        means, root = np.asarray(mean, float).tolist(), choices.square_root(np.asarray(cov, float).tolist())
+        return self._vectors(lambda: choices.multivariate_normal(self, means, root), len(means), size, float)
 
     # -- shapes --------------------------------------------------------------------------------------------------------
-
-    def _law(self, law: Callable[..., Any], size: Size, *parameters: ArrayLike, dtype: Any = float) -> Any:
-        if size is None and _PLAIN.issuperset(map(type, parameters)):
-            return law(self, *parameters)
-        return self._drawn(lambda *values: law(self, *values), size, *parameters, dtype=dtype)
 
     def _drawn(self, draw: Callable[..., Any], size: Size, *parameters: ArrayLike, dtype: Any = float) -> Any:
         """One value of ``draw`` for each element of the parameters, which are broadcast to ``size``."""
@@ -339,6 +224,30 @@ class RandomStream:
     def _vectors(self, draw: Callable[[], Sequence[Any]], length: int, size: Size, dtype: Any) -> Any:
         shape = _shape(size)
         return np.array([draw() for _ in range(math.prod(shape))], dtype).reshape(*shape, length)
+
+
+def _method(law: Callable[..., Any]) -> Callable[..., Any]:
+    """The method of a stream that draws by a law: its parameters may be arrays, and ``size`` asks for an array."""
+    own = inspect.signature(law)
+    first, *parameters = own.parameters.values()
+    size = inspect.Parameter("size", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)
+    signature = own.replace(parameters=[first.replace(name="self"), *parameters, size])
+    dtype = np.int64 if own.return_annotation == "int" else float
+
+    @functools.wraps(law)
+    def draw(self: RandomStream, *values: Any, **named: Any) -> Any:
+        if not named and len(values) <= len(parameters) and _PLAIN.issuperset(map(type, values)):
+            return law(self, *values)
+        given = signature.bind(self, *values, **named)
+        given.apply_defaults()
+        return self._drawn(functools.partial(law, self), given.args[-1], *given.args[1:-1], dtype=dtype)
+
+    draw.__signature__ = signature  # type: ignore[attr-defined]
+    return draw
+
+
+for _law in laws.OF_ONE_VALUE:
+    setattr(RandomStream, _law.__name__, _method(_law))
 
 
 def _shape(size: Size) -> tuple[int, ...]:

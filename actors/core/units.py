@@ -4,7 +4,6 @@ Factors are exact fractions (of pi, for degrees) and become a float once, at the
 0.1 s to the last bit.
 """
 
-import difflib
 import functools
 import math
 import re
@@ -13,6 +12,7 @@ from fractions import Fraction
 from typing import Final
 
 from .errors import EpicycleError
+from .messages import brief, nearest
 
 MAX_TEXT = 100
 _MAX_EXPONENT = 20
@@ -254,11 +254,7 @@ class _Reader:
 
 
 def _did_you_mean(name: str) -> str:
-    meant = _MEANT.get(name.casefold())
-    if meant is None:
-        by_folded = {unit.casefold(): unit for unit in reversed(_SUGGESTED)}  # of m and M, the first one
-        found = difflib.get_close_matches(name.casefold(), by_folded, n=1)
-        meant = by_folded[found[0]] if found else None
+    meant = _MEANT.get(name.casefold()) or nearest(name, _SUGGESTED)
     return "" if meant is None else f", did you mean '{meant}'?"
 
 
@@ -299,7 +295,8 @@ def convert(value: str | int | float, unit: str) -> float:
             raise UnitError(f"{value!r} is not a number, {_expected(unit, parse_unit(unit))}")
         return float(value)
     except OverflowError:
-        raise UnitError(f"{_short(value)} is too large for a float") from None
+        shown = brief(value) if isinstance(value, str) else "a number of more than 40 digits"
+        raise UnitError(f"{shown} is too large for a float") from None
 
 
 def in_si(text: str) -> float | None:
@@ -311,14 +308,14 @@ def in_si(text: str) -> float | None:
     try:
         return _with_pi(split[0] * own.scale, own.pi_power)
     except OverflowError:
-        raise UnitError(f"{_short(text)} is too large for a float") from None
+        raise UnitError(f"{brief(text)} is too large for a float") from None
 
 
 @functools.lru_cache(maxsize=4096)  # the copies of an actor have the same quantities
 def _convert_text(text: str, unit: str) -> float:
     split, wanted = _split(text), parse_unit(unit)
     if split is None:
-        raise UnitError(f"{_short(text)} is not a number with a unit, {_expected(unit, wanted)}")
+        raise UnitError(f"{brief(text)} is not a number with a unit, {_expected(unit, wanted)}")
     number, own_text = split
     if not own_text:
         return float(number)
@@ -333,7 +330,7 @@ def _unit_in(text: str, unit: str) -> Unit:
         return parse_unit(unit)
     except UnitError as error:
         article = "an" if str(error).startswith("unreadable") else "the"
-        raise UnitError(f"{_short(text)} has {article} {error}") from None
+        raise UnitError(f"{brief(text)} has {article} {error}") from None
 
 
 def between(own: str, wanted: str, shown: str) -> tuple[Fraction, int]:
@@ -353,7 +350,7 @@ def is_compound(unit: str) -> bool:
 
 def _check_kind(shown: str, own_text: str, own: Unit, unit: str, wanted: Unit) -> None:
     if own.dimension != wanted.dimension or _is_turns_for_radians(own_text, unit):
-        raise UnitError(f"{_short(shown)} is {_kind(own_text, own)}, {_expected(unit, wanted)}")
+        raise UnitError(f"{brief(shown)} is {_kind(own_text, own)}, {_expected(unit, wanted)}")
 
 
 def _is_turns_for_radians(first: str, second: str) -> bool:
@@ -385,10 +382,3 @@ def _kind(text: str, unit: Unit) -> str:
     if unit.dimension == (_UNITS["Hz"] ** 2).dimension and symbols & _ANGLES:
         return "an angular acceleration"
     return _KINDS.get(unit.dimension, f"a quantity in {text}")
-
-
-def _short(value: object) -> str:
-    if isinstance(value, int) and abs(value) >= 10**40:
-        return "a number of more than 40 digits"
-    text = repr(value)
-    return text if len(text) <= 60 else text[:56] + "...'"

@@ -7,20 +7,7 @@ from .syntax import ExpressionError
 from .values import CONSTANTS, FUNCTIONS, Budget, BudgetError, text_of
 
 __all__ = [
-    "CONSTANTS",
-    "FUNCTIONS",
-    "Budget",
-    "BudgetError",
-    "ExpressionError",
-    "Formula",
-    "FormulaParameter",
-    "PortFormula",
-    "PortFormulaParameter",
-    "check_names",
-    "evaluate",
-    "interpolate",
-    "names_in",
-    "operand",
-    "text_of",
-    "value_at",
-]
+    "CONSTANTS", "FUNCTIONS", "Budget", "BudgetError", "ExpressionError", "Formula", "FormulaParameter",
+    "PortFormula", "PortFormulaParameter", "check_names", "evaluate", "interpolate", "names_in", "operand",
+    "text_of", "value_at",
+]  # fmt: skip

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import lru_cache
 from typing import ParamSpec, TypeVar
 
-from ..core import Quantity, UnitError, did_you_mean
+from ..core import Quantity, UnitError, cut, did_you_mean
 from .syntax import ExpressionError, free_names, parse, targets
 from .values import (
     BINARY,
@@ -72,26 +72,17 @@ def interpolate(text: str, names: Mapping[str, object], budget: Budget | None = 
 @lru_cache(maxsize=4096)  # a model asks for the same few texts once per copy of an actor
 def names_in(text: str) -> frozenset[str]:
     """Return the names that the `${...}` of a text ask for; constants and functions are left out."""
-    found: set[str] = set()
-    for offset, source in _pieces(text):
-        if offset is not None:
-            with _shifted(offset):
-                found |= free_names(parse(source), frozenset())
-    return frozenset(found - CONSTANTS.keys())
+    return frozenset().union(*(free_names(tree, frozenset()) for _, tree in _trees(text))) - CONSTANTS.keys()
 
 
 def check_names(text: str, known: Collection[str]) -> None:
     """Raise ``ExpressionError`` if the `${...}` of a text ask for a name that is not known."""
-    for offset, source in _pieces(text):
-        if offset is None:
-            continue
-        with _shifted(offset):
-            tree = parse(source)
-            strange = free_names(tree, frozenset()) - set(known) - CONSTANTS.keys() - FUNCTIONS.keys()
-            for node in ast.walk(tree):
-                if isinstance(node, ast.Name) and node.id in strange:
-                    length = (node.end_col_offset or 0) - node.col_offset
-                    raise ExpressionError(_unknown(node.id, known), node.col_offset, length)
+    for offset, tree in _trees(text):
+        strange = free_names(tree, frozenset()) - set(known) - CONSTANTS.keys() - FUNCTIONS.keys()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and node.id in strange:
+                length = (node.end_col_offset or 0) - node.col_offset
+                raise ExpressionError(_unknown(node.id, known), offset + node.col_offset, length)
 
 
 def _unknown(name: str, names: Collection[str]) -> str:
@@ -135,6 +126,14 @@ def _pieces(text: str) -> tuple[tuple[int | None, str], ...]:
     if literal:
         pieces.append((None, literal))
     return tuple(pieces)
+
+
+def _trees(text: str) -> Iterator[tuple[int, ast.expr]]:
+    """The expressions in a text, each with the offset at which it starts."""
+    for offset, source in _pieces(text):
+        if offset is not None:
+            with _shifted(offset):
+                yield offset, parse(source)
 
 
 def _end_of_expression(text: str, start: int) -> int | None:
@@ -204,8 +203,7 @@ class _Evaluation:
         raise self._error(node, message)
 
     def _text(self, node: ast.expr) -> str:
-        text = self._source[node.col_offset : node.end_col_offset]
-        return text if len(text) <= 60 else text[:57] + "..."
+        return cut(self._source[node.col_offset : node.end_col_offset])
 
     def value(self, node: ast.expr) -> object:
         """Return the value of a node."""
@@ -216,9 +214,9 @@ class _Evaluation:
             case ast.Name():
                 return self._lookup(node)
             case ast.List() | ast.Tuple():
-                return self._made(node, [self.value(item) for item in node.elts])
+                return self._weighed(node, [self.value(item) for item in node.elts])
             case ast.Dict():
-                return self._made(node, self._dict(node))
+                return self._weighed(node, self._dict(node))
             case ast.UnaryOp(op=ast.Not()):
                 return not self.value(node.operand)
             case ast.UnaryOp():
@@ -226,7 +224,7 @@ class _Evaluation:
                 return self.guard(node, UNARY[type(node.op)], operand)
             case ast.BinOp():
                 left, right = self.value(node.left), self.value(node.right)
-                return self._made(node, self.guard(node, BINARY[type(node.op)], left, right))
+                return self._weighed(node, self.guard(node, BINARY[type(node.op)], left, right))
             case ast.BoolOp():
                 return self._bool(node)
             case ast.Compare():
@@ -236,24 +234,21 @@ class _Evaluation:
             case ast.Subscript():
                 return self._subscript(node)
             case ast.Call(func=ast.Name(id=name)):
-                arguments = [self._used(item, self.value(item), name) for item in node.args]
-                return self._made(node, self.guard(node, FUNCTIONS[name], *arguments))
+                arguments = [self.value(item) for item in node.args]
+                if name != "len":  # which is known without looking
+                    for item, argument in zip(node.args, arguments, strict=True):
+                        self._weighed(item, argument)
+                return self._weighed(node, self.guard(node, FUNCTIONS[name], *arguments))
             case ast.ListComp():
                 items: list[object] = []
                 self._comprehend(node, 0, items)
-                return self._made(node, items)
+                return self._weighed(node, items)
             case _:
                 raise AssertionError(f"{type(node).__name__} passed the check")
 
-    def _made(self, node: ast.expr, value: T) -> T:
-        """Pay for a new list, dict or text, and see that it is not too large."""
+    def _weighed(self, node: ast.expr, value: T) -> T:
+        """Pay for a value by its size, when it is made or looked through, and see that it is not too large."""
         self.guard(node, self._budget.weigh, value)
-        return value
-
-    def _used(self, node: ast.expr, value: object, function: str = "") -> object:
-        """Pay for looking through all of a value; a length is known without looking."""
-        if function != "len":
-            self.guard(node, self._budget.weigh, value)
         return value
 
     def _lookup(self, node: ast.Name) -> object:
@@ -265,7 +260,7 @@ class _Evaluation:
             if name in CONSTANTS:
                 raise self._error(node, f"'{name}' is a constant and cannot be the name of something else: rename it")
             value = self._names[name]
-            return self._made(node, list(value)) if isinstance(value, tuple) else value
+            return self._weighed(node, list(value)) if isinstance(value, tuple) else value
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name in FUNCTIONS:
@@ -295,9 +290,9 @@ class _Evaluation:
         return result
 
     def _compare(self, node: ast.Compare) -> bool:
-        left = self._used(node.left, self.value(node.left))
+        left = self._weighed(node.left, self.value(node.left))
         for sign, right_node in zip(node.ops, node.comparators, strict=True):
-            right = self._used(right_node, self.value(right_node))
+            right = self._weighed(right_node, self.value(right_node))
             if not self.guard(node, COMPARE[type(sign)], left, right):
                 return False
             left = right
@@ -316,7 +311,7 @@ class _Evaluation:
         if not isinstance(whole, (list, tuple, str)):
             raise self._error(node, f"only a list or a text can be sliced, not {kind_of(whole)}")
         cut = self.guard(node, operator.getitem, whole, slice(*parts))
-        return self._made(node, list(cut) if isinstance(cut, tuple) else cut)
+        return self._weighed(node, list(cut) if isinstance(cut, tuple) else cut)
 
     def _comprehend(self, node: ast.ListComp, level: int, items: list[object]) -> None:
         if level == len(node.generators):

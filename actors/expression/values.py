@@ -16,6 +16,8 @@ MAX_TEXT = 10_000
 MAX_INT = 2**63
 _MAX_DECIMALS = 30
 
+NUMBER: Final = (int, float)
+LIST: Final = (list, tuple)
 CONSTANTS: Final = {"pi": math.pi, "e": math.e, "inf": math.inf}
 
 
@@ -91,8 +93,7 @@ def check_result(value: object) -> None:
     """Raise if the value that an expression hands out is too large or has a NaN in it."""
     if isinstance(value, str):
         _check_text(len(value))
-    elif isinstance(value, (list, tuple, dict)):
-        _size(value)
+    _size(value)
     stack = [value]
     while stack:
         item = stack.pop()
@@ -115,6 +116,9 @@ _KINDS: Final[tuple[tuple[type | tuple[type, ...], str], ...]] = (
 )
 
 
+_ORDERED: Final[tuple[Any, ...]] = (NUMBER, str, LIST)  # values of one kind can be put in an order
+
+
 def kind_of(value: object) -> str:
     """Return what kind of thing a value is, in words."""
     if value is None:
@@ -127,54 +131,25 @@ def kind_of(value: object) -> str:
 
 def text_of(value: object) -> str:
     """Return a value as it stands in a text: `true`, `null`, `3`, `2.5`, `[1, 'a']`."""
-    parts: list[str] = []
-    _write(value, parts, 0, is_inner=False)
-    return "".join(parts)
+    _size(value)  # which bounds what is to be written
+    text = value if isinstance(value, str) else _written(value)
+    _check_text(len(text))
+    return text
 
 
-def _write(value: object, parts: list[str], length: int, *, is_inner: bool) -> int:
-    """Append the pieces of a value; return the length so far, which must not outgrow the limit on the way."""
-    if isinstance(value, (list, tuple, dict)):
-        is_dict = isinstance(value, dict)
-        keys: list[object] = list(value) if isinstance(value, dict) else [None] * len(value)
-        values = value.values() if isinstance(value, dict) else value
-        parts.append("{" if is_dict else "[")
-        for index, (key, item) in enumerate(zip(keys, values, strict=True)):
-            start = (", " if index else "") + (f"{key!r}: " if is_dict else "")
-            parts.append(start)
-            length = _write(item, parts, length + len(start), is_inner=True)
-        parts.append("}" if is_dict else "]")
-        return length + 2
-    if value is None:
-        text = "null"
-    elif isinstance(value, bool):
-        text = "true" if value else "false"
-    elif isinstance(value, Quantity):
-        text = repr(value.si)
-    elif isinstance(value, float):
-        text = float.__repr__(value)  # also for subclasses that show their type
-    elif isinstance(value, str) and is_inner:
-        text = repr(value)
-    else:
-        text = str(value)
-    _check_text(length + len(text))
-    parts.append(text)
-    return length + len(text)
+def _written(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key!r}: {_written(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, LIST):
+        return "[" + ", ".join(map(_written, value)) + "]"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, float):  # by its own name, as subclasses show their type
+        return float.__repr__(value.si if isinstance(value, Quantity) else value)
+    return repr(value) if isinstance(value, str) else str(value)
 
 
 # --- operators ----------------------------------------------------------------------------------------
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float))
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
-
-
-def _is_list(value: object) -> bool:
-    return isinstance(value, (list, tuple))
 
 
 def _checked(result: Any, *operands: Any) -> Any:
@@ -193,7 +168,7 @@ def _checked(result: Any, *operands: Any) -> Any:
 
 def _arithmetic(sign: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def apply(left: Any, right: Any) -> Any:
-        if not (_is_number(left) and _is_number(right)):
+        if not (isinstance(left, NUMBER) and isinstance(right, NUMBER)):
             raise TypeError(f"{sign} needs two numbers, not {kind_of(left)} and {kind_of(right)}")
         return _checked(function(left, right), left, right)
 
@@ -201,25 +176,25 @@ def _arithmetic(sign: str, function: Callable[[Any, Any], Any]) -> Callable[[Any
 
 
 def _add(left: Any, right: Any) -> Any:
-    if _is_number(left) and _is_number(right):
+    if isinstance(left, NUMBER) and isinstance(right, NUMBER):
         return _checked(left + right, left, right)
     if isinstance(left, str) and isinstance(right, str):
         _check_text(len(left) + len(right))
         return left + right
-    if _is_list(left) and _is_list(right):
+    if isinstance(left, LIST) and isinstance(right, LIST):
         _check_elements(len(left) + len(right))
         return [*left, *right]
     raise TypeError(f"+ needs two numbers, two texts or two lists, not {kind_of(left)} and {kind_of(right)}")
 
 
 def _multiply(left: Any, right: Any) -> Any:
-    if _is_number(left) and _is_number(right):
+    if isinstance(left, NUMBER) and isinstance(right, NUMBER):
         return _checked(left * right, left, right)
     whole, times = (right, left) if isinstance(left, int) else (left, right)
     if isinstance(times, int) and isinstance(whole, str):
         _check_text(len(whole) * times)
         return whole * times
-    if isinstance(times, int) and _is_list(whole):
+    if isinstance(times, int) and isinstance(whole, LIST):
         _check_elements(len(whole) * times)
         return list(whole) * times
     raise TypeError(
@@ -238,8 +213,8 @@ def _power(base: Any, exponent: Any) -> Any:
 
 def _ordering(sign: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], bool]:
     def apply(left: Any, right: Any) -> bool:
-        for is_kind in (_is_number, _is_text, _is_list):
-            if is_kind(left) and is_kind(right):
+        for kind in _ORDERED:
+            if isinstance(left, kind) and isinstance(right, kind):
                 return bool(function(left, right))
         raise TypeError(f"{sign} cannot compare {kind_of(left)} with {kind_of(right)}")
 
@@ -258,7 +233,7 @@ def _contains(item: Any, whole: Any) -> bool:
 
 def _signed(sign: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     def apply(value: Any) -> Any:
-        if not _is_number(value):
+        if not isinstance(value, NUMBER):
             raise TypeError(f"{sign} needs a number, not {kind_of(value)}")
         return function(value)
 
@@ -313,34 +288,25 @@ def subscript(whole: Any, index: object) -> Any:
 # --- functions ----------------------------------------------------------------------------------------
 
 
-def _check_arity(name: str, count: int, least: int, most: float) -> None:
-    if not least <= count <= most:
-        wanted = f"at least {least}" if most == math.inf else f"{least} to {most}"
-        wanted = f"{least}" if least == most else wanted
-        raise TypeError(f"{name} takes {wanted} value{'' if wanted.endswith('1') else 's'}, not {count}")
-
-
-def _numeric(name: str, function: Callable[..., Any], least: int = 1, most: float = 1) -> Callable[..., Any]:
-    """Return a function of numbers that explains itself."""
+def _function(
+    name: str, function: Callable[..., Any], least: int = 1, most: float = 1, *, of_numbers: bool = True
+) -> Callable[..., Any]:
+    """A function that explains what it takes; of numbers, it gives a number of bearable size."""
 
     def call(*values: Any) -> Any:
-        _check_arity(name, len(values), least, most)
+        if not least <= len(values) <= most:
+            wanted = f"at least {least}" if most == math.inf else f"{least}" if least == most else f"{least} to {most}"
+            raise TypeError(f"{name} takes {wanted} value{'' if wanted.endswith('1') else 's'}, not {len(values)}")
+        if not of_numbers:
+            return function(*values)
         for value in values:
-            if not _is_number(value):
+            if not isinstance(value, NUMBER):
                 raise TypeError(f"{name} needs numbers, not {kind_of(value)}")
         try:
             result = function(*values)
         except ValueError:
             raise ValueError(f"{name} is not defined for {', '.join(map(str, values))}") from None
         return _checked(result, *values)
-
-    return call
-
-
-def _of_one(name: str, function: Callable[[Any], Any]) -> Callable[..., Any]:
-    def call(*values: Any) -> Any:
-        _check_arity(name, len(values), 1, 1)
-        return function(values[0])
 
     return call
 
@@ -386,7 +352,6 @@ def _round(value: Any, decimals: Any = None) -> Any:
 
 
 def _range(*values: Any) -> list[int]:
-    _check_arity("range", len(values), 1, 3)
     for value in values:
         if not isinstance(value, int):
             shown = text_of(value) if isinstance(value, float) else kind_of(value)
@@ -405,7 +370,7 @@ def _len(value: Any) -> int:
 
 
 def _needs_list(name: str, value: Any) -> list[Any]:
-    if not _is_list(value):
+    if not isinstance(value, LIST):
         raise TypeError(f"{name} needs a list, not {kind_of(value)}")
     return list(value)
 
@@ -413,21 +378,20 @@ def _needs_list(name: str, value: Any) -> list[Any]:
 def _sum(value: Any) -> Any:
     items = _needs_list("sum", value)
     for item in items:
-        if not _is_number(item):
+        if not isinstance(item, NUMBER):
             raise TypeError(f"sum needs a list of numbers, this one has {kind_of(item)} in it")
     return _checked(elementary.total(items), *items)
 
 
 def _ordered(name: str, items: list[Any]) -> list[Any]:
     """Return the items if they can be put in an order."""
-    if not any(all(map(is_kind, items)) for is_kind in (_is_number, _is_text, _is_list)):
+    if not any(all(isinstance(item, kind) for item in items) for kind in _ORDERED):
         raise TypeError(f"{name} cannot compare {' with '.join(sorted({kind_of(item) for item in items}))}")
     return items
 
 
 def _extreme(name: str, function: Callable[[list[Any]], Any]) -> Callable[..., Any]:
     def call(*values: Any) -> Any:
-        _check_arity(name, len(values), 1, math.inf)
         items = _ordered(name, _needs_list(name, values[0]) if len(values) == 1 else list(values))
         if not items:
             raise ValueError(f"{name} of an empty list")
@@ -450,28 +414,35 @@ def _converted(kind: type[int] | type[float], words: str) -> Callable[[Any], Any
 
 
 FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
-    "abs": _numeric("abs", abs),
-    "min": _extreme("min", min),
-    "max": _extreme("max", max),
-    "sum": _of_one("sum", _sum),
-    "len": _of_one("len", _len),
-    "range": _range,
-    "round": _numeric("round", _keeping_unit(_round), 1, 2),
-    "floor": _numeric("floor", _keeping_unit(math.floor)),
-    "ceil": _numeric("ceil", _keeping_unit(math.ceil)),
-    "sqrt": _numeric("sqrt", _in_unit("", math.sqrt)),
-    "exp": _numeric("exp", _in_unit("1", elementary.exp)),
-    "log": _numeric("log", _in_unit("1", _log), 1, 2),
-    "sin": _numeric("sin", _in_unit("rad", elementary.sin)),
-    "cos": _numeric("cos", _in_unit("rad", elementary.cos)),
-    "tan": _numeric("tan", _in_unit("rad", elementary.tan)),
-    "atan2": _numeric("atan2", _in_unit("", elementary.atan2), 2, 2),
-    "hypot": _numeric("hypot", _keeping_unit(elementary.hypot), 1, math.inf),
-    "radians": _numeric("radians", _angle("rad", math.radians)),
-    "degrees": _numeric("degrees", _angle("deg", math.degrees)),
-    "int": _of_one("int", _converted(int, "a whole number")),
-    "float": _of_one("float", _converted(float, "a number")),
-    "str": _of_one("str", text_of),
-    "bool": _of_one("bool", bool),
-    "sorted": _of_one("sorted", lambda value: sorted(_ordered("sorted", _needs_list("sorted", value)))),
+    name: _function(name, *rest, of_numbers=True)
+    for name, *rest in (
+        ("abs", abs),
+        ("round", _keeping_unit(_round), 1, 2),
+        ("floor", _keeping_unit(math.floor)),
+        ("ceil", _keeping_unit(math.ceil)),
+        ("sqrt", _in_unit("", math.sqrt)),
+        ("exp", _in_unit("1", elementary.exp)),
+        ("log", _in_unit("1", _log), 1, 2),
+        ("sin", _in_unit("rad", elementary.sin)),
+        ("cos", _in_unit("rad", elementary.cos)),
+        ("tan", _in_unit("rad", elementary.tan)),
+        ("atan2", _in_unit("", elementary.atan2), 2, 2),
+        ("hypot", _keeping_unit(elementary.hypot), 1, math.inf),
+        ("radians", _angle("rad", math.radians)),
+        ("degrees", _angle("deg", math.degrees)),
+    )
+} | {
+    name: _function(name, *rest, of_numbers=False)
+    for name, *rest in (
+        ("min", _extreme("min", min), 1, math.inf),
+        ("max", _extreme("max", max), 1, math.inf),
+        ("sum", _sum),
+        ("len", _len),
+        ("range", _range, 1, 3),
+        ("int", _converted(int, "a whole number")),
+        ("float", _converted(float, "a number")),
+        ("str", text_of),
+        ("bool", bool),
+        ("sorted", lambda value: sorted(_ordered("sorted", _needs_list("sorted", value)))),
+    )
 }

@@ -110,7 +110,7 @@ class RobustController(TargetModel, Actor):
         choices=(NOW, DECISION),
         doc="where the N steps begin: at t, or at t + period, when U_{t+1} begins to act",
     )
-    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="Delta t: time between two triggers")
+    period = Parameter(float, 0.1, unit="s", above=0, doc="Delta t: time between two triggers")
     safe_distance = Parameter(float, 2.0, unit="m", min=0, doc="Dmin: to the target and to other robots")
     margin = Parameter(float, 2.0, unit="1", min=0, doc="alpha: standard deviations to add to it")
     tube_initial = Parameter(float, 0.2, unit="m", min=1e-6, doc="sigma_r0: radius of the reachability set now")

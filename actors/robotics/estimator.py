@@ -46,7 +46,7 @@ class _Estimator(TargetModel, Actor):
     estimate = OutputPort(Estimate, doc="the target's state (x, y, vx, vy) after fusion")
     too_late = OutputPort(int, doc="how many measurements so far came more than max_delay late; sent with each of them")
 
-    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="the time over which the process noise was measured")
+    period = Parameter(float, 0.1, unit="s", above=0, doc="the time over which the process noise was measured")
     prior_mean = array_parameter((4,), (10.0, 0.0, 0.0, 0.0), doc="first guess of (x, y, vx, vy) in m and m/s")
     prior_variance = array_parameter((4,), (400.0, 400.0, 4.0, 4.0), min=0, doc="its variances, in m^2 and m^2/s^2")
     max_delay = Parameter(

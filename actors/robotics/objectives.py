@@ -41,7 +41,7 @@ class Inform(Objective):
 
     range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: farther from the target than this is penalised")
     penalty = Parameter(float, 0.001, min=0, doc="gamma: the penalty for each metre too far, at each step")
-    variance = Parameter(float, 2.0, unit="m^2", min=1e-9, doc="eta: variance of the predicted ranges")
+    variance = Parameter(float, 2.0, unit="m^2", above=0, doc="eta: variance of the predicted ranges")
     unit = Parameter(str, NAT, choices=(NAT, BIT), doc="of the information, against which the penalty counts")
     joint = Parameter(bool, True, doc="count what all robots measure together; false: what this one measures")
 

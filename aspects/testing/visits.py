@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, TypeVar
 
-from epicycle.aspects import Aspect, ExecutionAspect, JoinPoint, Unit
+from epicycle.aspects import Aspect, ExecutionAspect, JoinPoint, JoinPointAspect, PortAspect, Unit
+
+P = TypeVar("P", bound=JoinPoint)
 
 
 class Visits:
@@ -25,10 +28,13 @@ class Visits:
         self._acts = acts
         self._mutes = (*(() if acts else ("forward", "stop")), *(() if tells else ("act", "count", "record")))
         self._points: dict[JoinPoint, JoinPoint] = {}
-        setattr(self.aspect, "pass_token", self._pass_token)  # noqa: B010 (they are methods)
-        setattr(self.aspect, "pass_by", self._pass_by)  # noqa: B010
+        # Each run has a copy of the original, and tells this of it.
+        decides = "pass_token" if isinstance(aspect, PortAspect) else "schedule"
+        if isinstance(aspect, JoinPointAspect):
+            setattr(self.aspect, decides, partial(self._pass, aspect, decides))
+            setattr(self.aspect, "pass_by", partial(self._pass, aspect, "pass_by"))  # noqa: B010 (they are methods)
         if isinstance(aspect, ExecutionAspect):
-            setattr(self.aspect, "begin", self._begin)  # noqa: B010
+            setattr(self.aspect, "begin", partial(self._begin, aspect))  # noqa: B010
 
     def demand_some(self, at: str | Sequence[str]) -> None:
         """Raise ``AssertionError`` if nothing has passed."""
@@ -37,31 +43,24 @@ class Visits:
                 f"nothing has passed {self._original!r} at {at}, so nothing is shown: let it run longer"
             )
 
-    def _pass_token(self, token: Any, point: JoinPoint) -> None:
-        self.count += 1
-        if point.port not in self.streams:
-            self.streams[point.port] = repr(point.random)
-        self._do(self._original.pass_token, token, point)
+    def _begin(self, original: ExecutionAspect, unit: Unit) -> None:
+        original.begin(self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart")))
 
-    def _pass_by(self, token: Any, point: JoinPoint) -> None:
-        self._do(self._original.pass_by, token, point)
-
-    def _begin(self, unit: Unit) -> None:
-        assert isinstance(self._original, ExecutionAspect)
-        muted = self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart"))
-        assert isinstance(muted, Unit)
-        self._original.begin(muted)
-
-    def _do(self, method: Callable[[Any, JoinPoint], None], token: Any, point: JoinPoint) -> None:
+    def _pass(self, original: Aspect, method: str, passing: Any, point: JoinPoint) -> None:
+        """Let the aspect do what it does with a token or a firing."""
+        if method != "pass_by":
+            self.count += 1
+            if point.port not in self.streams:
+                self.streams[point.port] = repr(point.random)
         known = self._points.get(point)
         if known is None:
             known = self._points[point] = self._muted(point)
-        method(token, known)
+        getattr(original, method)(passing, known)
         self.shares = self.shares or bool(point.shared)
         if not self._acts:
-            point.forward(token)
+            point.forward(passing)
 
-    def _muted(self, point: JoinPoint, more: Sequence[str] = ()) -> JoinPoint:
+    def _muted(self, point: P, more: Sequence[str] = ()) -> P:
         if not self._mutes:
             return point
         muted = copy.copy(point)

@@ -19,7 +19,7 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print the reference."""
-    from ..model.catalogue import installed
+    from ..catalogue import installed
 
     known = installed().with_types(own_types(options))
     print_reference(known.actors, known.aspects, "actor", options.name, options.json)

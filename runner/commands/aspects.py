@@ -30,8 +30,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print the reference, or a model's aspects."""
     from epicycle.actors import EpicycleError
 
-    from ..model.catalogue import installed
-    from ..model.packaged import is_path, packaged_models
+    from ..catalogue import installed, is_path, packaged_models
 
     known = installed().with_types(own_types(options))
     name, types, models = options.model, known.aspects, packaged_models()

@@ -29,9 +29,9 @@ def print_reference(
 
     from epicycle.actors import EpicycleError
 
-    from ..model import did_you_mean
-    from ..model.catalogue import load_all
+    from ..catalogue import load_all
     from ..show import described, detail, overview, parts_described
+    from ..text import did_you_mean
 
     if name is not None:
         if name not in types:

@@ -20,11 +20,11 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Repeat the run, and compare its digest."""
-    from ..engine import write_log
-    from ..model import Problems
-    from ..show import check_folder, draw_figures, figures_of, summary_table, write_folder
-    from ..study import open_study, plan_of_folder
-    from ..study.one_run import again
+    from ..model import figures_of
+    from ..results import write_log
+    from ..show import check_folder, draw_figures, summary_table, write_folder
+    from ..study import again, open_study, plan_of_folder
+    from ..text import Problems
 
     row = open_study(options.folder).find(options.run_key)
     plan = plan_of_folder(options.folder)

@@ -22,8 +22,7 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Count what is there; name what failed."""
-    from ..study import open_study
-    from ..study.store import is_running
+    from ..study import is_running, open_study
 
     results = open_study(options.folder)
     table = results.table()

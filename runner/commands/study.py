@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, complain_traceback, tell
-from .options import DONE, FAILED, INTERRUPTED, add_types
+from .options import DONE, FAILED, INTERRUPTED, add_several, add_types, count, positive_seconds, seed
 
 if TYPE_CHECKING:
     from ..study import Plan, StudyResults
@@ -21,13 +20,8 @@ SHOWN = 5  # failed runs that are told one by one
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle study``."""
     command.add_argument("study", metavar="STUDY", help="a path to a YAML file, or the name of a packaged study")
-    command.add_argument(
-        "--set",
-        metavar="PATH=VALUE",
-        action="append",
-        default=[],
-        help="set a parameter of the model that the study does not vary; may be repeated",
-    )
+    about = "set a parameter of the model that the study does not vary; may be repeated"
+    add_several(command, "--set", "PATH=VALUE", about)
     command.add_argument(
         "--replications", type=count, metavar="N", help="runs of each condition (default: the study's); more are added"
     )
@@ -57,7 +51,7 @@ def add_session(command: argparse.ArgumentParser) -> None:
     command.add_argument("--jobs", type=count, metavar="N", help="processes at a time (default: one for each core)")
     command.add_argument(
         "--run-timeout",
-        type=seconds,
+        type=positive_seconds,
         metavar="S",
         help="seconds of real time after which a run is ended, and counts as failed (default: none)",
     )
@@ -66,20 +60,11 @@ def add_session(command: argparse.ArgumentParser) -> None:
     )
 
 
-def count(text: str) -> int:
-    """A whole number from 1 on."""
-    if not text.isdecimal() or not 0 < int(text) <= 10**9:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 1e9")
-    return int(text)
-
-
 def first_seed(text: str) -> int:
     """A seed after which those of all replications are seeds, too."""
-    from ..study.declaration import MAX_STUDY_SEED
+    from ..language import MAX_STUDY_SEED
 
-    if not text.isdecimal() or len(text) > 20 or int(text) > MAX_STUDY_SEED:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {MAX_STUDY_SEED}")
-    return int(text)
+    return seed(text, MAX_STUDY_SEED)
 
 
 def address(text: str) -> str:
@@ -90,21 +75,11 @@ def address(text: str) -> str:
     return f"{found[1] or 'tcp://'}{found[2]}:{found[3]}"
 
 
-def seconds(text: str) -> float:
-    """A number of seconds."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not 0.0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
-    return number
-
-
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Read, try and run the study."""
+    from ..language import read_study
     from ..show.report import check_figures
-    from ..study import Plan, available_cores, check_size, read_study
+    from ..study import Plan, available_cores, check_size
 
     check_session(options)
     types = [Path(file) for file in options.types]
@@ -153,9 +128,7 @@ def session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Make the runs that are missing, and tell what came of it."""
     from epicycle.actors import counted
 
-    from ..study import WorkerError, WriteError, open_study, run_study
-    from ..study.one_run import again
-    from ..study.progress import progress
+    from ..study import WorkerError, WriteError, again, open_study, progress, run_study
 
     try:
         with progress(plan.study.name) as told:

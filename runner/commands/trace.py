@@ -8,13 +8,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..printing import console, notices, tell, tell_json_text
-from .options import DONE, add_model, load, seconds, seed
+from .options import DONE, add_model, add_several, load, seconds, seed
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Tag
 
     from ..engine import Firing
-    from ..model import ModelGraph
+    from ..model import Model, ModelGraph
 
 DESCRIPTION = "Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."
 WIDEST = 80  # characters of a token
@@ -23,13 +23,8 @@ WIDEST = 80  # characters of a token
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle trace``."""
     add_model(command)
-    command.add_argument(
-        "--actor",
-        metavar="PATTERN",
-        action="append",
-        default=[],
-        help="actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)",
-    )
+    about = "actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)"
+    add_several(command, "--actor", "PATTERN", about)
     command.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
     command.add_argument("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'")
     command.add_argument("--to", metavar="TIME", help="end there (default: the end of the run)")
@@ -45,7 +40,7 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     start = to_nanoseconds(seconds("--from", options.start)) if options.start is not None else 0
     end = seconds("--to", options.to) if options.to is not None else None
     model = load(options)
-    actors = _actors(options.actor, model.graph)
+    actors = _actors(options.actor, model)
     show = _as_json if options.json else _as_text(actors, model.graph)
     say = tell_json_text if options.json else tell
 
@@ -60,12 +55,13 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     return DONE
 
 
-def _actors(patterns: list[str], graph: ModelGraph) -> dict[str, Actor]:
+def _actors(patterns: list[str], model: Model) -> dict[str, Actor]:
     """The actors that some patterns select, or that stand in composites that they select."""
     from epicycle.actors import EpicycleError
 
-    from ..model import PatternError, did_you_mean, select
+    from ..text import PatternError, did_you_mean, select
 
+    graph = model.graph
     known = [*graph.actors, *graph.composites]
     chosen: set[str] = set()
     for pattern in patterns or ["**"]:
@@ -73,7 +69,7 @@ def _actors(patterns: list[str], graph: ModelGraph) -> dict[str, Actor]:
             found = select(pattern, known)
         except PatternError as error:
             raise EpicycleError(f"--actor {pattern}: {error}") from None
-        if not found and not graph.is_excused(pattern):
+        if not found and not model.draft.excuses(pattern):
             raise EpicycleError(f"--actor {pattern} matches no actor{did_you_mean(pattern, known)}")
         chosen.update(found)
 
@@ -124,24 +120,15 @@ def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], 
 
 def _token(token: Any) -> str:
     """A token on one line, its numbers to six digits, and not too much of it."""
-    from ..engine import plain
+    from ..results import plain
+    from ..shown import six_digits
 
-    text = json.dumps(_rounded(plain(token)), ensure_ascii=False)
+    text = json.dumps(six_digits(plain(token)), ensure_ascii=False)
     return text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}..."
 
 
-def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
-        return float(f"{value:.6g}")
-    if isinstance(value, list):
-        return [_rounded(item) for item in value]
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    return value
-
-
 def _as_json(firing: Firing) -> str:
-    from ..engine import plain
+    from ..results import plain
 
     def tag(at: Tag | None) -> dict[str, float | int] | None:
         return None if at is None else {"time": at.seconds, "microstep": at.microstep}

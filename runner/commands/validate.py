@@ -23,20 +23,20 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
         return check_study(options)
     model = load(options, strict=options.strict)
     if model.endless:
-        told = f"warning: {model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
-        if options.strict:
-            from epicycle.actors import EpicycleError
+        from epicycle.actors import EpicycleError
 
-            raise EpicycleError(told.removeprefix("warning: "))
-        complain(told)
+        told = f"{model.endless}\n   help: write 'run: {{stop: 60 s}}', or run it with --until"
+        if options.strict:
+            raise EpicycleError(told)
+        complain(f"warning: {told}")
     tell(f"{options.model} is valid: {model.extent}")
     return DONE
 
 
 def is_study(name: str) -> bool:
     """Whether a packaged study has that name, or the file says that it is one."""
-    from ..model import is_path, packaged_models, packaged_studies
-    from ..study import is_study
+    from ..catalogue import is_path, packaged_models, packaged_studies
+    from ..language import is_study
 
     if is_path(name):
         return is_study(Path(name))
@@ -47,8 +47,9 @@ def check_study(options: argparse.Namespace) -> int:
     """Load the model at every level of what the study varies."""
     from epicycle.actors import EpicycleError, counted
 
+    from ..language import read_study
     from ..show.report import check_figures
-    from ..study import Plan, read_study
+    from ..study import Plan
 
     for option in ("overrides", "disturb", "aspect", "without"):
         if getattr(options, option):

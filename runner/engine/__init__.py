@@ -1,20 +1,32 @@
 """From a model to its results: director, event log, simulation."""
 
+from ..results import (
+    EventLog,
+    LogError,
+    LogFile,
+    Record,
+    Results,
+    Signal,
+    SignalError,
+    canonical,
+    cell,
+    check_log_path,
+    leaves,
+    plain,
+    write_log,
+)
+from .copies import CopyError
 from .director import ActorError, Director, LoopError
-from .encoding import canonical, cell, leaves, plain
-from .log import EventLog, LogError, Record
-from .log_file import LogFile, check_log_path, write_log
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
-from .results import Results
-from .signal import Signal, SignalError
-from .simulation import Simulation
+from .simulation import Simulation, Snapshot, SnapshotError
 from .trace import Arrival, Firing, Tracer
 
 __all__ = [
     "SLOWEST",
     "ActorError",
     "Arrival",
+    "CopyError",
     "Director",
     "EventLog",
     "Firing",
@@ -28,6 +40,8 @@ __all__ = [
     "Signal",
     "SignalError",
     "Simulation",
+    "Snapshot",
+    "SnapshotError",
     "Tracer",
     "canonical",
     "cell",

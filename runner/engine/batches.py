@@ -7,37 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
+from ..results import Interval
 from ..student import student_quantile
 
 BATCHES = 20  # more of them gain next to nothing (Schmeiser 1982)
 MOST = 1024  # that are kept
 OF_MSER = 5  # tokens in a batch
 LEAST_OF_MSER = 10  # batches
-SHAKY = 0.45  # two standard deviations of the autocorrelation of 20 numbers that have nothing to do with each other
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A confidence interval of a mean from one run; ``autocorrelation`` is that of the batch means, at lag 1."""
-
-    level: float
-    low: float
-    high: float
-    batches: int
-    autocorrelation: float
-
-    @property
-    def half(self) -> float:
-        """Half its width."""
-        return (self.high - self.low) / 2
-
-    @property
-    def is_shaky(self) -> bool:
-        """Whether the batch means hang together so much that only a longer run can be trusted."""
-        return self.autocorrelation > SHAKY
 
 
 class TokenBatches:

@@ -32,7 +32,8 @@ from typing import Any, NoReturn
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake, readable
 from epicycle.aspects import Job
 
-from ..model import NORMAL, RAISE_IT, Limits, Position, describe, told_raised
+from ..model import describe
+from ..text import NORMAL, RAISE_IT, Limits, Position, told_raised
 from .agenda import Environment, Instant, Turn
 from .pace import Pace
 
@@ -132,7 +133,9 @@ class Director:
         self._on_their_way = 0  # tokens, to times and microsteps to come
         self._most_times = limits.times
         self.firings = 0
-        self.present: Tag | None = None  # the tag that is being handled; None between, while SimPy does things
+        self.steps = 0  # tags, and events of SimPy's
+        # The tag that is being handled, also while its time has another; None between, while SimPy does things.
+        self.present: Tag | None = None
         self.last = Tag(_START, 0)  # the latest tag that was handled, or is being handled
         self.ranks = order  # of actors and of their inputs
         self._turns: dict[int, Turn] = {}  # by rank
@@ -294,20 +297,7 @@ class Director:
 
     # -- time -----------------------------------------------------------------------------------------------------
 
-    def _handle(self, time: int) -> None:
-        """Handle every tag of an instant."""
-        self.environment.move_on(time)
-        to_handle: Instant | None = self._instants.pop(time)
-        try:
-            while to_handle is not None:
-                if self._stop_after is not None and to_handle.tag > self._stop_after:
-                    return  # and leave it undone: the run ends here
-                self._handle_tag(to_handle)
-                to_handle, self._next = self._next, None
-        finally:
-            self.present = None
-
-    def _handle_tag(self, instant: Instant) -> None:
+    def _handle(self, instant: Instant) -> None:
         tag, turns, ready = instant.tag, self._turns, self._ready
         for turn, wake in instant.wakes:
             turn.wakes.append(wake)
@@ -329,6 +319,8 @@ class Director:
             if self.present is not tag:
                 self._begin(tag)
             self.fire(turn)
+        if self._next is None:
+            self.present = None
 
     def _begin(self, tag: Tag) -> None:
         """Something happens at a tag, for the first time."""
@@ -378,27 +370,34 @@ class Director:
         actors: list[Actor],
         progress: Callable[[float], None] | None = None,
         pace: Pace | None = None,
+        most: int | None = None,
     ) -> str:
         """Handle events up to and including ``stop`` (ns), until none is left, or until a stop was asked for.
 
-        Returns why it ended.
+        Returns why it ended; nothing if that is because ``most`` steps are done, of which each is a tag or an event of
+        SimPy's.
         """
         environment, times = self.environment, self._times
-        steps = here = 0
-        now: float = _START
+        last_step = math.inf if most is None else self.steps + most
+        here = 0
+        now: float = self.last.time
         if pace is not None:
             pace.wait_for(now)
         if progress is not None:
             progress(now / 1e9)
-        while True:
-            upcoming: float = times[0] if times else math.inf
-            is_of_simpy = environment.comes_by(upcoming)
-            if is_of_simpy:
-                upcoming = environment.peek()
-            if upcoming == math.inf:
+        while self.steps < last_step:
+            after, instant = self._stop_after, self._next if self.present is not None else None
+            if after is not None and self.last >= after:
                 break
-            if self._stop_after is not None and max(upcoming, self.last.time) > self._stop_after.time:
-                break
+            goes_on, is_of_simpy = instant is not None, False
+            if instant is not None:  # more of the present time
+                upcoming: float = instant.tag.time
+            else:
+                upcoming = times[0] if times else math.inf
+                if environment.comes_by(upcoming):
+                    upcoming, is_of_simpy = environment.peek(), True
+                if upcoming == math.inf or (after is not None and max(upcoming, self.last.time) > after.time):
+                    break
             if stop is not None and upcoming > stop:
                 if pace is not None:
                     pace.wait_for(stop)
@@ -408,22 +407,27 @@ class Director:
             try:
                 if is_of_simpy:
                     environment.step()
+                elif instant is not None:
+                    self._next = None
+                    self._handle(instant)
                 else:
-                    self._handle(heappop(times))
-            except (ActorError, LoopError, KeyboardInterrupt):
-                raise
+                    environment.move_on(times[0])
+                    self._handle(self._instants.pop(heappop(times)))
             except BaseException as error:
+                self.present = None
+                if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
+                    raise
                 found, cause = self._of_process(error, actors)
                 raise found from cause
-            if self._stop_after is not None and self.last >= self._stop_after:
-                break
-            here = here + 1 if upcoming == now else 0
+            here = here + (not goes_on) if upcoming == now else 0
             now = upcoming
             if here > MAX_STEPS:
                 raise LoopError(self.tag.time, ())
-            steps += 1
-            if progress is not None and steps % 16 == 0:
+            self.steps += 1
+            if progress is not None and self.steps % 16 == 0:
                 progress(now / 1e9)
+        else:
+            return ""
         return self._reason
 
     def _of_process(self, error: BaseException, actors: list[Actor]) -> tuple[ActorError, BaseException | None]:

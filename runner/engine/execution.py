@@ -18,7 +18,7 @@ from epicycle.aspects import ActorPoint, Job
 from ..model import describe
 from .agenda import Turn
 from .director import ActorError, Director
-from .local import LocalDirector
+from .local_time import LocalDirector
 
 
 class Execution:

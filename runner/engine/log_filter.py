@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..model import Model, PatternError, did_you_mean, select
-from .log import LogError
+from ..model import Model
+from ..results import LogError
+from ..text import PatternError, did_you_mean, select
 
 _SHOWN = 12  # names in a message
 

@@ -4,63 +4,20 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula, operand
 
+from ..catalogue import MSER5, TIME, Measure
 from ..model import Metric
-from ..model.measure import MSER5, TIME, Measure
-from ..tables import short
-from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, Interval, TimeBatches, TokenBatches, batch_interval, mser
+from ..results import Outcome
+from ..shown import short
+from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
 from .statistic import statistic_of
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a metric came to.
-
-    ``missing`` says why there is no value, ``unsure`` why there is no interval where one was asked for; ``after`` is
-    the time (s) until which nothing counted.
-    """
-
-    value: Any = None
-    missing: str = ""
-    interval: Interval | None = None
-    unsure: str = ""
-    after: float = 0.0
-
-    def shown(self, show: Callable[[Any], str]) -> str:
-        """The value with its interval, as ``show`` writes numbers."""
-        if self.value is None:
-            return "-"
-        return show(self.value) + (f" ± {self.interval.half:.2g}" if self.interval is not None else "")
-
-    def plain(self) -> dict[str, Any]:
-        """What there is to say beside the value, for programs."""
-        found: dict[str, Any] = {"after": self.after} if self.after else {}
-        found |= {key: said for key, said in (("missing", self.missing), ("unsure", self.unsure)) if said}
-        return found if self.interval is None else {**found, **asdict(self.interval)}
-
-    @property
-    def remarks(self) -> list[str]:
-        """What people should know of the value."""
-        if self.missing:
-            return [f"no value, because {self.missing}"]
-        found = []
-        if self.interval is not None:
-            found.append(
-                f"{100 * self.interval.level:.6g} % interval, autocorrelation {self.interval.autocorrelation:.2f}"
-                + (" (too much: make the run longer)" if self.interval.is_shaky else "")
-            )
-        if self.unsure:
-            found.append(f"no interval, because {self.unsure}")
-        if self.after:
-            found.append(f"after {self.after:.6g} s")
-        return found
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from epicycle.actors import EpicycleError, to_nanoseconds, to_seconds
 from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
 from ..model import WovenAspect
-from .local import Deliver
+from .local_time import Deliver
 
 
 class Requests:
@@ -24,27 +24,24 @@ class Requests:
         self._jobs: dict[tuple[str, int], Job] = {}  # the firings that wait for an answer, by actor and number
         self._number: dict[str, int] = {}  # how many firings of an actor there were
 
-    def add_way(self, point: JoinPoint, place: str) -> Callable[[Any, JoinPoint], None]:
-        """A further way through a place, to all that is behind a port or to one channel: what to do with its tokens."""
+    def add_way(self, point: JoinPoint, place: str) -> Callable[[Any], None]:
+        """A further way through a place, to all that is behind a port or to one channel: where its tokens enter."""
         ways = self._ways.setdefault(place, [])
         way = len(ways)
         ways.append(point)
 
-        def ask_for_firing(job: Job, point: JoinPoint) -> None:
+        def ask_for_firing(job: Job) -> None:
             number = self._number[place] = self._number.get(place, -1) + 1
             self._jobs[place, number] = job
-            seconds = time_needed(self.model.times[place], job, ways[0].random) or 0.0
+            seconds = time_needed(self.model.times[place], job, point.random) or 0.0
             point.act("requested", seconds)
             self.entries[place](FiringRequest(None, "", place, point.now, self.name, number, seconds))
 
-        if place in self.model.times:
-            return ask_for_firing
-
-        def ask(token: Any, point: JoinPoint) -> None:
+        def ask(token: Any) -> None:
             point.act("requested", token)
             self.entries[place](Request(token, point.source, place, point.now, self.name, way))
 
-        return ask
+        return ask_for_firing if place in self.model.times else ask
 
     def answer(self, request: Any) -> None:
         """Take what the composite sends from its response port; raises ``EpicycleError`` if that is no request."""

@@ -1,35 +1,71 @@
-"""Simulation: a model, wired up, woven and run."""
+"""Simulation: a model that is run, at once or step by step, and whose run can be kept and gone back to."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from functools import partial
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar, overload
 
-from epicycle.actors import Actor, EpicycleError, to_nanoseconds, to_seconds
+from epicycle.actors import Actor, EpicycleError, Process, Tag, did_you_mean, to_nanoseconds
+from epicycle.aspects import Aspect
 
-from ..collection import without_collection
-from ..model import Model, WovenAspect, describe, raised_at
-from .director import ActorError, Director
-from .interrupt import between_steps
-from .local import Deliver
-from .log import EventLog, Record
+from ..model import Model, WovenAspect
+from ..results import EventLog, Record, Results, Signal
+from .copies import Copies
+from .director import Director
 from .log_filter import LogFilter
-from .measurement import Measurement
 from .pace import Pace
-from .results import Results
-from .signal import Signal
-from .trace import Tracer, TracingDirector, TracingLog
-from .wiring import Wiring
+from .run import Run
+from .trace import Tracer
+
+Part = TypeVar("Part", bound=Actor | Aspect)
+
+
+class SnapshotError(EpicycleError):
+    """A run that cannot be kept, or cannot be gone back to."""
+
+
+class Snapshot:
+    """A run at a tag, of which any number of runs can go on: see ``Simulation.snapshot``."""
+
+    def __init__(self, run: Run) -> None:
+        self.model = run.model
+        self.seed = run.seed
+        self.tag = run.director.last
+        self._digest = run.log.digest  # which leaves nothing in the log that waits for its bytes
+        self._steps = run.director.steps
+        self._is_begun = run.is_begun
+        # Python cannot copy a generator: what is kept of processes is the way there.
+        has_processes = run.is_begun and any(isinstance(actor, Process) for actor in run.actors.values())
+        self._run = None if has_processes else _copy(run)
+
+    def again(self, start: Callable[[int], Run]) -> Run:
+        """A run that goes on from here; ``start`` makes one that begins, with a seed.  Raises ``SnapshotError``."""
+        if self._run is not None:
+            return _copy(self._run)
+        run = start(self.seed)
+        run.go(None, most=self._steps)
+        if (run.director.last, run.log.digest) != (self.tag, self._digest):
+            raise SnapshotError(
+                f"{self.model.name} has processes, so a run goes back to {self.tag} by way of its beginning, but came "
+                "to something else there: the model was changed, or something depends on more than model and seed"
+            )
+        return run
+
+    def __repr__(self) -> str:
+        return f"<Snapshot of {self.model.name}, seed {self.seed}, at {self.tag}>"
+
+
+def _copy(run: Run) -> Run:
+    return Copies(run.outside).of(run)
 
 
 class Simulation:
-    """One run of a model, which is checked first and may not be changed between this and ``run``.
+    """One run of a model, which is checked first, and is not changed by any of its runs.
 
-    A model can be run any number of times, one after the other, each time by a Simulation of its own.  ``keep_log``
-    keeps the records of the event log, all or those that a ``LogFilter`` lets pass; ``log_to``, such as
-    ``LogFile.add``, is given them instead.
+    It is compiled into actors, aspects and ways of this run alone: any number of simulations of a model can go on at
+    once, step by step in turn or in threads.  ``simulation["sink"]``, or ``simulation[sink]`` for the object that was
+    added to the model, is the actor of this run.  ``keep_log`` keeps the records of the event log, all or those that a
+    ``LogFilter`` lets pass; ``log_to``, such as ``LogFile.add``, is given them instead.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
@@ -43,63 +79,19 @@ class Simulation:
         log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
     ) -> None:
-        _refuse_running(model)
         model.check()
         if keep_log is True:
             keep_log = LogFilter({})
         if keep_log:
             keep_log.check(model)
+        seed = model.seed if seed is None else seed
+        if seed < 0:
+            raise ValueError(f"a seed is a whole number from 0 up, not {seed}")
         self.model = model
-        self.seed = model.seed if seed is None else seed
-        if self.seed < 0:
-            raise ValueError(f"a seed is a whole number from 0 up, not {self.seed}")
-        self._tracer = tracer
-        order = model.order()
-        keeps = keep_log.keeps if keep_log else None
-        self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
-        limits = model.graph.limits
-        self.director = (
-            Director(order, self.seed, limits) if tracer is None else TracingDirector(order, self.seed, tracer, limits)
-        )
-        self.log.crowd = self.director.crowd
-        self.signals = {name: Signal(name) for name in model.recorded}
-        self._measurements = {metric.name: Measurement(metric) for metric in model.metrics}
-        self._has_run = False
-        self._started = 0.0
-        self._stop: int | None = None
-        self._unreported: ActorError | None = None
-        try:
-            with without_collection():
-                self._wiring = Wiring(model, self.director, self.log, self._listeners(), self.signals)
-        except ActorError as error:  # of a clock that is wrong in a way that cannot be told
-            raise self._placed(error) from _cause(error)
-
-    # -- what is watched ------------------------------------------------------------------------------------------
-
-    def _listeners(self) -> dict[str, list[Deliver]]:
-        """Recorders, metrics and the stop rule, by the path of the port that they listen to."""
-        found: dict[str, list[Deliver]] = {}
-        for name, signal in self.signals.items():
-            found.setdefault(name, []).append(partial(self._record, signal))
-        for metric in self.model.metrics:
-            for path in metric.ports:
-                found.setdefault(path, []).append(partial(self._measure, self._measurements[metric.name], path))
-        for path in self.model.stop_ports:
-            found.setdefault(path, []).append(partial(self._ask_to_stop, path))
-        return found
-
-    def _record(self, signal: Signal, token: Any) -> None:
-        signal.add(self.director.tag, token)
-
-    def _measure(self, measurement: Measurement, path: str, token: Any) -> None:
-        measurement.add(path, self.director.tag.time, token)
-
-    def _ask_to_stop(self, path: str, token: Any) -> None:
-        try:
-            if token:
-                self.director.stop("stop_when")
-        except ValueError as error:  # arrays are neither true nor false
-            raise ActorError("stop_when", self.director.tag, f"asking {path}", describe(error)) from error
+        self._keeps = keep_log.keeps if keep_log else None
+        self._is_told_of = log_to is not None or tracer is not None
+        self._parts = _parts(model.graph.actors, model.aspects)
+        self._run = Run(model, seed, self._keeps, log_to, tracer)
 
     # -- running --------------------------------------------------------------------------------------------------
 
@@ -115,123 +107,127 @@ class Simulation:
         ``until`` is the stop time (s, default: the model's), ``progress`` is told of the time now and then, and
         ``pace`` holds the run to the wall clock.
         """
-        if self._has_run:
-            raise RuntimeError("a Simulation runs once: make another one for another run")
-        _refuse_running(self.model)
-        self._has_run = True
-        stop = self._stop = self.model.stop_time if until is None else to_nanoseconds(until)
-        actors = list(self.model.graph.actors.values())
-        director = self.director
-        begun: list[Actor] = []
-        self.model.is_running = True
-        try:
-            for actor in actors:
-                actor.enter(self._wiring.context_of(actor.path))
-                for port in actor.inputs.values():
-                    port.clear()  # of what a failed run has left there
-            self._started = time.perf_counter()
-            for actor in actors:
-                self._call(actor, "initialize")
-                begun.append(actor)
-            self._wiring.begin()
-            # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
-            self._wiring.open()
-            with between_steps(director.interrupt):
-                stopped = director.run(stop, actors, progress, pace)
-        except ActorError as error:
-            raise self._placed(error) from _cause(error)
-        finally:
-            try:
-                self._wiring.close()
-                if self._tracer is not None:
-                    self._tracer.end()
-                late = self._wrap_up(begun)
-            finally:
-                self.model.is_running = False
-        results = self.results(stopped)
-        late = late or self._unreported
-        if late is not None:
-            raise self._placed(late) from _cause(late)
-        return results
+        self._refuse_over()
+        self._run.go(self._until(until), progress=progress, pace=pace)
+        return self._run.finish()
+
+    def advance(self, until: float) -> bool:
+        """Go on up to and including a time (s); whether there is more to come after it."""
+        self._refuse_over()
+        stop, last = to_nanoseconds(until), self.model.stop_time
+        is_last = last is not None and stop >= last
+        return self._run.go(last if is_last else stop) == "stop time" and not is_last
+
+    def step(self) -> bool:
+        """Handle the next tag, or what SimPy has to do before it; whether there was anything until the stop time."""
+        self._refuse_over()
+        return not self._run.go(self.model.stop_time, most=1)
+
+    def finish(self) -> Results:
+        """End the run where it has come to, and return what came of it."""
+        self._refuse_over()
+        return self._run.finish()
 
     def results(self, stopped: str) -> Results:
         """What has come of the run so far; ``stopped`` says why it is over."""
-        # What stood at the last event stands until the stop time, if that is what ended the run.
-        end = self._stop if stopped == "stop time" and self._stop is not None else self.director.last.time
-        outcomes = {name: each.outcome(end) for name, each in self._measurements.items()}
-        return Results(
-            model=self.model.name,
-            seed=self.seed,
-            parameters=dict(self.model.parameters),
-            metrics={name: each.value for name, each in outcomes.items()},
-            aspects=self._figures(),
-            signals=self.signals,
-            log=self.log,
-            end=to_seconds(self.director.last.time),
-            stopped=stopped,
-            firings=self.director.firings,
-            wall_time=time.perf_counter() - self._started,
-            units={metric.name: metric.unit for metric in self.model.metrics},
-            outcomes=outcomes,
-        )
+        return self._run.results(stopped)
 
-    def _wrap_up(self, actors: list[Actor]) -> ActorError | None:
-        """Let every actor wrap up, whatever happened before; the first error of these is returned."""
-        first = None
-        for actor in actors:
-            try:
-                self._call(actor, "wrapup")
-            except ActorError as error:
-                first = first or error
-        return first
+    def _refuse_over(self) -> None:
+        if self._run.is_over:
+            raise RuntimeError("a Simulation runs once: make another one for another run")
 
-    def _call(self, actor: Actor, method: str) -> None:
-        try:
-            getattr(actor, method)()
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:
-            raise ActorError(actor.path, self.director.tag, f"{method}()", describe(error)) from error
+    def _until(self, until: float | None) -> int | None:
+        return self.model.stop_time if until is None else to_nanoseconds(until)
 
-    def _placed(self, error: ActorError) -> ActorError:
-        """The error with the place in the model file where its actor is declared, and the user's line it comes from."""
-        position = self.model.graph.positions.get(error.path)
-        where = f"{position.file}:{position.line}:{position.column}" if position else ""
-        return ActorError(error.path, error.tag, error.doing, error.reason, where, raised_at(_cause(error)))
+    # -- going back -----------------------------------------------------------------------------------------------
 
-    def _figures(self) -> dict[str, dict[str, float | None]]:
-        """How often each event of each aspect happened, over all its ports, and what the aspect reports."""
-        figures: dict[str, dict[str, float | None]] = {}
-        for woven in self.model.aspects:
-            total = dict.fromkeys(woven.aspect.events, 0)
-            for point in self._wiring.points[woven.name]:
-                for event, number in point.counts.items():
-                    total[event] = total.get(event, 0) + number
-            figures[woven.name] = {**total, **self._report(woven)}
-        return figures
+    def snapshot(self) -> Snapshot:
+        """The run as it is now, between two tags: ``restore`` and ``fork`` go on from there as this one would.
 
-    def _report(self, woven: WovenAspect) -> dict[str, float | None]:
-        """What an aspect reports; if it fails, that is told when all results are there."""
-        try:
-            return dict(woven.aspect.report(self._wiring.shared(woven), self.director.last.time))
-        except Exception as error:
-            self._unreported = ActorError(f"aspect {woven.name}", self.director.tag, "report()", describe(error))
-            self._unreported.__cause__ = error
-            return {}
+        It holds copies of all that the run consists of; where there are processes (``Process``), which Python cannot
+        copy, it holds how far the run has come, and going back to it runs the model again up to there.  Raises
+        ``SnapshotError`` for a run that is over, or that others are told of; ``CopyError`` for what cannot be copied.
+        """
+        if self._run.is_over:
+            raise SnapshotError(f"the run of {self.model.name} is over: take a snapshot before its end")
+        if self._is_told_of:
+            raise SnapshotError(
+                f"the run of {self.model.name} is told to log_to or to a tracer, which cannot be untold: leave them out"
+            )
+        return Snapshot(self._run)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of a run of the same model, whatever has become of this one.
+
+        Actors are copies of those in the snapshot: ask ``simulation["path"]`` for them once more.
+        """
+        if snapshot.model is not self.model:
+            raise SnapshotError(f"{snapshot!r} is of another model than this simulation of {self.model.name}")
+        if self._is_told_of:
+            raise SnapshotError(
+                f"the run of {self.model.name} is told to log_to or to a tracer, which cannot be untold: leave them out"
+            )
+        self._run = snapshot.again(self._started)
+
+    def fork(self) -> Simulation:
+        """Another simulation that goes on from here, as this one does unless something is changed in it."""
+        fork = object.__new__(Simulation)
+        fork.__dict__.update(self.__dict__)
+        fork.restore(self.snapshot())
+        return fork
+
+    def _started(self, seed: int) -> Run:
+        return Run(self.model, seed, self._keeps)
+
+    # -- what there is in it --------------------------------------------------------------------------------------
+
+    @overload
+    def __getitem__(self, part: str) -> Actor: ...
+    @overload
+    def __getitem__(self, part: Part) -> Part: ...
+    def __getitem__(self, part: str | Part) -> Any:
+        """The actor of this run that has a path, or that stands for an actor or aspect object of the model."""
+        found: Any = None
+        if isinstance(part, str):
+            found = self.actors.get(part)
+        else:
+            pairs = zip(self._parts, _parts(self._run.actors, self._run.aspects), strict=True)
+            found = next((ours for own, ours in pairs if own is part), None)
+        if found is None:
+            name, known = (part, did_you_mean(part, self.actors)) if isinstance(part, str) else (repr(part), "")
+            raise EpicycleError(f"{name} is no part of {self.model.name}{known}")
+        return found
+
+    @property
+    def actors(self) -> Mapping[str, Actor]:
+        """The actors of this run, by path."""
+        return self._run.actors
+
+    @property
+    def seed(self) -> int:
+        """The seed of this run."""
+        return self._run.seed
+
+    @property
+    def tag(self) -> Tag:
+        """The tag that was handled last; (0, 0) before the first."""
+        return self._run.director.last
+
+    @property
+    def director(self) -> Director:
+        """Engine: who fires the actors."""
+        return self._run.director
+
+    @property
+    def log(self) -> EventLog:
+        """The event log so far."""
+        return self._run.log
+
+    @property
+    def signals(self) -> dict[str, Signal]:
+        """What has been recorded so far."""
+        return self._run.signals
 
 
-def _refuse_running(model: Model) -> None:
-    """Its actors can be part of one run at a time."""
-    if model.is_running:
-        raise EpicycleError(
-            f"{model.name} is being run by another Simulation: wait until that is over, or load or build the model "
-            "once more"
-        )
-
-
-def _cause(error: ActorError) -> BaseException | None:
-    """What an actor really raised: SimPy raises a copy of an error, whose cause the error itself is."""
-    cause = error.__cause__
-    while isinstance(cause, ActorError):
-        cause = cause.__cause__
-    return cause
+def _parts(actors: Mapping[str, Actor], aspects: Iterable[WovenAspect]) -> list[Actor | Aspect]:
+    return [*actors.values(), *(woven.aspect for woven in aspects)]

@@ -13,7 +13,7 @@ from fractions import Fraction
 from itertools import chain
 from typing import Any
 
-from ..model.measure import Measure
+from ..catalogue import Measure
 
 _KEPT = 512  # numbers until they are summed up
 

@@ -12,11 +12,11 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import Job
 
-from ..model import Limits
+from ..results import EventLog, Record, Write
+from ..text import Limits
 from .agenda import Turn
 from .director import Director
 from .execution import is_stand_in
-from .log import EventLog, Record, Write
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,52 +1,40 @@
-"""From YAML text to a checked model: document, declarations, elaboration, graph."""
+"""From declarations, or a program, to a checked model."""
 
 from .clock import Clock
 from .composite_class import CompositeClass, load_composite
 from .culprit import describe, raised_at
 from .ends import CompositePort, Instance
-from .graph import Hop, ModelGraph, Wire
-from .limits import NORMAL, RAISE_IT, Limits
+from .figures import Complaint, figures_of, made_figure, place_in_figure, tell_of_figure
+from .graph import Hop, ModelGraph, Wire, is_within
 from .load import load_model
 from .model import Model
-from .observation import Metric
-from .packaged import is_path, packaged_disturbances, packaged_models, packaged_studies
-from .patterns import PatternError, select
-from .problems import ModelError, Position, Problem, Problems, did_you_mean, told_raised
 from .schedule import firing_order
 from .scope import Composite
+from .watch import Metric
 from .woven import WovenAspect, extent
 
 __all__ = [
-    "NORMAL",
-    "RAISE_IT",
     "Clock",
+    "Complaint",
     "Composite",
     "CompositeClass",
     "CompositePort",
     "Hop",
     "Instance",
-    "Limits",
     "Metric",
     "Model",
-    "ModelError",
     "ModelGraph",
-    "PatternError",
-    "Position",
-    "Problem",
-    "Problems",
     "Wire",
     "WovenAspect",
     "describe",
-    "did_you_mean",
     "extent",
+    "figures_of",
     "firing_order",
-    "is_path",
+    "is_within",
     "load_composite",
     "load_model",
-    "packaged_disturbances",
-    "packaged_models",
-    "packaged_studies",
+    "made_figure",
+    "place_in_figure",
     "raised_at",
-    "select",
-    "told_raised",
+    "tell_of_figure",
 ]

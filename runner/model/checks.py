@@ -10,24 +10,25 @@ import networkx as nx
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
+from ..text import RAISE_IT, Position, Problems, in_general
+from .draft import Draft
 from .graph import Detour, Hop, ModelGraph, Wire
-from .limits import RAISE_IT
-from .problems import Position, Problems
 from .schedule import dependencies
 
 MAX_PASSAGE = 200  # composite ports in a row
 MAX_SHOWN = 10  # names in one message
 
 
-def check(graph: ModelGraph, problems: Problems, *, whole: bool = True) -> None:
+def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
     """Add every problem of wiring: types, missing connections, two writers, loops without delay.
 
     If it is the ``whole`` model and nothing is wrong, warn of actors that can never fire.
     """
+    graph = draft.graph
     if not check_passages(graph, problems):
         return
     check_types(graph, problems)
-    check_connections(graph, problems)
+    check_connections(draft, problems)
     check_loops(graph, problems)
     if whole and not len(problems):
         check_reach(graph, problems)
@@ -84,6 +85,7 @@ def check_types(graph: ModelGraph, problems: Problems) -> None:
                 *(who for who in (_who(graph, path), _who(graph, far)) if who),
                 *((f"the way: {way}",) if len(hops) > 1 else ()),
                 *_other_position(hops[0].position, hops[-1].position),
+                about=("types", in_general(path), in_general(far)),
             )
 
 
@@ -113,18 +115,20 @@ def _other_position(first: Position | None, last: Position | None) -> tuple[str,
     return (f"connected onward at {last.file}:{last.line}:{last.column}",)
 
 
-def check_connections(graph: ModelGraph, problems: Problems) -> None:
+def check_connections(draft: Draft, problems: Problems) -> None:
     """Required inputs are connected, and single inputs have one writer."""
+    graph = draft.graph
     for actor in graph.actors.values():
         position = graph.positions.get(actor.path)
         for port in actor.inputs.values():
             wires = graph.wires_to(port)
-            if not wires and port.required and not _may_be_connected(graph, port.path):
+            if not wires and port.required and not _may_be_connected(draft, port.path):
                 problems.add(
                     f"{port.path} is not connected, and {type(actor).__name__} cannot do without it",
                     position,
                     *_open_end(graph, port.path),
                     f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
+                    about=("missing", in_general(port.path)),
                 )
             if len(wires) > 1 and not port.multi:
                 times = Counter(wire.source.path for wire in wires)
@@ -137,22 +141,14 @@ def check_connections(graph: ModelGraph, problems: Problems) -> None:
                     wires[1].hops[-1].position,
                     *_first_connection(wires),
                     "connect one of them, or send through an actor that merges them",
+                    about=("several", in_general(port.path)),
                 )
 
 
-def _may_be_connected(graph: ModelGraph, path: str) -> bool:
+def _may_be_connected(draft: Draft, path: str) -> bool:
     """Whether a missing connection may be due to another problem: a wrong connection, or an actor not made."""
-    if not graph.is_wired:
-        return True
-    seen, waiting = {path}, [path]
-    while waiting:
-        here = waiting.pop()
-        if graph.ports.nodes[here].get("unmade"):
-            return True
-        before = {hop.source for hop in graph.incoming(here)} - seen
-        seen |= before
-        waiting += sorted(before)
-    return False
+    before = nx.ancestors(draft.graph.ports, path) if draft.is_wired and draft.open else ()
+    return not draft.is_wired or path in draft.open or not draft.open.isdisjoint(before)
 
 
 def _first_connection(wires: list[Wire]) -> tuple[str, ...]:
@@ -205,6 +201,7 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
             *map(_step, ways),
             f"the aspect {detour.aspect} sends the tokens of all its ports through one model: let it stand at fewer of "
             "them, or give that model a delay",
+            about=("loop", *map(in_general, actors)),
         )
         return
     # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
@@ -220,6 +217,7 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
             if path in graph.clocks
         ),
         f"give one of these connections a delay, best the one that leads back: {_with_delay(graph, back)}",
+        about=("loop", *map(in_general, actors)),
     )
 
 
@@ -282,6 +280,7 @@ def check_reach(graph: ModelGraph, problems: Problems) -> None:
             f"{first} can never fire: it is no source, and {why}",
             graph.positions.get(first),
             *((f"nor can what it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
+            about=("idle", in_general(first)),
         )
 
 

@@ -7,20 +7,20 @@ output ``response``, or its only output.  Which of several inputs takes the toke
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import networkx as nx
 
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
-from epicycle.aspects import Aspect, CompositeAspect, Request
+from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
-from .configuration import place_of
-from .declarations import PartText, PointcutText
+from ..language import PartText, PointcutText
+from ..text import PathIndex, Position, Problems, did_you_mean
+from .draft import Draft
 from .firing_times import without_port
 from .graph import Detour, ModelGraph
-from .patterns import PathIndex
-from .problems import Position, Problems, did_you_mean
+from .settle import place_of
 from .weave import Paths, Weaving
 from .woven import AspectModel, WovenAspect
 
@@ -40,7 +40,7 @@ class ModelWeaving(Weaving):
 
     def __init__(
         self,
-        graph: ModelGraph,
+        draft: Draft,
         paths: Paths,
         name: str,
         path: str,
@@ -49,25 +49,26 @@ class ModelWeaving(Weaving):
         position: Position,
         cls: type[Aspect] = CompositeAspect,
     ) -> None:
-        super().__init__(graph, paths, name, cls, scope, problems)
+        super().__init__(draft, paths, name, cls, scope, problems)
         self.path = path
         self.position = position
-        self.model = AspectModel(path, graph.composites[path], "", {})
-        self.inputs, self.outputs = graph.borders(path)
-        self.requests: dict[str, None] = {}  # the request ports
+        self.inputs, self.outputs = draft.graph.borders(path)
+        self._response = ""
+        self._asked: dict[str, str] = {}  # the request port of each place
+        self._request_ports: dict[str, None] = {}  # with "" for one that is not known, which has been told
+        self._times: dict[str, FiringTime] = {}
         self._is_misplaced = False
-        self._is_unsure = False  # whether it was told that a request port is not known
 
     @property
     def kind(self) -> str:
-        return self.model.kind
+        return self.graph.composites[self.path]
 
     def check(self, woven: WovenAspect) -> None:
         """Find the ports by which tokens come in and leave, and see whether the composite can stand where it is to."""
-        self.model.response = self._only(self.outputs, "response", "output", self.position)
-        if not self.requests and not self._is_unsure:
+        self._response = self._only(self.outputs, "response", "output", self.position)
+        if not self._request_ports:
             self._request(PointcutText("", self.position))
-        for port in self.requests:
+        for port in filter(None, self._request_ports):
             for hop in self.graph.incoming(port):
                 self._problem(
                     f"{port} is for the tokens of this aspect, and nothing else can be connected to it",
@@ -83,27 +84,28 @@ class ModelWeaving(Weaving):
         self._check_types()
         self._check_directors(woven)
 
-    def connect(self, woven: WovenAspect) -> None:
+    def connect(self, woven: WovenAspect) -> WovenAspect:
         """Let the tokens of all places come in, and go on when they are answered."""
-        if self._is_unsure:
-            self.graph.leave_open(self.path)
-        for port in self.requests:
+        if "" in self._request_ports:
+            self.draft.leave_open(self.path)
+        for port in filter(None, self._request_ports):
             for hop in list(self.graph.incoming(port)):  # a problem, and told as such
                 self.graph.disconnect(hop)
             self.graph.open_requests(port)
-        if self.model.response:
-            self.graph.ports.nodes[self.model.response]["type"] = Request
-        if self.model.response and not self._is_misplaced:
-            woven.model = self.model
+        if self._response:
+            self.graph.ports.nodes[self._response]["type"] = Request
+        if not self._response or self._is_misplaced:
+            return woven
+        return replace(woven, model=AspectModel(self.path, self.kind, self._response, self._asked, self._times))
 
-    def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         ports, connections, actors = super().select(pointcuts)
         actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
         # What was aimed at may be left out again, and of actors it is the composite around them.
         aimed = {place: place for place in (*ports, *(_place(*ends) for ends in connections))} | actors
-        requests, times = self.model.requests, self.model.times
-        self.model.requests = {place: requests[unit] for place, unit in aimed.items() if unit in requests}
-        self.model.times = {place: times[unit] for place, unit in aimed.items() if unit in times}
+        asked, times = self._asked, self._times
+        self._asked = {place: asked[unit] for place, unit in aimed.items() if unit in asked}
+        self._times = {place: times[unit] for place, unit in aimed.items() if unit in times}
         return ports, connections, actors
 
     def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> list[str]:
@@ -111,7 +113,7 @@ class ModelWeaving(Weaving):
         outside = [path for path in found if path != self.path and not self._is_inside(path)]
         self._ask(pointcut, outside, found)
         if not pointcut.exclude:
-            self.model.times.update(dict.fromkeys(outside, pointcut.firing_time))
+            self._times.update(dict.fromkeys(outside, pointcut.firing_time))
             inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
             for message, keys, advice in without_port(("time",), pointcut.firing_time, inside, self.graph):
                 time = pointcut.time
@@ -137,9 +139,8 @@ class ModelWeaving(Weaving):
             return
         if found and not places:
             self._problem(f"it cannot stand inside of itself, at {found[0]}", pointcut)
-        request = self._request(pointcut)
-        if request:
-            self.model.requests.update(dict.fromkeys(places, request))
+        if request := self._request(pointcut):
+            self._asked.update(dict.fromkeys(places, request))
 
     def _request(self, pointcut: PointcutText) -> str:
         """The port by which the tokens of a pointcut come in."""
@@ -156,9 +157,7 @@ class ModelWeaving(Weaving):
                     f"its inputs: {', '.join(names) or 'none'}",
                 )
                 found = ""
-        if found:
-            self.requests[found] = None
-        self._is_unsure = self._is_unsure or not found
+        self._request_ports[found] = None
         return found
 
     def _only(self, ports: list[str], name: str, direction: str, position: Position, hint: str = "") -> str:
@@ -179,7 +178,7 @@ class ModelWeaving(Weaving):
 
     def _check_types(self) -> None:
         """Whether the ports, if they declare types, take and give requests."""
-        for port in [*self.requests, *([self.model.response] if self.model.response else [])]:
+        for port in filter(None, (*self._request_ports, self._response)):
             node = self.graph.ports.nodes[port]
             wanted = node.get("type")
             if wanted is not None and not accepts(wanted, Request):
@@ -239,7 +238,7 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
 
     def add(source: str, destination: str, woven: WovenAspect) -> None:
         position = graph.positions.get(f"aspect {woven.name}")
-        order = graph.mark() + len(found)
+        order = graph.next_order + len(found)
         key = (source, destination, woven.name)
         found.setdefault(key, Detour(source, destination, None, position, order, woven.name))
 

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
-from .catalogue import Catalogue, installed
-from .declarations import CompositeText, DeclarationReader, ModelText, PartText
-from .document import Mapping, read
-from .elaborate import Elaborator
-from .graph import ModelGraph
-from .inheritance import inherit
-from .load import find_library, included_composites
-from .model import Model
-from .problems import Position, Problems, did_you_mean
-from .reading import Text
-from .settings import Settings
-from .site import call_site, entries_of
+from ..catalogue import Catalogue, installed
+from ..language import (
+    CompositeText,
+    PartText,
+    Settings,
+    inherit,
+    read_library,
+)
+from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
+from .draft import Draft
+from .settle import Settler
+from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .weave_all import weave_all
+from .woven import WovenAspect
 
 
 class CompositeClass:
@@ -42,20 +46,23 @@ class CompositeInstance:
         self.path = path
         self.parameters = parameters
 
-    def unfold(self, path: str, model: Model, position: Position) -> None:
-        """Make it part of a model; raises ``ModelError`` before anything has changed."""
-        cls = self.composite
+    def unfold(self, path: str, draft: Draft, position: Position) -> tuple[Draft, list[WovenAspect]]:
+        """What it is as a part of a draft, with the aspects that come with it; raises ``ModelError``."""
+        cls, problems = self.composite, Problems()
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which stands beside the parameters, as in a model file
-            part.priority = part.values.pop("priority").value
-        root = ModelText(CompositeText(model.name, position))
-        for graph in (ModelGraph(), model.graph):  # the first one to see what is wrong
-            problems = Problems()
-            elaborator = Elaborator(root, cls.composites, Settings(), problems, cls.catalogue)
-            elaborator.graph = graph
-            aspects = elaborator.instance(path, part)
-            problems.raise_if_any()
-        model.enlist(aspects)
+            part = replace(part, priority=part.values.pop("priority").value)
+        limits = draft.graph.limits
+        made = Unfolded(draft.inside(draft.graph.director_of(path)), limits.actors)
+        known, settler = Known(cls.composites, cls.catalogue), Settler(Settings(limits=limits), problems)
+        _, bracket, index = path.rpartition("[")
+        names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
+        aspects: list[WovenAspect] = []
+        with suppress(TooLargeError):
+            Unfolding(known, settler, made).instances(path, path.rpartition(".")[0], part, names)
+            aspects = weave_all(made, known, settler)
+        problems.raise_if_any()
+        return made.draft, aspects
 
     def __repr__(self) -> str:
         return f"<{self.composite.name} {self.path}>"
@@ -70,18 +77,9 @@ def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -
     >>> main = model.add(MobileRobot("main", start=[30, 0], objective=ReachGoal(goal=[0, 0]), max_speed="8 m/s"))
     """
     problems = Problems()
-    path = find_library(Path(file))
-    node = read(path, problems)
-    text = None
-    if node is not None:
-        reader = DeclarationReader(problems)
-        is_model = isinstance(node, Mapping) and "model" in node.entries
-        text = reader.model(node) if is_model else reader.included(node)
-    problems.raise_if_any()
-    assert text is not None, "what cannot be read is a problem"
+    declared = read_library(file, problems)
     catalogue = installed().with_types(types)
-    found = included_composites(text, path, DeclarationReader(problems), problems)
-    composites, broken = inherit(found, catalogue.actors, problems)
+    composites, broken = inherit(declared, catalogue.actors, problems)
     if name not in composites and name not in broken:
         problems.add(
             f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}",

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import Aspect, Decoration, decorations
 
-from .declarations import PointcutText
+from ..language import PointcutText
+from ..text import Position, Problems, Text
+from .draft import Draft
 from .graph import ModelGraph
-from .problems import Position, Problems
-from .reading import Text
 from .weave import Paths, Weaving
 from .woven import WovenAspect
 
@@ -18,14 +19,14 @@ Change = Callable[[str, Aspect], Mapping[str, object]]
 
 
 def weave_decorations(
-    actor: Actor, graph: ModelGraph, problems: Problems, position: Position, change: Change | None = None
+    actor: Actor, draft: Draft, problems: Problems, position: Position, change: Change | None = None
 ) -> list[WovenAspect]:
     """The aspects that come with an actor; ``change`` tells the parameters that are set from outside."""
     before: list[WovenAspect] = []
     behind: list[WovenAspect] = []
     for each in decorations(actor):
-        woven = _weave(actor, each, graph, problems, position, change)
-        if woven is not None and _is_at_outputs(woven, graph):
+        woven = _weave(actor, each, draft, problems, position, change)
+        if woven is not None and _is_at_outputs(woven, draft.graph):
             before.append(woven)
         elif woven is not None:
             behind.insert(0, woven)
@@ -35,7 +36,7 @@ def weave_decorations(
 def _weave(
     actor: Actor,
     decoration: Decoration,
-    graph: ModelGraph,
+    draft: Draft,
     problems: Problems,
     position: Position,
     change: Change | None,
@@ -56,15 +57,17 @@ def _weave(
         except EpicycleError as error:
             problems.add(f"aspect {name}: {error}", position)
             return None
-    paths = Paths(graph, [port.path for port in own.values()])
+    paths = Paths(draft, [port.path for port in own.values()])
     pointcuts = [PointcutText.of(Text(each, position)) for each in at_parameter]
-    weaving = Weaving(graph, paths, name, type(aspect), actor.path, problems)
-    woven = weaving.weave(aspect, pointcuts, lambda *_: position)
-    woven.ports = [own[port].path for port in decoration.ports if port in own]
-    woven.actors = {} if decoration.ports else {actor.path: actor.path}
+    weaving = Weaving(draft, paths, name, type(aspect), actor.path, problems)
+    woven = replace(
+        weaving.weave(aspect, pointcuts, lambda *_: position),
+        ports=[own[port].path for port in decoration.ports if port in own],
+        actors={} if decoration.ports else {actor.path: actor.path},
+        comes_with_actor=True,
+    )
     weaving.check_times(woven, lambda *_: position)
-    woven.comes_with_actor = True
-    graph.positions.setdefault(f"aspect {name}", position)
+    draft.graph.positions.setdefault(f"aspect {name}", position)
     return woven
 
 

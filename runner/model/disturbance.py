@@ -1,165 +1,44 @@
-"""Disturbances: aspects in files of their own, which are added to a model from outside."""
+"""Disturbances that are woven around a model that is made."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .catalogue import installed
-from .declarations import DISTURBANCE_KEYS, CompositeText, DeclarationReader, ModelText, ParameterText
-from .document import Mapping, Node, Scalar, read
-from .elaborate import Elaborator
-from .inheritance import inherit
-from .packaged import find, packaged_disturbances
-from .problems import Position, Problems
-from .settings import Setting, Settings, put_aspect, settings_in
-from .site import node_of
-from .usage import check_own_usage
+from ..catalogue import installed
+from ..language import (
+    PARAMETER_THERE,
+    CompositeText,
+    ParameterText,
+    Settings,
+    inherit,
+    joined,
+    load_disturbance,
+    settings_in,
+)
+from ..text import Mapping, Position, Problems, node_of
+from .draft import Draft
+from .settle import Settler
+from .unfold import Known, Unfolded, Unfolding
+from .weave_all import weave_all
 from .woven import WovenAspect
 
 if TYPE_CHECKING:
     from .model import Model
 
 
-@dataclass
-class Disturbance:
-    """A file of aspects, with parameters and classes of their own and values for parameters of the model."""
-
-    text: CompositeText
-    composites: dict[str, CompositeText] = field(default_factory=dict)
-    settings: list[Setting] = field(default_factory=list)
-
-
-def find_disturbance(name: str, problems: Problems) -> Path | None:
-    """The file of a disturbance: a path if it looks like one, otherwise a packaged disturbance's name."""
-    return find(name, "disturbance", packaged_disturbances, problems)
-
-
-def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
-    """A disturbance by its name or path; None if it cannot be read at all."""
-    path = find_disturbance(name, problems)
-    node = None if path is None else read(path, problems)
-    return None if node is None else _declared(node, problems)
-
-
-def _declared(node: Node, problems: Problems) -> Disturbance | None:
-    """What a file declares; whatever is misshapen is a problem and left out."""
-    if isinstance(node, Mapping) and "model" in node.entries and "disturbance" not in node.entries:
-        problems.add(
-            f"{node.position.file} is a model, not a disturbance",
-            node.entries["model"].key.position,
-            "a disturbance begins with a line like 'disturbance: my_disturbance'",
-        )
-        return None
-    reader = DeclarationReader(problems)
-    entries = reader.entries(node, "the disturbance", DISTURBANCE_KEYS)
-    if entries is None:
-        return None
-    before = len(problems)
-    text = CompositeText("disturbance", node.position)
-    if "disturbance" in entries:
-        text.name = reader.name(entries["disturbance"].value, "the disturbance's name") or text.name
-    else:
-        problems.add(
-            "the disturbance has no name",
-            node.position,
-            "begin the file with a line like 'disturbance: my_disturbance'",
-        )
-    if "doc" in entries:
-        text.doc = reader.text(entries["doc"].value, "doc") or ""
-    settings = _settings(entries["set"].value, problems) if "set" in entries else []
-    for key, entry in reader.named(entries, "parameters"):
-        text.parameters[key] = reader.parameter(key, entry)
-    for key, entry in reader.named(entries, "aspects"):
-        if (part := reader.part(key, entry, "aspect")) is not None:
-            text.aspects[key] = part
-    classes = ModelText(text)
-    reader.library({key: entry for key, entry in entries.items() if key == "composites"}, classes)
-    if len(problems) == before:
-        check_own_usage(text, problems)
-    return Disturbance(text, classes.composites, settings)
-
-
-def _settings(node: Node, problems: Problems) -> list[Setting]:
-    """Values for parameters of the model, as ``--set`` gives them."""
-    if isinstance(node, Mapping):
-        return settings_in(node, problems)
-    if not (isinstance(node, Scalar) and node.value is None):
-        problems.add(
-            "set is not a mapping from parameters to values",
-            node.position,
-            "write lines like 'observer[*].sensor.max_range: 5 m'",
-        )
-    return []
-
-
-def load_disturbances(
-    names: Iterable[str], composites: dict[str, CompositeText], problems: Problems
-) -> list[Disturbance]:
-    """Disturbances by their names or paths; their classes join those of the model."""
-    found: list[Disturbance] = []
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            problems.add(f"the disturbance {name} is given twice", None, "leave one of them out")
-            continue
-        seen.add(name)
-        disturbance = load_disturbance(name, problems)
-        if disturbance is None:
-            continue
-        for key, composite in disturbance.composites.items():
-            if (first := composites.get(key)) is not None:
-                problems.add(
-                    f"there is a composite {key!r} already",
-                    composite.position,
-                    f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
-                )
-            composites.setdefault(key, composite)
-        found.append(disturbance)
-    return found
-
-
-def add_disturbances(text: ModelText, disturbances: Iterable[Disturbance], problems: Problems) -> list[Setting]:
-    """Add what disturbances hold to a model; what they set of the model's own parameters is returned.
-
-    Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
-    after the model's own, but one that has the name of another stands in its place.
-    """
-    settings: list[Setting] = []
-    for disturbance in disturbances:
-        _add_parameters(disturbance.text, text.root, problems)
-        for part in disturbance.text.aspects.values():
-            put_aspect(text, part)
-        settings += disturbance.settings
-    return settings
-
-
-def _add_parameters(disturbance: CompositeText, root: CompositeText, problems: Problems) -> None:
-    for key, parameter in disturbance.parameters.items():
-        if (first := root.parameters.get(key)) is not None:
-            problems.add(
-                f"the model has a parameter {key!r} already",
-                parameter.position,
-                f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
-            )
-        root.parameters.setdefault(key, parameter)
-
-
 def disturb(
     model: Model, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
-) -> list[WovenAspect]:
-    """Weave the aspects of a disturbance around a model that is made; raises ``ModelError``."""
+) -> tuple[Draft, list[WovenAspect]]:
+    """The model's draft with the aspects of a disturbance, and these; raises ``ModelError``."""
     problems = Problems()
     disturbance = load_disturbance(name, problems)
     problems.raise_if_any()
     assert disturbance is not None, "what cannot be read is a problem"
-    root = CompositeText(model.name, position)
-    for key, value in model.parameters.items():
-        root.parameters[key] = ParameterText(key, position, node_of(value, position))
-    _add_parameters(disturbance.text, root, problems)
+    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
+    parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
+    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
     for setting in disturbance.settings:
         problems.add(
             f"{setting.path!r} cannot be set any more: the model is made",
@@ -170,14 +49,17 @@ def disturb(
         problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
     taken = {woven.name for woven in model.aspects}
     for part in disturbance.text.aspects.values():
-        root.aspects[part.name] = part
         if part.name in taken:
             problems.add(f"there is an aspect {part.name!r} already", part.position, "unweave it before")
     problems.raise_if_any()
     node = node_of(values, position)
-    settings = Settings(settings_in(node, problems) if isinstance(node, Mapping) else [])
+    settler = Settler(Settings(settings_in(node, problems) if isinstance(node, Mapping) else []), problems)
     catalogue = installed().with_types(types)
     composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
-    found = Elaborator(ModelText(root), composites, settings, problems, catalogue, broken).woven(model.graph)
+    known = Known(composites, catalogue, broken)
+    made = Unfolded(model.draft.copy(), model.graph.limits.actors)
+    Unfolding(known, settler, made).body("", root, settler.parameters("", root, {}, {}, None))
+    found = weave_all(made, known, settler)
+    settler.check_unused(made.draft)
     problems.raise_if_any()
-    return found
+    return made.draft, found

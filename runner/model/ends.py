@@ -7,13 +7,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
+from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
-from .problems import ModelError, Position, Problem, Problems
+from ..text import ModelError, Position, Problem, Problems
+from .draft import Draft
+from .settle import drift, local_nanoseconds
+from .woven import WovenAspect
 
 if TYPE_CHECKING:
-    from .model import Model
     from .scope import Composite
 
 
@@ -40,8 +42,8 @@ class Instance(Protocol):
 
     path: str
 
-    def unfold(self, path: str, model: Model, position: Position) -> None:
-        """Make it part of a model, at its full path."""
+    def unfold(self, path: str, draft: Draft, position: Position) -> tuple[Draft, list[WovenAspect]]:
+        """What it is as a part of a draft, at its full path, with the aspects that come with it."""
 
 
 @contextmanager
@@ -53,19 +55,16 @@ def raising() -> Iterator[Problems]:
 
 
 def clock_of(
-    path: str, start: object, drift: object, position: Position, problems: Problems
+    path: str, start: object, speed: object, position: Position, problems: Problems
 ) -> tuple[int | None, float]:
     """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""
-    begin, speed = None, 1.0
-    try:
-        begin = None if start is None else to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
-    except (ParameterError, ValueError) as error:
-        problems.add(f"{path}: director.start: {error}", position)
-    try:
-        speed = Parameter(float, unit="1", min=1e-6, max=1e6).convert(drift) or 1.0
-    except ParameterError as error:
-        problems.add(f"{path}: director.drift: {error}", position)
-    return begin, speed
+    found: list[Any] = [None, 1.0]
+    for number, (key, value, convert) in enumerate((("start", start, local_nanoseconds), ("drift", speed, drift))):
+        try:
+            found[number] = found[number] if value is None else convert(value)
+        except (ParameterError, ValueError) as error:
+            problems.add(f"{path}: director.{key}: {error}", position)
+    return found[0], found[1]
 
 
 def check_aspect(aspect: object, kinds: tuple[type, ...], position: Position, problems: Problems) -> None:

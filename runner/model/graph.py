@@ -6,20 +6,18 @@ an actor's output port, through any composite ports, to an actor's input port.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
 import networkx as nx
 
-from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_own_ports
+from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
 
+from ..text import NORMAL, Limits, Position
 from .clock import Clock
-from .limits import NORMAL
-from .patterns import could_be_within
-from .problems import Position
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,39 +60,89 @@ class Detour(Hop):
 
 
 class ModelGraph:
-    """The flattened graph of one model."""
+    """The flattened graph of one model, which is built and then frozen: to change it again, change a ``copy``.
 
-    def __init__(self) -> None:
+    A part of a model is a graph, too, until it is merged; ``inside`` is then the graph that it will be a part of, and
+    ``director`` the one under which it will stand.
+    """
+
+    def __init__(self, limits: Limits = NORMAL, inside: ModelGraph | None = None, director: str = "") -> None:
         self.ports: Any = nx.MultiDiGraph()
         self.actors: dict[str, Actor] = {}
         self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
         # The composites with a director of their own, which are actors to the graph around them; "" is the model.
-        self.clocks: dict[str, Clock] = {"": Clock()}
+        self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
         self.priorities: dict[str, int] = {}
         self.positions: dict[str, Position] = {}  # also of "aspect NAME", "metric NAME" and "stop_when"
         self.tags: dict[str, tuple[str, ...]] = {}  # what the model's author put on actors and composites
-        self.empty_arrays: set[str] = set()  # arrays with count 0, which patterns may name all the same
-        self.unknown: set[str] = set()  # actors whose type or number is not known: anything may be behind them
-        self.absent: set[str] = set()  # types and tags of what would stand in empty arrays, and of unmade actors
-        self.is_wired = True  # whether every connection that the model declares has been made
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
-        self.limits = NORMAL
+        self.limits: Limits = limits if inside is None else inside.limits
+        self.is_frozen = False
         self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}
+        self._parts: dict[str, dict[str, list[str]]] = {}
         self._hops: dict[int, Hop] = {}  # in their order
-        self._order = 0
+        self._order: int = 0 if inside is None else inside._order
+
+    def freeze(self) -> None:
+        """Nothing changes it any more: it may be run."""
+        nx.freeze(self.ports)
+        self.is_frozen = True
+
+    def copy(self) -> ModelGraph:
+        """One that can be changed, of the same actors."""
+        made = ModelGraph(self.limits)
+        for name, value in vars(self).items():
+            setattr(made, name, copy(value))
+        made.ports = nx.MultiDiGraph(self.ports)
+        made.is_frozen = False
+        made.members = {path: [*each] for path, each in self.members.items()}
+        made._outgoing = {path: [*hops] for path, hops in self._outgoing.items()}
+        made._incoming = {path: [*hops] for path, hops in self._incoming.items()}
+        made._borders = {path: ([*inputs], [*outputs]) for path, (inputs, outputs) in self._borders.items()}
+        made._parts = {path: {name: [*each] for name, each in parts.items()} for path, parts in self._parts.items()}
+        return made
+
+    def merge(self, part: ModelGraph, director: str) -> None:
+        """Take in a part that was made for this graph."""
+        self.ports.add_nodes_from(part.ports.nodes(data=True))
+        self.members[director] += part.members.pop("")
+        del part.clocks[""]
+        parts = part._parts
+        part._parts = {path: each for path, each in parts.items() if path not in self._parts}
+        for known, new in zip(self._by_path(), part._by_path(), strict=True):
+            known |= new
+        for path in parts.keys() - part._parts.keys():  # the one in which it stands
+            for name, instances in parts[path].items():
+                self._parts[path].setdefault(name, []).extend(instances)
+        for hop in part._hops.values():
+            self._enter(hop)
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         """Add an actor and its ports."""
         actor.home = self
         self.actors[actor.path] = actor
+        self._enrol(actor.path)
         self.members[self.director_of(actor.path)].append(actor.path)
         if position is not None:
             self.positions[actor.path] = position
         for port in (*actor.inputs.values(), *actor.outputs.values()):
             self.ports.add_node(port.path, port=port, direction=port.direction)
+
+    def add_composite(self, path: str, kind: str) -> None:
+        """Add a composite, of that class."""
+        self.composites[path] = kind
+        self._enrol(path)
+
+    def _enrol(self, path: str) -> None:
+        above, _, name = path.rpartition(".")
+        self._parts.setdefault(above, {}).setdefault(name.partition("[")[0], []).append(path)
+
+    def parts(self, composite: str) -> Mapping[str, list[str]]:
+        """The actors and composites in a composite, by their names: of an array all instances."""
+        return self._parts.get(composite, {})
 
     def add_director(self, path: str, start: int | None, drift: float) -> None:
         """Give a composite a director of its own; ``start`` (ns) and ``drift`` are those of its clock."""
@@ -102,14 +150,6 @@ class ModelGraph:
         self.members[outer].append(path)
         self.members[path] = []
         self.clocks[path] = self.clocks[outer].inside(start, drift)
-
-    def add_unmade(self, path: str, actor_type: type[Actor]) -> None:
-        """Add the ports of an actor that could not be made, so that what names them is not wrong as well."""
-        for name, port in declared_ports(actor_type).items():
-            self.ports.add_node(f"{path}.{name}", port=None, direction=port.direction, unmade=True)
-        self.absent.add(actor_type.__name__)
-        if has_own_ports(actor_type):
-            self.unknown.add(path)
 
     def add_composite_port(
         self, path: str, direction: str, position: Position | None, type: Any = None, declared: Position | None = None
@@ -126,19 +166,16 @@ class ModelGraph:
         port.name, port.path = path.rpartition(".")[2], path
         self.ports.nodes[path]["port"] = port
 
-    def leave_open(self, composite: str) -> None:
-        """Nothing more is said of what comes into a composite: another problem has been told."""
-        for port in self.borders(composite)[0]:
-            self.ports.nodes[port]["unmade"] = True
-
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
         """Add one connection between two ports."""
-        hop = Hop(source, destination, delay, position, self._order)
-        self._order += 1
+        self._enter(Hop(source, destination, delay, position, self._order))
+
+    def _enter(self, hop: Hop) -> None:
+        self._order = hop.order + 1
         self._hops[hop.order] = hop
-        self.ports.add_edge(source, destination, key=hop.order, hop=hop)
-        self._outgoing.setdefault(source, []).append(hop)
-        self._incoming.setdefault(destination, []).append(hop)
+        self.ports.add_edge(hop.source, hop.destination, key=hop.order, hop=hop)
+        self._outgoing.setdefault(hop.source, []).append(hop)
+        self._incoming.setdefault(hop.destination, []).append(hop)
 
     @property
     def connections(self) -> int:
@@ -152,68 +189,41 @@ class ModelGraph:
         self._outgoing[hop.source].remove(hop)
         self._incoming[hop.destination].remove(hop)
 
-    def mark(self) -> int:
-        """Where the next connection will stand, for ``since``."""
+    @property
+    def hops(self) -> Collection[Hop]:
+        """All connections, in the order of their declaration."""
+        return self._hops.values()
+
+    @property
+    def next_order(self) -> int:
+        """Where the next connection will stand."""
         return self._order
-
-    def since(self, mark: int) -> list[Hop]:
-        """The connections that were made since a mark and are still there."""
-        found = []
-        for order in reversed(self._hops):
-            if order < mark:
-                break
-            found.append(self._hops[order])
-        return found[::-1]
-
-    def size(self) -> tuple[Any, ...]:
-        """How large it is, for ``shrink``."""
-        flags = {name: getattr(self, name) for name in ("is_wired", "detours", "_order")}
-        names = {name: set(getattr(self, name)) for name in ("empty_arrays", "unknown", "absent")}
-        return len(self.ports), [len(known) for known in self._by_path()], flags | names
-
-    def shrink(self, size: tuple[Any, ...]) -> None:
-        """Take out what was added since it had that size."""
-        ports, sizes, attributes = size
-        for hop in self.since(attributes["_order"]):
-            self.disconnect(hop)
-        self.ports.remove_nodes_from(list(islice(self.ports, ports, None)))
-        for actor in islice(self.actors.values(), sizes[0], None):
-            actor.home = None
-        for known, length in zip(self._by_path(), sizes, strict=True):
-            while len(known) > length:
-                known.popitem()
-        for members in self.members.values():
-            members[:] = [each for each in members if each in self.actors or each in self.clocks]
-        for border in self._borders.values():
-            for paths in border:
-                paths[:] = [path for path in paths if path in self.ports]
-        for name, value in attributes.items():
-            setattr(self, name, value)
 
     def _by_path(self) -> tuple[dict[str, Any], ...]:
         """What is known of parts, the actors first."""
         return (
             self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
-            self._borders,
+            self._borders, self._parts,
         )  # fmt: skip
 
     def remove(self, path: str) -> None:
         """Take out an actor, or a composite and all within, with their connections."""
-
-        def is_within(each: str) -> bool:
-            return each == path or each.startswith(f"{path}.")
-
-        for port in [each for each in self.ports if is_within(each)]:
+        for port in [each for each in self.ports if is_within(each, path)]:
             for hop in {*self.incoming(port), *self.outgoing(port)}:
                 self.disconnect(hop)
             self.ports.remove_node(port)
-        for actor in [each for each in self.actors if is_within(each)]:
+        for actor in [each for each in self.actors if is_within(each, path)]:
             self.actors[actor].home = None
         for known in self._by_path():
-            for each in [each for each in known if is_within(each)]:
+            for each in [each for each in known if is_within(each, path)]:
                 del known[each]
         for members in self.members.values():
-            members[:] = [each for each in members if not is_within(each)]
+            members[:] = [each for each in members if not is_within(each, path)]
+        above, _, name = path.rpartition(".")
+        instances = self._parts[above][name.partition("[")[0]]
+        instances.remove(path)
+        if not instances:
+            del self._parts[above][name.partition("[")[0]]
 
     def direction(self, path: str) -> str:
         """``input`` or ``output``."""
@@ -306,8 +316,7 @@ class ModelGraph:
                 seen.update(before)
         return found
 
-    def is_excused(self, pattern: str) -> bool:
-        """Whether a pattern that matches nothing is right: it speaks of an empty array, or of what is not known."""
-        return any(could_be_within(pattern, path, array=True) for path in self.empty_arrays) or any(
-            could_be_within(pattern, path, array=False) for path in self.unknown
-        )
+
+def is_within(path: str, outer: str) -> bool:
+    """Whether a path is that of a part, or of something in it."""
+    return path == outer or path.startswith(f"{outer}.")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from .reading import split
+from ..text import split
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _EXPRESSION = re.compile(r"\$\{.*\}", re.DOTALL)
@@ -19,7 +19,11 @@ MAX_INDICES = 1_000_000
 
 
 class BadIndexError(Exception):
-    """Text that names no instances; the message says why."""
+    """Text that names no instances; the message says why, ``is_misshapen`` that it is no index at all."""
+
+    def __init__(self, message: str, *, is_misshapen: bool = False) -> None:
+        super().__init__(message)
+        self.is_misshapen = is_misshapen
 
 
 def resolve(text: str, array: str, count: int, value: Callable[[str], object]) -> tuple[list[int], bool]:
@@ -81,7 +85,7 @@ def _number(text: str, value: Callable[[str], object]) -> object:
         return int(text)
     if _EXPRESSION.fullmatch(text):
         return value(text)
-    raise BadIndexError(f"{text!r} is no index of an array")
+    raise BadIndexError(f"{text!r} is no index of an array", is_misshapen=True)
 
 
 def _whole(value: object, item: str) -> int:

@@ -1,4 +1,4 @@
-"""Model: what elaboration or a program makes and a simulation runs."""
+"""Model: what is loaded or built, and then run."""
 
 from __future__ import annotations
 
@@ -7,25 +7,26 @@ from pathlib import Path
 
 from epicycle.actors import Stop, Tag, counted, declared_parameters
 
+from ..catalogue import take_problem
 from ..collection import without_collection
-from ..tables import Table, as_html, as_text, short
+from ..language import Values
+from ..shown import short
+from ..tables import Table, as_html, as_text
+from ..text import NAME, Position, Problem, Problems, Text, call_site, within
+from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .decorated import arranged
-from .document import Mapping as MappingNode
+from .draft import Draft
 from .ends import Port, raising
-from .graph import ModelGraph
-from .measure import take_problem
-from .observation import Metric, Observation, checked_seed, nanoseconds
-from .problems import Problem, Problems
-from .reading import NAME, Text, within
+from .graph import ModelGraph, is_within
 from .schedule import firing_order
 from .scope import Composite, Scope
-from .scopes import Scopes, is_within
-from .site import call_site
-from .transaction import all_or_nothing, transaction
-from .values import Values
+from .settle import nanoseconds
+from .watch import Metric, Watched, Watching, checked_seed
 from .woven import WovenAspect, check_processors
+
+DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 
 
 class Model(Scope):
@@ -42,6 +43,8 @@ class Model(Scope):
     ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
     A model that was loaded can be changed in the same way.  Its ``parameters`` are a record of how it was made:
     actors took their values from them then, so they are set with ``load_model(..., set=...)``, not here.
+
+    What is run is frozen: a change makes another graph, which counts for later simulations.
     """
 
     def __init__(
@@ -53,25 +56,30 @@ class Model(Scope):
         seed: int = 0,
         parameters: Mapping[str, object] | None = None,
     ) -> None:
-        super().__init__(self, "", name, call_site())
+        super().__init__(self, "")
         self.name = name
         self.doc = doc
-        self.graph = ModelGraph()
-        self.scopes = Scopes(self)
+        self.draft = Draft()
         self.parameters: dict[str, object] = dict(parameters or {})
         self.declared: dict[str, tuple[str, str]] = {}  # unit and doc of the parameters
         self.aspects: list[WovenAspect] = []
         self.stop_time: int | None = None  # ns
         self.stop_ports: list[str] = []
+        self._stop_position: Position | None = None
         self.seed = checked_seed(seed)
         self.recorded: list[str] = []
         self.metrics: list[Metric] = []
-        self.figures: dict[str, tuple[str, dict[str, object], MappingNode]] = {}  # type, values, as written
+        self.figures: dict[str, DeclaredFigure] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
-        self.is_running = False
+        self._scopes: dict[str, Composite] = {}
         self._order: dict[str, int] | None = None  # worked out since then
         self.stop = stop
+
+    @property
+    def graph(self) -> ModelGraph:
+        """All actors, composites, ports and connections."""
+        return self.draft.graph
 
     @property
     def stop(self) -> float | None:
@@ -97,9 +105,12 @@ class Model(Scope):
         """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
         return self.graph.clocks[self.graph.director_of(actor)].tag(tag)
 
+    def position_of(self, path: str) -> Position | None:
+        """Where an actor, a composite, ``aspect NAME`` or ``stop_when`` is declared, if that is known."""
+        return self._stop_position if path == "stop_when" else self.graph.positions.get(path)
+
     # -- what disturbs it -----------------------------------------------------------------------------------------
 
-    @all_or_nothing
     def disturb(
         self, disturbance: str | Path, *, set: Mapping[str, object] | None = None, types: Iterable[type] = ()
     ) -> list[WovenAspect]:
@@ -111,20 +122,19 @@ class Model(Scope):
         """
         from .disturbance import disturb
 
-        found = disturb(self, str(disturbance), set or {}, types, call_site())
-        self.enlist(found)
-        self.changed()
+        draft, found = disturb(self, str(disturbance), set or {}, types, call_site())
+        self.adopt(draft, found)
         return found
 
     # -- what is watched ------------------------------------------------------------------------------------------
 
     def record(self, *ports: str | Port) -> None:
         """Keep what output ports send, given as such or as patterns over the ports that are there now."""
-        self._watch(ports, lambda observation, text: observation.record(text))
+        self._watch(ports, lambda watching, text: watching.record(text))
 
     def stop_when(self, *ports: str | Port) -> None:
         """End the run, after the tag in question, when one of these output ports sends something true."""
-        self._watch(ports, lambda observation, text: observation.stop_when(text))
+        self._watch(ports, lambda watching, text: watching.stop_when(text))
 
     def metric(self, name: str, *, of: str | Port, take: str = "last", **options: object) -> None:
         """A number in the results; what can be taken, and with which options, is in docs/language.md.
@@ -141,16 +151,21 @@ class Model(Scope):
             problems.add(problem[0], position, problem[1])
         problems.raise_if_any()
         values = {"take": take, **options}
-        self._watch([of], lambda observation, text: observation.metric(name, text, values, position))
+        self._watch([of], lambda watching, text: watching.metric(name, text, values, position))
 
-    def _watch(self, ports: Iterable[str | Port], ask: Callable[[Observation, Text], None]) -> None:
-        """Let an ``Observation`` do what it does for a model file."""
+    def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
+        """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
+        return Watching(self.draft, Values(problems), problems).select(Text(pattern, position), what)
+
+    def _watch(self, ports: Iterable[str | Port], ask: Callable[[Watching, Text], None]) -> None:
+        """Find out what is to be watched as for a model file."""
         position = call_site()
-        with transaction(self), raising() as problems:
-            observation = Observation(self, Values(problems), problems)
+        with raising() as problems:
+            watching = Watching(self.draft, Values(problems), problems, self.recorded)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
-                ask(observation, Text(path, within(Text(path, position), path)))
+                ask(watching, Text(path, within(Text(path, position), path)))
+        self._add(watching.found)
 
     # -- the whole ------------------------------------------------------------------------------------------------
 
@@ -159,12 +174,13 @@ class Model(Scope):
         if not self.is_checked:
             problems = Problems()
             if check_nesting(self.aspects, self.graph, problems):
-                self.graph.detours = detours(self.graph, self.aspects)
-            check(self.graph, problems)
+                self.edit().graph.detours = detours(self.graph, self.aspects)
+            check(self.draft, problems)
             check_processors(self.aspects, self.graph, problems)
             problems.raise_if_any()
             self.warnings = problems.warnings
             self.is_checked = True
+        self.graph.freeze()
 
     def order(self) -> dict[str, int]:
         """Engine: the firing order of a model that has been checked; the same for all its runs."""
@@ -173,39 +189,50 @@ class Model(Scope):
                 self._order = firing_order(self.graph)
         return self._order
 
-    def scope(self, path: str) -> Composite:
-        """Engine: the composite at a path."""
-        self.scopes.update()
-        return self.scopes.at(path)
+    # -- changes: what is called here has been found to be right --------------------------------------------------
 
-    def enlist(self, aspects: Iterable[WovenAspect]) -> None:
-        """Engine: these aspects stand in the model from now on."""
-        self.aspects = arranged([*self.aspects, *aspects], self.graph)
-
-    def changed(self) -> None:
-        """Engine: what was checked before may no longer hold."""
+    def edit(self) -> Draft:
+        """The draft, which is then changed: what was checked before may no longer hold."""
+        if self.graph.is_frozen:
+            self.draft = self.draft.copy()
         self.is_checked = False
         self._order = None
+        return self.draft
+
+    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect], watched: Watched | None = None) -> None:
+        """Go on with a draft that came of the present one, with further aspects."""
+        self.draft = draft
+        self.edit()
+        self.enlist(aspects)
+        if watched is not None:
+            self.stop_time, self.seed = watched.stop_time, watched.seed
+            self._add(watched)
+
+    def enlist(self, aspects: Iterable[WovenAspect]) -> None:
+        """These aspects stand in the model from now on."""
+        self.aspects = arranged([*self.aspects, *aspects], self.graph)
+
+    def _add(self, watched: Watched) -> None:
+        self._stop_position = watched.stop_position or self._stop_position
+        self.recorded = [*self.recorded, *watched.recorded]
+        self.stop_ports = [*self.stop_ports, *watched.stop_ports]
+        self.metrics = [*self.metrics, *watched.metrics]
+
+    def scope(self, path: str) -> Composite:
+        """The composite at a path."""
+        return self._scopes.setdefault(path, Composite(self, path))
 
     def forget(self, path: str) -> None:
-        """Engine: take out an actor or composite, and whatever stands at it or watches it."""
-        self.graph.remove(path)
-        self.scopes.renew()
-        for woven in self.aspects:
-            woven.ports = [port for port in woven.ports if not is_within(port, path)]
-            woven.actors = {actor: unit for actor, unit in woven.actors.items() if not is_within(actor, path)}
-            woven.parameters = [each for each in woven.parameters if not is_within(each, path)]
-            woven.connections = [ends for ends in woven.connections if not any(is_within(end, path) for end in ends)]
+        """Take out an actor or composite, and whatever stands at it or watches it."""
+        self.edit().graph.remove(path)
         self.aspects = [
-            woven
+            woven.without(path)
             for woven in self.aspects
             if not is_within(woven.name, path) and not (woven.model and is_within(woven.model.path, path))
         ]
         self.recorded = [port for port in self.recorded if not is_within(port, path)]
         self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
-        for metric in self.metrics:
-            metric.ports = [port for port in metric.ports if not is_within(port, path)]
-        self.changed()
+        self.metrics = [metric.without(path) for metric in self.metrics]
 
     # -- for people -----------------------------------------------------------------------------------------------
 
@@ -236,7 +263,7 @@ class Model(Scope):
             actors.append((path, type(actor).__name__, ", ".join(given)))
         connections = [
             (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")
-            for hop in self.graph.since(0)
+            for hop in self.graph.hops
         ]
         aspects = [(woven.name, repr(woven.aspect), ", ".join(woven.places)) for woven in self.aspects]
         parameters = [(name, short(value)) for name, value in self.parameters.items()]

@@ -2,22 +2,25 @@
 
 A program makes and changes the same graph as a model file does, through the same rules: names, connections, pointcuts
 and metrics go to the classes that read them from YAML, and a mistake raises ``ModelError`` that points at the line of
-the program.  A call that fails changes nothing (``transaction``).
+the program.  Each call first finds out what it comes to, which raises or changes nothing, and then does it.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
+from ..language import ConnectionText, DeclarationReader, PointcutText, Values
+from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
 from .composite_aspect import ModelWeaving, check_nesting
-from .declarations import CompositeText, ConnectionText, DeclarationReader, PartText, PointcutText, PortText
+from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
 from .decorated import weave_decorations
-from .document import Scalar
+from .draft import Draft
 from .ends import (
     CompositePort,
     Ends,
@@ -30,14 +33,8 @@ from .ends import (
     mistake,
     raising,
 )
-from .graph import Hop
-from .problems import Position, Problems, did_you_mean
-from .reading import NAME, Text, within
-from .site import call_site, node_of
-from .transaction import all_or_nothing
-from .values import Values
+from .graph import ModelGraph
 from .weave import Paths, Weaving
-from .wiring import Child, Wiring
 from .woven import WovenAspect
 
 if TYPE_CHECKING:
@@ -50,30 +47,47 @@ OF_NO_CLASS = "Composite"  # what stands for the class of a composite that Pytho
 A = TypeVar("A", bound=Actor)
 
 
+class _Children(Mapping[str, Child]):
+    """What is inside of a composite of a graph, looked up when it is asked for: a program connects in many calls."""
+
+    def __init__(self, graph: ModelGraph, path: str) -> None:
+        self._graph = graph
+        self._parts = graph.parts(path)
+
+    def __getitem__(self, name: str) -> Child:
+        graph, paths = self._graph, self._parts[name]
+        first, is_array = paths[0], paths[0].endswith("]")
+        if first in graph.actors:
+            return child_of_actors(type(graph.actors[first]), paths, is_array, len(paths), graph)
+        inputs, outputs = graph.borders(first)
+        return Child(_label(graph, first), paths, is_array, len(paths), _names(inputs), _names(outputs))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._parts)
+
+    def __len__(self) -> int:
+        return len(self._parts)
+
+
 class Scope:
     """The inside of a model or of a composite: where actors are added and connected."""
 
-    def __init__(self, model: Model, path: str, label: str, position: Position) -> None:
+    def __init__(self, model: Model, path: str) -> None:
         self.path = path
         self._model = model
-        # What wiring reads: the same declarations that it reads of a model file.
-        self._text = CompositeText(label, position)
-        self._parts: dict[str, Child] = {}
 
     @property
     def model(self) -> Model:
         """The model that it is, or is in."""
         return self._model
 
-    def forget_parts(self) -> None:
-        """Engine: what is in here is to be found anew."""
-        self._parts = {}
-        self._text.actors.clear()
-
     @property
-    def _children(self) -> dict[str, Child]:
-        self._model.scopes.update()
-        return self._parts
+    def _inside(self) -> Inside:
+        graph = self._model.graph
+        inputs, outputs = graph.borders(self.path)
+        children = _Children(graph, self.path)
+        label = _label(graph, self.path) if self.path else self._model.name
+        return Inside(self.path, label, _names(inputs), _names(outputs), children.keys(), children)
 
     # -- parts ----------------------------------------------------------------------------------------------------
 
@@ -81,7 +95,6 @@ class Scope:
     def add(self, part: A, *, priority: int | None = None) -> A: ...
     @overload
     def add(self, part: Instance) -> Composite: ...
-    @all_or_nothing
     def add(self, part: Actor | Instance, *, priority: int | None = None) -> Actor | Composite:
         """Add an actor, or an instance of a composite class, and return it.
 
@@ -97,24 +110,30 @@ class Scope:
             )
         with raising() as problems:
             full = self._free(part.path, position, problems)
-        if isinstance(part, Actor):
-            name = part.path
-            part.move(full)
-            self._model.graph.add_actor(part, position)
-            try:
-                with raising() as problems:
-                    self._model.enlist(weave_decorations(part, self._model.graph, problems, position))
-            except Exception:
-                part.move(name)  # it may be added elsewhere
-                raise
-        else:
-            part.unfold(full, self._model, position)
+        made, aspects = self._made(part, full, position)
         if priority:
-            self._model.graph.priorities[full] = priority
-        self._model.changed()
+            made.graph.priorities[full] = priority
+        draft = self._model.edit()
+        draft.merge(made, draft.graph.director_of(full))
+        self._model.enlist(aspects)
         return part if isinstance(part, Actor) else self._model.scope(full)
 
-    @all_or_nothing
+    def _made(self, part: Actor | Instance, full: str, position: Position) -> tuple[Draft, list[WovenAspect]]:
+        """A part that is yet to be merged, and the aspects that come with it."""
+        draft = self._model.draft
+        if not isinstance(part, Actor):
+            return part.unfold(full, draft, position)
+        made, name = draft.inside(draft.graph.director_of(full)), part.path
+        part.move(full)
+        made.graph.add_actor(part, position)
+        try:
+            with raising() as problems:
+                return made, weave_decorations(part, made, problems, position)
+        except Exception:
+            part.move(name)  # it may be added elsewhere
+            part.home = None
+            raise
+
     def composite(
         self,
         name: str,
@@ -131,37 +150,37 @@ class Scope:
         (default: as around it) and goes ``drift`` times as fast.  Raises ``ModelError``.
         """
         position = call_site()
+        made, ports = Composite(self._model, self._full(name)), [("input", each) for each in inputs]
+        ports += [("output", each) for each in outputs]
         with raising() as problems:
             full = self._free(name, position, problems)
             begin, speed = clock_of(full, start, drift, position, problems)
-        self._model.graph.composites[full] = OF_NO_CLASS
+        for number, (_, port) in enumerate(ports):
+            made.check_port(port, [each for _, each in ports[:number]], position)
+        graph = self._model.edit().graph
+        graph.add_composite(full, OF_NO_CLASS)
         if director:
-            self._model.graph.add_director(full, begin, speed)
-        self._model.graph.positions.setdefault(full, position)
-        made = self._model.scope(full)
-        for port in inputs:
-            made.input(port)
-        for port in outputs:
-            made.output(port)
-        self._model.changed()
-        return made
+            graph.add_director(full, begin, speed)
+        graph.positions.setdefault(full, position)
+        for direction, port in ports:
+            graph.add_composite_port(f"{full}.{port}", direction, position)
+        return self._model.scope(full)
 
-    @all_or_nothing
     def remove(self, name: str) -> None:
         """Take out an actor or a composite with all that is connected to it, stands at it and watches it."""
         position = call_site()
-        child = self._children.get(name.partition("[")[0])
-        full = self._full(name)
+        full, parts = self._full(name), self._model.graph.parts(self.path)
+        instances = parts.get(name.partition("[")[0], [])
         with raising() as problems:
-            if child is None or full not in child.paths:
-                known = [path[len(self._full("")) :] for each in self._children.values() for path in each.paths]
+            if full not in instances:
+                known = [path[len(self._full("")) :] for each in parts.values() for path in each]
                 problems.add(
-                    f"{self._text.name} has no actor {name!r}{did_you_mean(name, known)}",
+                    f"{self._inside.name} has no actor {name!r}{did_you_mean(name, known)}",
                     position,
                     f"valid actors: {', '.join(known) or 'none'}",
                 )
-            elif full != child.paths[-1]:
-                problems.add(f"{full} is not the last of its array", position, f"only {child.paths[-1]} can be removed")
+            elif full != instances[-1]:
+                problems.add(f"{full} is not the last of its array", position, f"only {instances[-1]} can be removed")
         self._model.forget(full)
 
     def __getitem__(self, name: str) -> Any:
@@ -191,41 +210,31 @@ class Scope:
             )
             return full
         base, index = match.groups()
-        child = self._children.get(base)
-        if base in self._text.inputs or base in self._text.outputs:
+        graph = self._model.graph
+        instances = graph.parts(self.path).get(base, [])
+        if self._full(base) in graph.ports:
             problems.add(f"{self.path}.{base} is a port already", position, "give the actor another name")
-        elif child is None:
+        elif not instances:
             if index is not None and int(index) != 0:
                 problems.add(f"{full} cannot be the first of its array", position, f"begin with {base}[0]")
-        elif full in child.paths:
-            at = self._model.graph.positions.get(full)
+        elif full in instances:
+            at = graph.positions.get(full)
             where = (f"the first was added at {at.file}:{at.line}",) if at is not None else ()
             problems.add(f"there is a {full} already", position, *where, "give it another name")
-        elif child.array != (index is not None):
-            kind = "an array" if child.array else "a single actor"
+        elif (is_array := instances[0].endswith("]")) != (index is not None):
+            kind = "an array" if is_array else "a single actor"
             problems.add(f"{self._full(base)} is {kind} already", position, "give it another name")
-        elif index is not None and int(index) != len(child.paths):
+        elif index is not None and int(index) != len(instances):
             problems.add(
-                f"{full} is not the next of its array", position, f"the next is {self._full(base)}[{len(child.paths)}]"
+                f"{full} is not the next of its array", position, f"the next is {self._full(base)}[{len(instances)}]"
             )
         return full
 
     def _full(self, name: str) -> str:
         return f"{self.path}.{name}" if self.path else name
 
-    def enrol(self, name: str, child: Child, position: Position) -> None:
-        """Engine: there is a new part, of which connections may speak."""
-        base = name.partition("[")[0]
-        known = self._parts.setdefault(base, child)
-        if known is not child:
-            known.paths += child.paths
-            known.actors += child.actors
-            known.count = len(known.paths)
-        self._text.actors.setdefault(base, PartText(base, position, Text(child.kind, position)))
-
     # -- connections ----------------------------------------------------------------------------------------------
 
-    @all_or_nothing
     def connect(self, source: Ends, destination: Ends | None = None, *, delay: float | str | None = None) -> None:
         """Connect ports, given as such or as text: ``connect(a.output, b.input)``, ``connect("a.output -> b.input")``.
 
@@ -234,35 +243,17 @@ class Scope:
         within the tag in which they are sent.  Raises ``ModelError``.
         """
         position = call_site()
-        graph = self._model.graph
-        before = graph.mark()
         with raising() as problems:
-            connection = self._connection(source, destination, delay, position, problems)
-            if connection is not None:
-                wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
-                wiring.connect(connection, {})
-            for hop in graph.since(before):
-                self._judge(hop, problems)
-        self._model.changed()
+            links = self._links(source, destination, delay, position, problems)
+            self._judge(links, problems)
+        links.make(self._model.edit())
 
-    @all_or_nothing
     def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
         """Take out the connections between ports, which are given as to ``connect``; there must be some."""
-        position = call_site()
-        graph = self._model.graph
-        before, was_wired = graph.mark(), graph.is_wired
-        try:
-            with raising() as problems:
-                connection = self._connection(source, destination, None, position, problems)
-                if connection is not None:
-                    wiring = Wiring(self.path, self._text, self._children, graph, Values(problems), problems)
-                    wiring.connect(connection, {})
-            pairs = dict.fromkeys((hop.source, hop.destination) for hop in graph.since(before))
-        finally:
-            # Connected only to find out which ports are meant.
-            for hop in graph.since(before):
-                graph.disconnect(hop)
-            graph.is_wired = was_wired
+        position, graph = call_site(), self._model.graph
+        with raising() as problems:
+            links = self._links(source, destination, None, position, problems)
+        pairs = dict.fromkeys((link.source, link.destination) for link in links.found)
         found = [hop for one, other in pairs for hop in graph.outgoing(one) if hop.destination == other]
         if not found:
             with raising() as problems:
@@ -271,9 +262,23 @@ class Scope:
                     problems.add(
                         f"{one} is not connected to {other}", position, f"{one} is connected to: {here or 'nothing'}"
                     )
+        graph = self._model.edit().graph
         for hop in found:
             graph.disconnect(hop)
-        self._model.changed()
+
+    def _links(
+        self,
+        source: Ends,
+        destination: Ends | None,
+        delay: float | str | None,
+        position: Position,
+        problems: Problems,
+    ) -> Links:
+        """The connections that are meant."""
+        connection = self._connection(source, destination, delay, position, problems)
+        if connection is None:
+            return Links([], True)
+        return Wiring(self._inside, self._model.graph, Values(problems), problems).resolve(connection, {})
 
     def _connection(
         self,
@@ -292,9 +297,9 @@ class Scope:
         else:
             sources = self._ends(source, position, problems)
             destinations = self._ends(destination, position, problems)
-            connection = ConnectionText(sources, destinations, position)
+            connection = ConnectionText(tuple(sources), tuple(destinations), position)
         if connection is not None and delay is not None:
-            connection.delay = node_of(delay, position)
+            connection = replace(connection, delay=node_of(delay, position))
         # A list that is empty connects nothing: there may be no robots.
         return connection if connection is not None and connection.sources and connection.destinations else None
 
@@ -306,9 +311,8 @@ class Scope:
                 found.append(Text(name, within(Text(name, position), name)))
         return found
 
-    def _known(self, port: Any, position: Position, problems: Problems) -> str | None:
-        """The path of a port of this model."""
-        graph = self._model.graph
+    def _known(self, port: Any, graph: ModelGraph, position: Position, problems: Problems) -> str | None:
+        """The path of a port of the graph."""
         if isinstance(port, (Actor, Composite)):
             kind = "an actor" if isinstance(port, Actor) else "a composite"
             ports = [each for each in graph.ports if graph.owner(each) == port.path]
@@ -334,7 +338,7 @@ class Scope:
 
     def _name_of(self, port: object, position: Position, problems: Problems) -> str | None:
         """The name of a port as seen from inside this scope."""
-        path = self._known(port, position, problems)
+        path = self._known(port, self._model.graph, position, problems)
         if path is None:
             return None
         owner = path.rpartition(".")[0]
@@ -344,35 +348,38 @@ class Scope:
         if scope != self.path:
             there = f"in {scope}" if scope else "at the top of the model"
             problems.add(
-                f"{path} cannot be connected in {self._text.name}",
+                f"{path} cannot be connected in {self._inside.name}",
                 position,
                 f"connect it {there}, where {owner} is; ports of composites lead in and out",
             )
             return None
         return path[len(self._full("")) :]
 
-    def _judge(self, hop: Hop, problems: Problems) -> None:
-        """What can be said of a new connection at once; the rest is said when the model is whole."""
-        graph = self._model.graph
-        source, target = (graph.ports.nodes[path]["port"] for path in (hop.source, hop.destination))
-        if source is not None and target is not None and not accepts(target.type, source.type):
-            problems.add(
-                f"{source.path} sends {type_name(source.type)}, but {target.path} takes {type_name(target.type)}",
-                hop.position,
-            )
-        incoming = graph.incoming(hop.destination)
-        if target is not None and not target.multi and incoming[0] is not hop:
-            at = incoming[0].position
-            where = f", at {at.file}:{at.line}" if at is not None else ""
-            problems.add(
-                f"{target.path} takes one connection, and {incoming[0].source} is connected to it already{where}",
-                hop.position,
-                "disconnect that one, or send through an actor that merges them",
-            )
+    def _judge(self, links: Links, problems: Problems) -> None:
+        """What can be said of new connections at once; the rest is said when the model is whole."""
+        graph, new = self._model.graph, dict[str, Link]()
+        for link in links.found:
+            source, target = (graph.ports.nodes[path]["port"] for path in (link.source, link.destination))
+            if source is not None and target is not None and not accepts(target.type, source.type):
+                problems.add(
+                    f"{source.path} sends {type_name(source.type)}, but {target.path} takes {type_name(target.type)}",
+                    link.position,
+                )
+            if target is None or target.multi:
+                continue
+            before = next(iter(graph.incoming(link.destination)), None) or new.get(link.destination)
+            if before is not None:
+                at = before.position
+                where = f", at {at.file}:{at.line}" if at is not None else ""
+                problems.add(
+                    f"{target.path} takes one connection, and {before.source} is connected to it already{where}",
+                    link.position,
+                    "disconnect that one, or send through an actor that merges them",
+                )
+            new.setdefault(link.destination, link)
 
     # -- aspects --------------------------------------------------------------------------------------------------
 
-    @all_or_nothing
     def weave(
         self,
         name: str,
@@ -398,74 +405,79 @@ class Scope:
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
             check_aspect(aspect, (Aspect, Composite, Instance), position, problems)
             firing_time = firing_time_of(time, aspect, position, problems)
+        model = self._model
         if isinstance(aspect, Aspect):
             with raising() as problems:
-                pointcuts = self._pointcuts(at, type(aspect), position, problems)
-                weaving = Weaving(self._model.graph, self._paths, full, type(aspect), self.path, problems)
+                pointcuts = self._pointcuts(at, type(aspect), model.graph, position, problems)
+                weaving = Weaving(model.draft, Paths(model.draft), full, type(aspect), self.path, problems)
                 woven = weaving.weave(aspect, pointcuts, lambda *_: position)
-            self._model.enlist([woven])
+            model.enlist([woven])
             return woven
-        model, kind = self._model, CompositeAspect if firing_time is None else CompositeExecutionAspect
-        composite = aspect if isinstance(aspect, Composite) else self.add(aspect)
+        draft, others = model.draft.copy(), list[WovenAspect]()
+        if isinstance(aspect, Composite):
+            path = aspect.path
+        else:
+            with raising() as problems:
+                path = self._free(aspect.path, position, problems)
+            made, others = aspect.unfold(path, draft, position)
+            draft.merge(made, draft.graph.director_of(path))
+        kind = CompositeAspect if firing_time is None else CompositeExecutionAspect
         with raising() as problems:
-            pointcuts = self._pointcuts(at, kind, position, problems)
-            for pointcut in pointcuts:
-                pointcut.firing_time = firing_time or 0.0
-            detour = ModelWeaving(model.graph, self._paths, full, composite.path, self.path, problems, position, kind)
+            pointcuts = self._pointcuts(at, kind, draft.graph, position, problems)
+            pointcuts = [replace(each, firing_time=firing_time or 0.0) for each in pointcuts]
+            detour = ModelWeaving(draft, Paths(draft), full, path, self.path, problems, position, kind)
             woven = detour.weave(kind(), pointcuts, lambda *_: position)
             detour.check(woven)
-            check_nesting([*model.aspects, woven], model.graph, problems)
-        detour.connect(woven)
-        model.graph.positions.setdefault(f"aspect {full}", position)
-        model.enlist([woven])
-        model.changed()
+            woven = detour.connect(woven)
+            check_nesting([*model.aspects, woven], draft.graph, problems)
+        draft.graph.positions.setdefault(f"aspect {full}", position)
+        model.adopt(draft, [*others, woven])
         return woven
 
-    @property
-    def _paths(self) -> Paths:
-        return Paths(self._model.graph)
-
     def _pointcuts(
-        self, at: Places | Mapping[str, Places], cls: type[Aspect], position: Position, problems: Problems
+        self,
+        at: Places | Mapping[str, Places],
+        cls: type[Aspect],
+        graph: ModelGraph,
+        position: Position,
+        problems: Problems,
     ) -> list[PointcutText]:
         """Pointcuts as a model file would declare them."""
         found = []
         for request, ends in at.items() if isinstance(at, Mapping) else ((None, at),):
             for end in each_of(ends):
-                path = end if isinstance(end, str) else self._place(end, cls, position, problems)
+                path = end if isinstance(end, str) else self._place(end, cls, graph, position, problems)
                 if path is not None:
                     here = path if path is end else path.removeprefix(self._full(""))
                     pointcut = PointcutText.of(Text(here, within(Text(here, position), here)))
-                    pointcut.request = None if request is None else Text(request, position)
-                    found.append(pointcut)
+                    found.append(replace(pointcut, request=None if request is None else Text(request, position)))
         return found
 
-    def _place(self, place: object, cls: type[Aspect], position: Position, problems: Problems) -> str | None:
+    def _place(
+        self, place: object, cls: type[Aspect], graph: ModelGraph, position: Position, problems: Problems
+    ) -> str | None:
         """The path of a port, or of an actor or composite for an aspect that stands at such."""
-        if "actor" not in cls.stands_at or not isinstance(place, (Actor, Composite)):
-            return self._known(place, position, problems)
-        if isinstance(place, Actor) and self._model.graph.actors.get(place.path) is not place:
+        if cls.at_ports or not isinstance(place, (Actor, Composite)):
+            return self._known(place, graph, position, problems)
+        if isinstance(place, Actor) and graph.actors.get(place.path) is not place:
             problems.add(f"{place.path} is not part of this model", position, "add it to the model first")
             return None
         return place.path
 
-    @all_or_nothing
     def unweave(self, name: str) -> None:
         """Take an aspect out, with its composite if it is a model."""
-        full = self._full(name)
-        known = [woven.name for woven in self._model.aspects]
+        full, model = self._full(name), self._model
+        known = [woven.name for woven in model.aspects]
         if full not in known:
             raise mistake(
                 f"the model has no aspect {full!r}{did_you_mean(full, known)}",
                 call_site(),
                 f"its aspects: {', '.join(known) or 'none'}",
             )
-        woven = self._model.aspects[known.index(full)]
-        if woven.model is None:
-            self._model.aspects.remove(woven)
-        else:  # its composite is of no use without it
-            above, _, part = woven.model.path.rpartition(".")
-            (self._model.scope(above) if above else self._model).remove(part)
+        woven = model.aspects[known.index(full)]
+        if woven.model is not None:  # its composite is of no use without it
+            model.forget(woven.model.path)
+        model.aspects = [each for each in model.aspects if each.name != full]
 
 
 class Composite(Scope):
@@ -482,30 +494,34 @@ class Composite(Scope):
         """Add an output port."""
         return self._port(name, "output")
 
-    @all_or_nothing
     def _port(self, name: str, direction: str) -> CompositePort:
         position = call_site()
+        self.check_port(name, (), position)
         full = self._full(name)
+        self._model.edit().graph.add_composite_port(full, direction, position)
+        return CompositePort(full, direction)
+
+    def check_port(self, name: str, others: Collection[str], position: Position) -> None:
+        """Raise ``ModelError`` if there can be no such port, beside what there is and some others."""
+        full, graph = self._full(name), self._model.graph
         with raising() as problems:
             if not NAME.match(name):
                 problems.add(f"{name!r} is not a port name", position)
-            elif name in self._text.inputs or name in self._text.outputs:
+            elif full in graph.ports or name in others:
                 problems.add(f"port {full!r} is declared twice", position)
-            elif name in self._children:
+            elif name in graph.parts(self.path):
                 problems.add(f"{full!r} is the name of an actor and of a port", position, "rename one")
-        self._model.graph.add_composite_port(full, direction, position)
-        self.enrol_port(name, direction, position)
-        return CompositePort(full, direction)
-
-    def enrol_port(self, name: str, direction: str, position: Position) -> None:
-        """Engine: the composite has this port."""
-        self._text.ports(direction)[name] = PortText(name, position)
-
-    @property
-    def declaration(self) -> CompositeText:
-        """Engine: the composite as its surroundings see it."""
-        return self._text
 
     def __repr__(self) -> str:
-        inputs, outputs = ", ".join(self._text.inputs) or "none", ", ".join(self._text.outputs) or "none"
+        inputs, outputs = (", ".join(_names(ports)) or "none" for ports in self._model.graph.borders(self.path))
         return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
+
+
+def _label(graph: ModelGraph, composite: str) -> str:
+    """How messages call a composite: by its class, if it has one."""
+    kind = graph.composites[composite]
+    return composite if kind == OF_NO_CLASS else kind
+
+
+def _names(paths: Iterable[str]) -> list[str]:
+    return [path.rpartition(".")[2] for path in paths]

@@ -9,7 +9,7 @@ at a composite for all the actors in it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -17,25 +17,26 @@ from epicycle.actors import declared_parameters
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
+    JoinPointAspect,
     PortsParameter,
     Reading,
+    Selection,
     SelectionParameter,
 )
 
-from .declarations import PointcutText
+from ..language import PointcutText
+from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, in_general, nearest
+from .draft import Draft
 from .firing_times import unknown_inputs
-from .graph import ModelGraph
-from .patterns import PathIndex, PatternError
-from .problems import Position, Problems, did_you_mean, nearest
-from .reading import Text
 from .woven import WovenAspect
 
 
 class Paths:
     """What the pointcuts of a model's aspects choose from, found out once for all of them; of ``ports``, or of all."""
 
-    def __init__(self, graph: ModelGraph, ports: Iterable[str] | None = None) -> None:
-        self._graph = graph
+    def __init__(self, draft: Draft, ports: Iterable[str] | None = None) -> None:
+        self._draft, self._graph = draft, draft.graph
+        graph = draft.graph
         self.ports = PathIndex(graph.ports.nodes if ports is None else ports, graph.limits)
 
     @cached_property
@@ -52,7 +53,7 @@ class Paths:
     def owners(self) -> PathIndex:
         """All composites and actors, those that could not be made included."""
         graph = self._graph
-        unmade = (graph.owner(path) for path, is_unmade in graph.ports.nodes(data="unmade") if is_unmade)
+        unmade = sorted(set(map(graph.owner, self._draft.open)))
         return PathIndex(dict.fromkeys((*graph.composites, *graph.actors, *unmade)), graph.limits)
 
     @cached_property
@@ -65,9 +66,10 @@ class Weaving:
     """Finds the places of one aspect; ``scope`` is the composite that declares it, to which its names are relative."""
 
     def __init__(
-        self, graph: ModelGraph, paths: Paths, name: str, cls: type[Aspect], scope: str, problems: Problems
+        self, draft: Draft, paths: Paths, name: str, cls: type[Aspect], scope: str, problems: Problems
     ) -> None:
-        self.graph = graph
+        self.draft = draft
+        self.graph = draft.graph
         self.paths = paths
         self.ports = paths.ports
         self.name = name
@@ -84,36 +86,41 @@ class Weaving:
         return self.cls.__name__
 
     def weave(
-        self, aspect: Aspect, pointcuts: list[PointcutText], position_of: Callable[..., Position | None]
+        self, aspect: Aspect, pointcuts: Sequence[PointcutText], position_of: Callable[..., Position | None]
     ) -> WovenAspect:
         """The aspect with its places and all that it looks at; a pointcut that selects nothing is a problem.
 
         ``position_of`` tells where a parameter, or a key in it, is set in the model file.
         """
         before = len(self.problems)
-        woven = WovenAspect(self.name, aspect, *self.select(pointcuts))
-        woven.parameters = [path for path, is_left_out in self._parameters.items() if not is_left_out]
-        if pointcuts and not woven.places and not self._is_excused and len(self.problems) == before:
+        ports, connections, actors = self.select(pointcuts)
+        parameters = [path for path, is_left_out in self._parameters.items() if not is_left_out]
+        is_somewhere = ports or connections or actors or parameters
+        if pointcuts and not is_somewhere and not self._is_excused and len(self.problems) == before:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
             self._problem(nowhere, pointcuts[0])
+        readings: dict[PortFormula, list[Reading]] = {}
+        selections: dict[str, Selection] = {}
+        reads: list[str] = []
         for name, parameter in declared_parameters(type(aspect)).items():
+            value, position = getattr(aspect, name), position_of(name)
             if isinstance(parameter, SelectionParameter):
-                patterns = parameter.patterns(getattr(aspect, name))
-                found = {each: self._selected(name, each, parameter, position_of(name)) for each in patterns}
-                woven.selections[name] = found
+                patterns = parameter.patterns(value)
+                found = selections[name] = {each: self._selected(name, each, parameter, position) for each in patterns}
                 if isinstance(parameter, PortsParameter):
-                    woven.reads += [port for ports in found.values() for port in ports]
-                continue
-            formula = getattr(aspect, name)
-            if isinstance(formula, PortFormula):
-                position = position_of(name)
-                woven.readings[formula] = [self._reading(name, each, position) for each in formula.references]
-                for reference, fields in formula.given_fields:
-                    self._check_given(name, reference, fields, woven.ports, position)
+                    reads += [port for ports_found in found.values() for port in ports_found]
+            elif isinstance(value, PortFormula):
+                readings[value] = [self._reading(name, each, position) for each in value.references]
+                for reference, fields in value.given_fields:
+                    self._check_given(name, reference, fields, ports, position)
+        asked = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
+        chosen = (port for pattern in asked for port in self.ports.select(self._full(pattern)))
+        reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
+        woven = WovenAspect(
+            self.name, aspect, ports, connections, actors, readings, selections, reads, parameters=parameters
+        )
         self.check_times(woven, position_of)
-        chosen = (port for pattern in aspect.reads() for port in self.ports.select(self._full(pattern)))
-        woven.reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return woven
 
     def check_times(self, woven: WovenAspect, position_of: Callable[..., Position | None]) -> None:
@@ -121,13 +128,13 @@ class Weaving:
         for message, keys, advice in unknown_inputs(woven, self.graph):
             self._problem(message, position_of(*keys), advice)
 
-    def select(self, pointcuts: list[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         """The ports, connections and actors that the pointcuts select."""
-        if "actor" in self.cls.stands_at:
+        if not self.cls.at_ports:
             return [], [], self._select_actors(pointcuts)
         return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
 
-    def _select_ports(self, pointcuts: list[PointcutText]) -> list[str]:
+    def _select_ports(self, pointcuts: Sequence[PointcutText]) -> list[str]:
         """The ports that the pointcuts select."""
         of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
@@ -202,18 +209,22 @@ class Weaving:
     def _enter_parameter(self, actor: str, name: str, pointcut: PointcutText) -> None:
         """Take a parameter of an actor, if it holds numbers that nothing else changes."""
         path, parameter = f"{actor}.{name}", declared_parameters(type(self.graph.actors[actor]))[name]
+        about = ("altered", in_general(path))
         if pointcut.exclude:
             self._parameters[path] = True
         elif parameter.type not in (int, float, int | float):
-            self._problem(f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut)
+            self._problem(
+                f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut, about=about
+            )
         elif vars(self.graph.actors[actor])[name] is None:
-            self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut)
+            self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
         elif path in self.graph.ports and self.graph.incoming(path):
             sender = self.graph.incoming(path)[0].source
             self._problem(
                 f"{path} gets its values over a connection",
                 pointcut,
                 f"let the aspect stand at {sender!r}, where they come from",
+                about=about,
             )
         else:
             self._parameters.setdefault(path, False)
@@ -242,7 +253,7 @@ class Weaving:
         ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
         if pointcut.port is None:
             found = [path for path in ports if self._fits(path)]
-            if not found and not any(path in graph.unknown for path in owners):
+            if not found and not any(path in self.draft.unknown for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 where = pointcut.type or pointcut.tag
                 self._problem(f"{self.kind} stands at {wanting} ports, but no {_asked(pointcut)} has one", where)
@@ -273,21 +284,21 @@ class Weaving:
             wanted = pointcut.tag
             owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
             known = {tag for path in inside for tag in graph.tags.get(path, ())}
-        unknown = [path for path in graph.unknown if not self.scope or path.startswith(f"{self.scope}.")]
-        if not owners and (unknown or wanted.text in graph.absent):
+        unknown = [path for path in self.draft.unknown if not self.scope or path.startswith(f"{self.scope}.")]
+        if not owners and (unknown or wanted.text in self.draft.kinds):
             self._is_excused = True
             return None
         if not owners:
             what = "types" if pointcut.type is not None else "tags"
             self._problem(
-                f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | graph.absent))}",
+                f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}",
                 wanted,
                 f"{what} in it: {', '.join(sorted(known)) or 'none'}",
             )
             return None
         return owners
 
-    def _select_actors(self, pointcuts: list[PointcutText]) -> dict[str, str]:
+    def _select_actors(self, pointcuts: Sequence[PointcutText]) -> dict[str, str]:
         """The actors that the pointcuts select, as such or with a composite around them, and what was aimed at."""
         index = self.paths.owners
         aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
@@ -348,7 +359,7 @@ class Weaving:
                 )
         return found
 
-    def _select_connections(self, pointcuts: list[PointcutText]) -> list[tuple[str, str]]:
+    def _select_connections(self, pointcuts: Sequence[PointcutText]) -> list[tuple[str, str]]:
         """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
         chosen: dict[tuple[str, str], None] = {}
         for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
@@ -395,7 +406,7 @@ class Weaving:
 
     def _excuses(self, pattern: str) -> bool:
         """Whether a pattern that matches nothing is right."""
-        is_excused = self.graph.is_excused(pattern)
+        is_excused = self.draft.excuses(pattern)
         self._is_excused = self._is_excused or is_excused
         return is_excused
 
@@ -413,7 +424,7 @@ class Weaving:
         fitting = [path for path in found if not of_ports or self._sends(path)]
         if found and not fitting:
             self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
-        elif not found and not self.graph.is_excused(self._full(pattern) + ("" if of_ports else ".*")):
+        elif not found and not self.draft.excuses(self._full(pattern) + ("" if of_ports else ".*")):
             near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
             self._problem(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
         elif len(fitting) > 1 and parameter.is_single:
@@ -429,7 +440,7 @@ class Weaving:
                 fields = tuple(parts[length:])
                 self._check_fields(name, reference, port, fields, position)
                 return port, fields
-        if self.graph.is_excused(self._full(reference)):
+        if self.draft.excuses(self._full(reference)):
             return reference, ()  # nothing can send there now, and the condition never holds
         if self._full(reference) in self.ports:
             self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
@@ -473,9 +484,11 @@ class Weaving:
     def _full(self, text: str) -> str:
         return f"{self.scope}.{text}" if self.scope else text
 
-    def _problem(self, message: str, where: PointcutText | Text | Position | None, *hints: str) -> None:
+    def _problem(
+        self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
+    ) -> None:
         position = where.position if isinstance(where, (PointcutText, Text)) else where
-        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
+        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope, about=about)
 
 
 def _asked(pointcut: PointcutText) -> str:

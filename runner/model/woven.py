@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from epicycle.actors import counted
 from epicycle.actors.expression import PortFormula
-from epicycle.aspects import Aspect, CompositeExecutionAspect, ExecutionAspect, FiringTime, Reading, Selection
+from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
 
-from .graph import ModelGraph
-from .problems import Problems
+from ..text import Problems
+from .graph import ModelGraph, is_within
 
 
-@dataclass
+@dataclass(frozen=True)
 class AspectModel:
     """The composite that an aspect is, the port from which it answers, and the port by which each place asks it."""
 
@@ -33,7 +33,7 @@ class AspectModel:
         return said
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class WovenAspect:
     """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
 
@@ -66,6 +66,16 @@ class WovenAspect:
         connections = (f"{source} -> {destination}" for source, destination in self.connections)
         return [*self.ports, *connections, *self.actors, *self.parameters]
 
+    def without(self, path: str) -> WovenAspect:
+        """The aspect when a part of the model is taken out at which it stood, too."""
+        return replace(
+            self,
+            ports=[port for port in self.ports if not is_within(port, path)],
+            actors={actor: unit for actor, unit in self.actors.items() if not is_within(actor, path)},
+            parameters=[each for each in self.parameters if not is_within(each, path)],
+            connections=[ends for ends in self.connections if not any(is_within(end, path) for end in ends)],
+        )
+
     @property
     def looks_at(self) -> list[str]:
         """All ports whose latest tokens it needs to know."""
@@ -89,7 +99,7 @@ def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems
     taken: dict[str, str] = {}
     for woven in aspects:
         aspect = woven.aspect
-        if not (isinstance(aspect, (ExecutionAspect, CompositeExecutionAspect)) and aspect.is_processor):
+        if not (isinstance(aspect, ExecutionAspect) and aspect.is_processor):
             continue
         if twice := [actor for actor in woven.actors if actor in taken]:
             problems.add(

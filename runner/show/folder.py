@@ -8,15 +8,12 @@ import shlex
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-
 from epicycle.actors import EpicycleError, abridged, read_regular
 
-from ..columns import categories, numbers, texts
-from ..engine import Results
+from ..catalogue import Figure
 from ..provenance import versions
+from ..results import Results, write_signals
 from .drawing import FigureError, draw
-from .figures import Figure
 from .summary import summary_object
 
 MAX_NAME = 60  # letters of a file's name, which file systems bound
@@ -75,28 +72,3 @@ def draw_figures(folder: Path, results: Results, figures: dict[str, Figure]) -> 
             written.append(folder / file)
             os.replace(aside, written[-1])
     return written, failed
-
-
-def write_signals(results: Results, path: Path) -> None:
-    """The recorded signals as ``Results.table`` has them."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    made = {"time": np.float64, "time_ns": np.int64, "microstep": np.int64, "value": np.float64}
-    columns = results.table()
-    table = pa.table(
-        {
-            name: numbers(values, made[name])
-            if name in made
-            else texts(values)
-            if name == "text"
-            else categories(values)
-            for name, values in columns.items()
-        }
-    )
-    aside = path.with_name(f".{path.name}")
-    # Numbers are mostly near to the one before: told that, Parquet takes two thirds of the place for both times.
-    encoding = dict.fromkeys(("time", "value"), "BYTE_STREAM_SPLIT") | {"time_ns": "DELTA_BINARY_PACKED"}
-    few = [name for name in columns if name not in encoding]
-    pq.write_table(table, aside, compression="zstd", use_dictionary=few, column_encoding=encoding)
-    os.replace(aside, path)

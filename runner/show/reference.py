@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 
 from rich.console import Group, RenderableType
@@ -10,12 +10,13 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from epicycle.actors import Configurable, variants
+from epicycle.actors import Configurable, bounds_text
 
-from ..model import Model
-from ..model.catalogue import Catalogue
-from ..model.measure import TAKES, Measure
-from ..model.reference import (
+from ..catalogue import (
+    TAKES,
+    Catalogue,
+    Figure,
+    Measure,
     ParameterReference,
     PortReference,
     TypeReference,
@@ -24,12 +25,9 @@ from ..model.reference import (
     parts_of,
     shown,
 )
-from .figures import Figure
-
-
-def figure_types() -> dict[str, type[Figure]]:
-    """The figures that a model may ask for, by name."""
-    return dict(sorted(variants(Figure).items()))
+from ..language import CONSTRUCTS
+from ..model import Model
+from ..printing import columns
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
@@ -45,6 +43,12 @@ def parts_described(types: Iterable[type[Configurable]]) -> dict[str, list[TypeR
     }
 
 
+def by_group(references: Iterable[TypeReference]) -> Iterator[tuple[str, str, Iterator[TypeReference]]]:
+    """The topics, what is said of them, and the types of each."""
+    for (group, about), members in groupby(references, key=lambda each: (each.group, each.about_group)):
+        yield group, about, members
+
+
 # -- for a terminal -------------------------------------------------------------------------------------------------
 
 
@@ -52,7 +56,7 @@ def overview(references: Sequence[TypeReference]) -> Group:
     """A line for each type under the heading of its topic."""
     width = max((len(each.name) for each in references), default=0)
     blocks: list[RenderableType] = []
-    for (group, about), members in groupby(references, key=lambda each: (each.group, each.about_group)):
+    for group, about, members in by_group(references):
         blocks += [Text(""), Text.assemble((group, "bold"), f"  {about}" if about else "")]
         table = Table(box=None, show_header=False, pad_edge=False)
         table.add_column(width=width + 2, no_wrap=True)
@@ -65,31 +69,19 @@ def overview(references: Sequence[TypeReference]) -> Group:
 
 def detail(reference: TypeReference, parts: Mapping[str, Sequence[TypeReference]]) -> Group:
     """All that is declared by one type, and by the parts that its parameters take."""
-    blocks: list[RenderableType] = [
-        Text.assemble((reference.name, "bold"), f"  {reference.kind}, {reference.group}"),
-        Text(""),
-        Text(reference.doc),
-        *_tables(reference),
-    ]
+    head = Text.assemble((reference.name, "bold"), f"  {reference.kind}, {reference.group}")
+    blocks: list[RenderableType] = [head, *_about(reference)]
     for base, known in parts.items():
         for each in known:
-            blocks += [
-                Text(""),
-                Text.assemble((each.name, "bold"), f"  {base.lower()}"),
-                Padding(Group(Text(""), Text(each.doc), *_tables(each)), (0, 0, 0, 2)),
-            ]
+            blocks += [Text(""), Text.assemble((each.name, "bold"), f"  {base.lower()}")]
+            blocks.append(Padding(Group(*_about(each)), (0, 0, 0, 2)))
     return Group(*blocks)
 
 
-def _tables(reference: TypeReference) -> list[RenderableType]:
-    blocks: list[RenderableType] = []
+def _about(reference: TypeReference) -> list[RenderableType]:
+    blocks: list[RenderableType] = [Text(""), Text(reference.doc)]
     for heading, rows in sections(reference):
-        table = Table(box=None, pad_edge=False, header_style="dim")
-        for title in heading:
-            table.add_column(title, no_wrap=title.endswith("port") or title in ("parameter", "unit"))
-        for row in rows:
-            table.add_row(*map(Text, row))
-        blocks += [Text(""), table]
+        blocks += [Text(""), columns(heading, rows, whole=("input port", "output port", "parameter", "unit"))]
     return [*blocks, *(Text(f"\n{line}") for line in facts(reference))]
 
 
@@ -97,14 +89,13 @@ def weaving(model: Model) -> RenderableType:
     """Which aspects stand at each port and actor of a model, in the order in which a token or a firing meets them."""
     if not model.aspects:
         return Text(f"{model.name} has no aspects")
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for title in ("at", "", "aspect", "type", "parameters"):
-        table.add_column(title, no_wrap=title == "at")
-    for path, woven in aspects_at(model).items():
-        for place, (name, kind, parameters) in enumerate(woven):
-            number = str(place + 1) if len(woven) > 1 else ""
-            table.add_row(*map(Text, ("" if place else path, number, name, kind, parameters)))
+    rows = [
+        ("" if place else path, str(place + 1) if len(woven) > 1 else "", *about)
+        for path, woven in aspects_at(model).items()
+        for place, about in enumerate(woven)
+    ]
     idle = [each for each in model.aspects if not each.places]
+    table = columns(("at", "", "aspect", "type", "parameters"), rows, whole=("at",))
     return Group(table, *(Text(f"{each.name} ({each.kind}) stands nowhere") for each in idle))
 
 
@@ -150,7 +141,7 @@ def markdown(
     actors, aspects = described(catalogue.actors), described(catalogue.aspects)
     for title, references in (("Actors", actors), ("Aspects", aspects)):
         lines.append(f"## {title}\n")
-        for (group, about), members in groupby(references, key=lambda each: (each.group, each.about_group)):
+        for group, about, members in by_group(references):
             names = ", ".join(f"[{each.name}](#{each.name.lower()})" for each in members)
             lines.append(f"**{group}** ({about}): {names}\n")
         lines += [block for each in references for block in _markdown(each)]
@@ -163,6 +154,10 @@ def markdown(
     for title, types in (("Figures", figures), ("Figures of studies", study_figures)):
         lines.append(f"## {title}\n")
         lines += [block for each in described(types) for block in _markdown(each)]
+    lines.append("## Keys\n")
+    for title, construct in CONSTRUCTS.items():
+        rows = [[f"`{key}`", each.doc.replace("<", "\\<")] for key, each in construct.keys.items()]
+        lines += [f"### {title}\n", _rows(("key", "what it is"), rows)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -229,14 +224,15 @@ def facts(reference: TypeReference) -> list[str]:
 
 
 def _port_row(port: PortReference) -> list[str]:
-    notes = []
-    if port.direction == "input":
-        notes += [] if port.required else ["optional"]
-        notes += [] if port.triggers else ["does not trigger"]
-    elif port.depends_on is not None:  # the port may stand in a loop
-        notes.append(f"depends at once on {' and '.join(port.depends_on) or 'no input'}")
-    notes += ["any number of connections"] if port.multi else []
-    return [port.name, port.type, ", ".join(notes), port.doc]
+    is_input, inputs = port.direction == "input", port.depends_on
+    notes = {
+        "optional": is_input and not port.required,
+        "does not trigger": is_input and not port.triggers,
+        # Such a port may stand in a loop.
+        f"depends at once on {' and '.join(inputs or ()) or 'no input'}": not is_input and inputs is not None,
+        "any number of connections": port.multi,
+    }
+    return [port.name, port.type, ", ".join(note for note, holds in notes.items() if holds), port.doc]
 
 
 def _parameter_row(parameter: ParameterReference) -> list[str]:
@@ -245,10 +241,8 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
         kind = " or ".join(parameter.choices)
     elif parameter.min is not None and parameter.max is not None:
         kind += f", {parameter.min:g} to {parameter.max:g}"
-    elif parameter.min is not None:
-        kind += f" >= {parameter.min:g}"
-    elif parameter.max is not None:
-        kind += f" <= {parameter.max:g}"
+    else:
+        kind += bounds_text(parameter.min, parameter.above, parameter.max, "{:g}".format)
     return [
         parameter.name,
         kind,

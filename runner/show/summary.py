@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from epicycle.actors import shortened, visible
 
-from ..engine import Results, plain
 from ..model import Model, extent
+from ..printing import columns
+from ..results import Results, plain
+from ..shown import finite, in_words
 
 WIDEST = 400  # characters of a text in the table
 
@@ -37,56 +37,35 @@ def summary_object(results: Results) -> dict[str, Any]:
     return result
 
 
-def finite(value: Any) -> Any:
-    """The same with every number that is not finite replaced by None."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
 def summary_table(model: Model, results: Results) -> Group:
     """What a person sees at the end of a run."""
     head = Text.assemble(
         (visible(results.model), "bold"),
         f"  seed {results.seed}, {results.end:g} s of model time, ended by {visible(results.stopped)}",
     )
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    table.add_column("metric", overflow="fold")
-    table.add_column("value", justify="right", overflow="fold")
-    table.add_column("unit", overflow="fold")
-    table.add_column("", style="dim", overflow="fold")
+    rows = []
     for metric in model.metrics:
         found = results.outcomes[metric.name]
         said = "; ".join([metric.measure.doc, *found.remarks] if metric.measure.doc else found.remarks)
         unit = "" if metric.unit == "1" else metric.unit
-        table.add_row(*map(_cell, (metric.name, found.shown(shown), unit, said)))
+        rows.append((metric.name, found.shown(shown), unit, said))
     for name, figures in results.aspects.items():
         woven = next(each for each in model.aspects if each.name == name)
         for what, figure in figures.items():
             where = f"by {woven.kind} at {extent([woven])}"
-            table.add_row(*map(_cell, (f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where)))
-    table.add_row("events", f"{results.events}", "", "sends and acts of aspects in the event log")
-    table.add_row("firings", f"{results.firings}", "", "of actors")
-    table.add_row("wall time", f"{results.wall_time:.3f}", "s", "of initialisation and run")
-    table.add_row("digest", results.digest[:16] + "...", "", "SHA-256 of the event log, shortened")
+            rows.append((f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where))
+    rows += [
+        ("events", f"{results.events}", "", "sends and acts of aspects in the event log"),
+        ("firings", f"{results.firings}", "", "of actors"),
+        ("wall time", f"{results.wall_time:.3f}", "s", "of initialisation and run"),
+        ("digest", results.digest[:16] + "...", "", "SHA-256 of the event log, shortened"),
+    ]
+    cells = ([visible(shortened(text, WIDEST)) for text in row] for row in rows)
+    table = columns(("metric", "value", "unit", ""), cells)
+    table.columns[1].justify, table.columns[3].style = "right", "dim"
     return Group(head, table)
-
-
-def _cell(text: str) -> Text:
-    """Text as it is, whatever a terminal or rich would take it for."""
-    return Text(visible(shortened(text, WIDEST)))
 
 
 def shown(value: Any) -> str:
     """A metric's value in few characters."""
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.4g}" if abs(value) < 1e5 else f"{value:.6g}"
-    return str(plain(value))
+    return in_words(plain(value), digits=4, nothing="-")

@@ -1,34 +1,74 @@
-"""Studies: many runs of a model under many conditions, which survive whatever happens to them."""
+"""Studies: many runs of a model under many conditions, which survive whatever happens to them.
 
-from .declaration import Study, find_study, is_study, read_study
-from .executor import WorkerError
-from .manifest import StoreError
-from .metrics import MetricError, StudyMetric
-from .plan import Condition, Plan
-from .results import StudyResults, open_study
-from .schedule import Schedule
+``plan`` says what is to be run, ``run`` makes the runs and keeps what came of them, ``judge`` says what that means.
+"""
+
+from .inference import Estimate, half_width, mean
+from .judge import (
+    CONFIRMED,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    REVERSED,
+    UNDECIDED,
+    Finding,
+    Judgement,
+    Recommendation,
+    StudyResults,
+    open_study,
+    ranked,
+)
+from .plan import Column, Condition, MetricError, Plan
+from .run import (
+    OK,
+    Backlog,
+    Replay,
+    ReplayError,
+    StoreError,
+    WorkerError,
+    WriteError,
+    again,
+    is_running,
+    progress,
+    repeat,
+    replace_file,
+)
 from .session import Outcome, TooManyRunsError, available_cores, check_size, plan_of_folder, run_study
-from .store import WriteError
 
 __all__ = [
+    "CONFIRMED",
+    "NOT_REPRODUCED",
+    "OK",
+    "REPRODUCED",
+    "REVERSED",
+    "UNDECIDED",
+    "Backlog",
+    "Column",
     "Condition",
+    "Estimate",
+    "Finding",
+    "Judgement",
     "MetricError",
     "Outcome",
     "Plan",
-    "Schedule",
+    "Recommendation",
+    "Replay",
+    "ReplayError",
     "StoreError",
-    "Study",
-    "StudyMetric",
     "StudyResults",
     "TooManyRunsError",
     "WorkerError",
     "WriteError",
+    "again",
     "available_cores",
     "check_size",
-    "find_study",
-    "is_study",
+    "half_width",
+    "is_running",
+    "mean",
     "open_study",
     "plan_of_folder",
-    "read_study",
+    "progress",
+    "ranked",
+    "repeat",
+    "replace_file",
     "run_study",
 ]

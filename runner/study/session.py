@@ -14,15 +14,22 @@ from epicycle.actors import EpicycleError, counted
 
 from ..engine import Simulation
 from ..provenance import git_revision, machine, versions
-from .executor import Executor
-from .local import LocalExecutor
-from .manifest import FORMAT, StoreError, read_manifest
+from .judge import StudyResults
 from .plan import Plan, epicycle_version
-from .results import StudyResults
-from .schedule import OK, Schedule
-from .store import Store, collect, is_wanted, lock, prepare
+from .run import (
+    FORMAT,
+    LOCAL,
+    RETRIED,
+    Backlog,
+    StoreError,
+    check_executor,
+    duration,
+    lock,
+    make_runs,
+    prepare,
+    read_manifest,
+)
 
-LOCAL, DASK = "local", "dask"  # executors
 MANY = 100_000  # runs that nobody asks for by mistake
 _TRIAL = 5.0  # s that are spent at most to find out how long a run takes
 
@@ -54,7 +61,7 @@ def run_study(
     jobs: int | None = None,
     timeout: float | None = None,
     retry: bool = False,
-    tell: Callable[[Schedule], None] | None = None,
+    tell: Callable[[Backlog], None] | None = None,
     executor: str = LOCAL,
     scheduler: str | None = None,
 ) -> Outcome:
@@ -64,31 +71,23 @@ def run_study(
     workers of the Dask ``scheduler`` at that address, or for a cluster of its own on this machine.  Raises
     ``StoreError`` and ``WorkerError``, and ``EpicycleError`` where Dask is wanted and not installed.
     """
-    if executor == DASK:
-        from .cluster import distributed_module
-
-        distributed_module()  # before anything is written
+    check_executor(executor)  # before anything is written
     with lock(folder):
         store = prepare(folder, manifest_of(plan))
-        until = plan.study.until
-        known = store.known(None if until is None else until.metric)
-        schedule = Schedule(plan, {key: done for key, done in known.items() if is_wanted(done, retry)})
-        maker = _executor(executor, scheduler, store, plan, jobs or available_cores(), timeout)
-        maker.run(schedule, lambda: None if tell is None else tell(schedule))
-        collect(store)
-        results = StudyResults(folder)
-        table = results.write_table()
-        made, there = schedule.made, schedule.there
-        failed = made.total() + there.total() - made[OK] - there[OK]
-        return Outcome(made.total(), there.total(), failed, schedule.stopped_early, table)
-
-
-def _executor(name: str, scheduler: str | None, store: Store, plan: Plan, jobs: int, timeout: float | None) -> Executor:
-    if name == DASK:
-        from .cluster import DaskExecutor
-
-        return DaskExecutor(store, plan, jobs, timeout, scheduler)
-    return LocalExecutor(store, plan, jobs, timeout)
+        known = store.known(plan.decides)
+        backlog = Backlog(plan, {key: done for key, done in known.items() if not (retry and done.status in RETRIED)})
+        make_runs(
+            store,
+            backlog,
+            lambda: None if tell is None else tell(backlog),
+            jobs=jobs or available_cores(),
+            timeout=timeout,
+            executor=executor,
+            scheduler=scheduler,
+        )
+        table = StudyResults(folder).write_table()
+        made, there = backlog.made.total(), backlog.there.total()
+        return Outcome(made, there, backlog.failed, backlog.stopped_early, table)
 
 
 def manifest_of(plan: Plan) -> dict[str, Any]:
@@ -167,11 +166,3 @@ def seconds_of_a_run(plan: Plan) -> float:
     except EpicycleError:
         pass  # the first run fails; others may not
     return time.perf_counter() - started
-
-
-def duration(seconds: float) -> str:
-    """A time as people say it."""
-    for limit, size, unit in ((100, 1, "s"), (6_000, 60, "min"), (172_800, 3600, "h"), (63_072_000, 86_400, "days")):
-        if seconds < limit:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{seconds / 31_536_000:,.0f} years"

@@ -24,7 +24,8 @@ from epicycle.actors import (
 )
 from epicycle.aspects import MeasurementFailure, PacketLoss
 from epicycle.runner import Model, ModelError, Results, Simulation, load_composite, load_model
-from epicycle.runner.model import firing_order, packaged_models
+from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.model import firing_order
 
 
 class Noisy(Actor):
@@ -145,7 +146,7 @@ def structure(model: Model) -> dict[str, Any]:
     return {
         "actors": {path: (type(actor), repr(actor)) for path, actor in graph.actors.items()},
         "ports": {path: (graph.direction(path), repr(port)) for path, port in graph.ports.nodes(data="port")},
-        "connections": [(hop.source, hop.destination, hop.delay) for hop in graph.since(0)],
+        "connections": [(hop.source, hop.destination, hop.delay) for hop in graph.hops],
         "composites": list(graph.composites),
         "members": graph.members,
         "priorities": {path: priority for path, priority in graph.priorities.items() if priority},

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from epicycle.actors import Tag, declared_parameters
-from epicycle.aspects import Aspect, JoinPoint, Medium, SelectionParameter
+from epicycle.aspects import JoinPoint, Medium, PortAspect, SelectionParameter
 
 SECOND = 1_000_000_000
 
@@ -23,13 +23,13 @@ class Bench:
     """
 
     def __init__(
-        self, aspect: Aspect | None = None, seed: int = 1, world: dict[str, Any] | None = None, **ports: Medium
+        self, aspect: PortAspect | None = None, seed: int = 1, world: dict[str, Any] | None = None, **ports: Medium
     ) -> None:
         self.world = world
         self.seed = seed
         self.tag = Tag(0, 1)
         self.source = "b.port" if aspect is not None else ""
-        self.aspects: dict[str, Aspect] = {"port": aspect} if aspect is not None else dict(ports)
+        self.aspects: dict[str, PortAspect] = {"port": aspect} if aspect is not None else dict(ports)
         self.out: list[tuple[float, str, Any]] = []
         self.acts: list[tuple[float, str, str, Any]] = []
         self._agenda: list[tuple[int, int, int, Callable[[Any], None], Any]] = []
@@ -112,8 +112,8 @@ class Bench:
     def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
         return partial(deliver, token)
 
-    def note(self, aspect: str, port: str, event: str, token: Any) -> None:
-        self.acts.append((self.tag.time / SECOND, port, event, token))
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        self.acts.append((self.tag.time / SECOND, f"{owner}.{port}", event, token))
 
     def record(self, signal: str, token: Any) -> None:
         raise AssertionError("nothing is recorded")

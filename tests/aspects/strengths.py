@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from inspect import isabstract
 
 import epicycle.aspects
 from epicycle.aspects import (
     Aspect,
     Bias,
     Bus,
+    CompositeAspect,
+    CompositeExecutionAspect,
     Corrupt,
     CrashRestart,
     Drift,
@@ -25,6 +28,7 @@ from epicycle.aspects import (
     Outlier,
     OutOfRange,
     PacketLoss,
+    PortAspect,
     Processor,
     Quantise,
     RadioMedium,
@@ -116,8 +120,8 @@ def concrete_aspects() -> set[type[Aspect]]:
         each
         for each in public
         if isinstance(each, type)
-        and issubclass(each, Aspect)
-        and each.pass_token is not Aspect.pass_token
-        and not getattr(each, "__abstractmethods__", None)
+        and issubclass(each, (PortAspect, ExecutionAspect))
+        and each not in (CompositeAspect, CompositeExecutionAspect)
+        and not isabstract(each)
         and not issubclass(each, ObservationAspect)
     }

@@ -1,262 +1,28 @@
-"""Every aspect against its law: rates, runs, delays and errors, at 99.9 % confidence with fixed seeds."""
+"""What all aspects of the catalogue have in common."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from epicycle.actors import BodyState, EpicycleError, ParameterError, Plan
 from epicycle.aspects import (
     Aspect,
     Bias,
-    Corrupt,
-    Drift,
-    Duplicate,
     FieldError,
     GilbertElliott,
     Latency,
     MeasurementFailure,
-    Noise,
-    Outlier,
-    PacketLoss,
-    Quantise,
-    Reorder,
     Saturate,
     StuckAt,
-    Throttle,
 )
 from tests.aspects.bench import Bench
+from tests.aspects.laws import Reading
 from tests.aspects.strengths import AT_WORK, AT_ZERO, at_ports, concrete_aspects
-
-MILLISECOND = 1_000_000
-SURE = 0.999
-
-
-@dataclass
-class Reading:
-    """A token with fields."""
-
-    name: str
-    value: Any
-    valid: bool = True
-
-
-def runs(lost: np.ndarray) -> np.ndarray:
-    """Lengths of the runs of true values, those at the ends left out."""
-    edges = np.flatnonzero(np.diff(lost.astype(int)))
-    lengths = np.diff(edges)
-    return lengths[0::2] if not lost[0] else lengths[1::2]
-
-
-def lost_of(bench: Bench, count: int) -> np.ndarray:
-    lost = np.ones(count, bool)
-    lost[bench.tokens] = False
-    return lost
-
-
-COUNT = 40_000
-
-
-# -- loss -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("p", "r", "loss_bad", "loss_good"), [(1 / 12, 0.25, 1, 0), (0.02, 0.1, 0.8, 0.05), (1, 1, 1, 0)]
-)
-def test_gilbert_elliott(p: float, r: float, loss_bad: float, loss_good: float) -> None:
-    aspect = GilbertElliott(p=p, r=r, loss_bad=loss_bad, loss_good=loss_good)
-    lost = lost_of(Bench(aspect).play(range(COUNT)), COUNT)
-    mean = (p * loss_bad + r * loss_good) / (p + r)
-    # Variance of the mean of a two-state chain: that of independent states times (1 + m) / (1 - m), m = 1 - p - r.
-    share, memory = p / (p + r), 1 - p - r
-    spread = (loss_bad - loss_good) ** 2 * share * (1 - share) * (1 + memory) / (1 - memory)
-    spread += share * loss_bad * (1 - loss_bad) + (1 - share) * loss_good * (1 - loss_good)
-    assert abs(lost.mean() - mean) <= stats.norm.ppf(0.9995) * math.sqrt(spread / COUNT) + 1 / COUNT
-    if loss_bad == 1 and loss_good == 0:
-        lengths = runs(lost)
-        error = stats.norm.ppf(0.9995) * math.sqrt(1 - r) / r / math.sqrt(len(lengths))
-        assert abs(lengths.mean() - 1 / r) <= error + 1e-12
-        if r < 1:  # geometric: bursts are longer than those of independent losses of the same rate
-            assert lengths.mean() > 2 / (1 - mean)
-
-
-def test_gilbert_elliott_starts_in_its_stationary_law() -> None:
-    starts = [lost_of(Bench(GilbertElliott(p=0.1, r=0.3), seed).play(range(1)), 1)[0] for seed in range(2000)]
-    low, high = stats.binom.interval(SURE, 2000, 0.25)
-    assert low <= sum(starts) <= high
-
-
-@pytest.mark.parametrize(("probability", "burst"), [(0.25, 4.0), (0.5, 10.0), (0.1, 1.0)])
-def test_failures_in_runs(probability: float, burst: float) -> None:
-    lost = lost_of(Bench(MeasurementFailure(probability=probability, burst=burst)).play(range(COUNT)), COUNT)
-    r = 1 / burst
-    memory = 1 - r - r * probability / (1 - probability)
-    spread = probability * (1 - probability) * (1 + memory) / (1 - memory)
-    assert abs(lost.mean() - probability) <= stats.norm.ppf(0.9995) * math.sqrt(spread / COUNT)
-    lengths = runs(lost)
-    assert (
-        abs(lengths.mean() - burst)
-        <= stats.norm.ppf(0.9995) * math.sqrt(1 - r) * burst / math.sqrt(len(lengths)) + 1e-9
-    )
-
-
-def test_first_tag_spared() -> None:
-    for aspect in (GilbertElliott(p=1, r=0, spare_first=True), PacketLoss(probability=1, spare_first=True)):
-        assert Bench(aspect).play(range(5)).tokens == [0]
-    assert Bench(MeasurementFailure(probability=0.5, burst=1e9, spare_first=True), seed=3).play(range(5)).tokens[0] == 0
-
-
-# -- delay, order, copies --------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("distribution", "law"),
-    [
-        ("uniform", stats.uniform(3, 4)),
-        ("normal", stats.norm(5, 2)),
-        ("exponential", stats.expon(5, 2)),
-    ],
-)
-def test_latency_follows_its_law(distribution: str, law: Any) -> None:
-    aspect = Latency(delay="5 ms", jitter="2 ms", distribution=distribution, reordering=True)
-    bench = Bench(aspect).play(range(5000), period=0.5)
-    delays = np.array([time - 0.5 * token for time, token in bench.passed])
-    if distribution == "normal":
-        assert (delays >= 0).all()  # cut off there
-        delays = delays[delays > 1e-3]
-    assert stats.kstest(delays, law.cdf).pvalue > 1 - SURE
-    assert bench.tokens != sorted(bench.tokens)
-    assert len(bench.told) == sum(time != 0.5 * token for time, token in bench.passed)
-    assert {act for act, _ in bench.told} == {"delayed"}
-    arrivals = {token: time for time, token in bench.passed}
-    for _, (token, delay) in bench.told[:50]:
-        assert delay == pytest.approx((arrivals[token] - 0.5 * token) * 1e-3, abs=1e-9)
-
-
-def test_latency_in_order() -> None:
-    bench = Bench(Latency(delay="5 ms", jitter="20 ms", distribution="exponential")).play(range(500))
-    assert bench.tokens == list(range(500))
-    free = Bench(Latency(delay="5 ms", jitter="20 ms", distribution="exponential", reordering=True)).play(range(500))
-    own = {token: time for time, token in free.passed}
-    latest = 0.0
-    for time, token in bench.passed:  # each at its own time, or together with the one before it
-        latest = max(latest, own[token])
-        assert time == pytest.approx(latest, abs=1e-5)
-
-
-def test_constant_latency() -> None:
-    assert Bench(Latency(delay="5 ms")).play("ab").passed == [(5.0, "a"), (6.0, "b")]
-
-
-def test_duplicates() -> None:
-    bench = Bench(Duplicate(probability=0.3, copies=2, spacing="0.25 ms")).play(range(COUNT // 10))
-    counts = np.bincount(bench.tokens)
-    assert set(counts) == {1, 3}
-    low, high = stats.binom.interval(SURE, len(counts), 0.3)
-    assert low <= (counts == 3).sum() <= high
-    twice = int(np.argmax(counts == 3))
-    assert [time - twice for time, token in bench.passed if token == twice] == pytest.approx([0, 0.25, 0.5])
-    assert bench.told[0] == ("duplicated", [twice, 2])
-
-
-def test_reordering() -> None:
-    always = Bench(Reorder(probability=0.25, overtaken_by=2)).play(range(2000))
-    places = {token: place for place, token in enumerate(always.tokens)}
-    held = [token for event, token in always.told if event == "held"]
-    low, high = stats.binom.interval(SURE, 2000, 0.25)
-    assert low <= len(held) <= high
-    for token in held:
-        if token in places:
-            assert sum(places[other] < places[token] for other in range(token + 1, 2000) if other in places) >= 2
-    free = [token for token in always.tokens if token not in set(held)]
-    assert free == sorted(free)
-    assert len(always.tokens) + len(set(held) - set(always.tokens)) == 2000
-
-
-@pytest.mark.parametrize("excess", ["drop", "delay"])
-def test_throttle(excess: str) -> None:
-    aspect = Throttle(rate=100, burst=5, excess=excess)
-    bench = Bench(aspect).play(range(1000))  # 1,000 messages a second for a second
-    times = np.array([time for time, _ in bench.passed])
-    assert (times[:5] == np.arange(5)).all()
-    for width in (100.0, 500.0):  # never more than burst + rate * time in any window
-        inside = [np.count_nonzero((times >= start) & (times < start + width)) for start in times]
-        assert max(inside) <= 5 + 0.1 * width
-    if excess == "drop":
-        assert len(bench.passed) == 5 + 99
-        assert bench.tokens == sorted(bench.tokens)
-    else:
-        assert bench.tokens == list(range(1000))
-        assert np.diff(times[5:]) == pytest.approx(10.0)
-
-
-def test_throttle_lets_what_is_on_time_pass() -> None:
-    for excess in ("drop", "delay"):
-        assert len(Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).passed) == 200
-        assert Bench(Throttle(rate=10, excess=excess)).play(range(200), period=100).told == []
-
-
-# -- errors -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("distribution", "law"),
-    [
-        ("normal", stats.norm(0, 3)),
-        ("uniform", stats.uniform(-3 * 3**0.5, 6 * 3**0.5)),
-        ("laplace", stats.laplace(0, 3 / 2**0.5)),
-    ],
-)
-def test_noise(distribution: str, law: Any) -> None:
-    bench = Bench(Noise(deviation=3, distribution=distribution)).play([float(i) for i in range(5000)])
-    errors = np.array(bench.tokens) - np.arange(5000)
-    assert stats.kstest(errors, law.cdf).pvalue > 1 - SURE
-    assert law.std() == pytest.approx(3)
-    assert abs(np.corrcoef(errors[1:], errors[:-1])[0, 1]) < stats.norm.ppf(0.9995) / math.sqrt(5000)
-
-
-def test_outliers() -> None:
-    bench = Bench(Outlier(probability=0.1, deviation=50)).play([np.zeros(2)] * 5000)
-    errors = np.array(bench.tokens)
-    low, high = stats.binom.interval(SURE, 10_000, 0.1)
-    assert low <= (errors != 0).sum() <= high
-    assert stats.kstest(errors[errors != 0], stats.norm(0, 50).cdf).pvalue > 1 - SURE
-
-
-def test_drift() -> None:
-    steady = Bench(Drift(rate=2.0)).play([1.0] * 1001)
-    assert steady.tokens == pytest.approx(1 + 2e-3 * np.arange(1001))
-    ends = [Bench(Drift(walk=2.0), seed).play([0.0] * 51, period=20).tokens[-1] for seed in range(400)]
-    assert stats.kstest(ends, stats.norm(0, 2).cdf).pvalue > 1 - SURE  # W(1 s) has variance 1
-    both = Bench(Drift(walk=1.0)).play([Reading("a", [0.0, 0.0])] * 10)
-    first, second = np.array([token.value for token in both.tokens]).T
-    assert not np.allclose(first[1:], second[1:])
-
-
-def test_quantise_saturate_bias() -> None:
-    assert Bench(Quantise(step=0.5)).play([0.2, 0.3, 0.75, -1.1]).tokens == [0.0, 0.5, 1.0, -1.0]
-    assert Bench(Saturate(low=-1, high=2)).play([-3.0, 0.5, 7]).tokens == [-1.0, 0.5, 2]
-    assert Bench(Bias(by=0.5)).play([1.0, Reading("a", 2.0)], period=1).tokens == [1.5, Reading("a", 2.5)]
-
-
-def test_stuck() -> None:
-    bench = Bench(StuckAt(p=0.05, r=0.2)).play(range(COUNT))
-    values = np.array(bench.tokens)
-    stuck = values != np.arange(COUNT)
-    starts = np.flatnonzero(~stuck[:-1] & stuck[1:])
-    assert all((values[start + 1] == start) for start in starts)
-    assert not stuck[0]
-    lengths = runs(stuck)
-    assert abs(lengths.mean() - 5) <= stats.norm.ppf(0.9995) * math.sqrt(0.8) / 0.2 / math.sqrt(len(lengths))
-    low, high = stats.binom.interval(SURE, int((~stuck).sum()), 0.05)
-    assert low <= len(starts) <= high
-    assert Bench(StuckAt(p=1)).play(range(4)).tokens == [0, 0, 0, 0]
 
 
 def test_when_a_token_is_of_is_no_number_to_be_altered() -> None:
@@ -275,41 +41,6 @@ def test_when_a_token_is_of_is_no_number_to_be_altered() -> None:
         {"time": 1.0, "x": 1.0},
         {"time": 0.0, "x": 1.0},
     ]
-
-
-@pytest.mark.parametrize("kind", ["gaussian", "bit_flip"])
-def test_corruption(kind: str) -> None:
-    sent = [Reading(str(i), np.array([float(i), 2.0])) for i in range(4000)]
-    bench = Bench(Corrupt(probability=0.2, kind=kind, deviation=3, fields=["value"])).play(sent)
-    old = np.array([reading.value for reading in sent])
-    new = np.array([reading.value for reading in bench.tokens])
-    hit = (new.view(np.uint64) != old.view(np.uint64)).any(axis=1)
-    low, high = stats.binom.interval(SURE, 4000, 0.2)
-    assert low <= hit.sum() <= high
-    assert [reading.name for reading in bench.tokens] == [reading.name for reading in sent]
-    if kind == "gaussian":
-        assert stats.kstest((new - old)[hit].ravel(), stats.norm(0, 3).cdf).pvalue > 1 - SURE
-    else:
-        flipped = old[hit].view(np.uint64) ^ new[hit].view(np.uint64)
-        which = np.log2(flipped.astype(float)).ravel()
-        assert (which == which.round()).all()
-        assert stats.chisquare(np.bincount(which.astype(int), minlength=64)).pvalue > 1 - SURE
-
-
-def test_each_field_drifts_by_itself() -> None:
-    ends = np.array(
-        [
-            list(Bench(Drift(walk=1.0), seed).play([{"x": 0.0, "y": 0.0}] * 3, period=500).tokens[-1].values())
-            for seed in range(400)
-        ]
-    )
-    low, high = stats.chi2.interval(SURE, 400)
-    for variance in ends.var(axis=0):
-        assert low <= 400 * variance <= high
-    assert abs(np.corrcoef(ends.T)[0, 1]) < 4 / math.sqrt(400)
-
-
-# -- what all have in common -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("aspect", at_ports(AT_ZERO), ids=repr)

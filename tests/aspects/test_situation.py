@@ -270,7 +270,7 @@ def test_in_a_model(aspect: str, expected: tuple[int, ...]) -> None:
         ),
         (
             "loss: {type: RangeLoss, positions: 'robot[*].place', range: 0 m, at: '*.hear'}",
-            "aspect loss.range: 0 is out of bounds, expected a number in m >= 1e-09",
+            "aspect loss.range: 0 is out of bounds, expected a number in m > 0",
         ),
         (
             "loss: {type: RangeLoss, positions: 'robot[*].place', range: 3, sender: sender, at: '*.hear'}",

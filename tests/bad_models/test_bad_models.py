@@ -20,10 +20,11 @@ from pathlib import Path
 import pytest
 
 from epicycle.aspects import MeasurementFailure, PacketLoss
+from epicycle.runner.catalogue import Catalogue
 from epicycle.runner.cli import main
-from epicycle.runner.model import ModelError, load_model
 from epicycle.runner.model import load as load_module
-from epicycle.runner.model.catalogue import Catalogue
+from epicycle.runner.model import load_model
+from epicycle.runner.text import ModelError
 from tests import cases
 from tests.cases import Case
 from tests.model.model_parts import TYPES

@@ -17,10 +17,11 @@ from typing import Any
 import pytest
 
 from epicycle.aspects import FiringRequest, Request
+from epicycle.runner.catalogue import built_in
 from epicycle.runner.engine import Simulation
-from epicycle.runner.model import Model, ModelError, load_model
-from epicycle.runner.model.catalogue import built_in
+from epicycle.runner.model import Model, load_model
 from epicycle.runner.model.schedule import dependencies, depths
+from epicycle.runner.text import ModelError
 from tests.conformance.conformance_parts import TYPES, TestActorPortDepth
 
 HERE = Path(__file__).parent

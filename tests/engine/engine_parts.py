@@ -162,10 +162,10 @@ def load(text: str, **options: Any) -> Model:
         return load_model(path, types=[*TYPES, *options.pop("types", ())], **options)
 
 
-def simulate(text: str, until: float | None = None, seed: int = 0, **options: Any) -> tuple[Model, Results]:
+def simulate(text: str, until: float | None = None, seed: int = 0, **options: Any) -> tuple[Simulation, Results]:
     """Load and run."""
-    model = load(text, **options)
-    return model, Simulation(model, seed=seed, keep_log=True).run(until=until)
+    simulation = Simulation(load(text, **options), seed=seed, keep_log=True)
+    return simulation, simulation.run(until=until)
 
 
 def sends(results: Results, actor: str = "") -> list[tuple[float, int, str, Any]]:
@@ -177,8 +177,8 @@ def sends(results: Results, actor: str = "") -> list[tuple[float, int, str, Any]
     ]
 
 
-def seen(model: Model, path: str = "probe") -> list[tuple[float, int, tuple[Any, ...]]]:
+def seen(simulation: Simulation, path: str = "probe") -> list[tuple[float, int, tuple[Any, ...]]]:
     """What a probe wrote down."""
-    probe = model.graph.actors[path]
+    probe = simulation[path]
     assert isinstance(probe, Probe)
     return probe.seen

@@ -9,7 +9,8 @@ import pytest
 
 from epicycle.actors import Actor
 from epicycle.runner.engine import ActorError, LoopError, Simulation
-from epicycle.runner.model import RAISE_IT, load_model
+from epicycle.runner.model import load_model
+from epicycle.runner.text import RAISE_IT
 from tests.engine.engine_parts import load
 
 

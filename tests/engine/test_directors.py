@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process, Tag
-from epicycle.aspects import Aspect, JoinPoint
+from epicycle.aspects import JoinPoint, PortAspect
 from epicycle.runner.engine import ActorError
-from epicycle.runner.model import Clock, ModelError
+from epicycle.runner.model import Clock
+from epicycle.runner.text import ModelError
 from tests.engine.engine_parts import Plan, load, seen, sends, simulate
 
 
@@ -69,7 +70,7 @@ class Nap(Process):
             self.output.send((self.environment.now, self.tag.time))
 
 
-class FixedWait(Aspect):
+class FixedWait(PortAspect):
     """Holds every token back for a time."""
 
     seconds = Parameter(float, 1.0, unit="s")
@@ -78,7 +79,7 @@ class FixedWait(Aspect):
         point.forward(token, self.seconds)
 
 
-class Twofold(Aspect):
+class Twofold(PortAspect):
     """Lets every token through twice at once."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
@@ -107,9 +108,9 @@ connections: [source.out -> twice.in, source.out -> middle.input, twice.out -> p
 
 def test_one_token_of_each_channel_passes_a_border_at_a_tag() -> None:
     """As Ptolemy's transferInputsandOutputs: what is left follows at the next microsteps."""
-    model, results = simulate(REPEATS, types=TYPES)
-    assert seen(model, "middle") == [(0.0, 1, (0,)), (0.0, 2, (0,))]
-    assert seen(model) == [(0.0, microstep, (0,)) for microstep in (1, 2, 3, 4)]
+    simulation, results = simulate(REPEATS, types=TYPES)
+    assert seen(simulation, "middle") == [(0.0, 1, (0,)), (0.0, 2, (0,))]
+    assert seen(simulation) == [(0.0, microstep, (0,)) for microstep in (1, 2, 3, 4)]
     assert [row[1:3] for row in sends(results)] == [
         (1, "source.t.output"),
         *[(1, "source.twice.output")] * 2,
@@ -120,7 +121,7 @@ def test_one_token_of_each_channel_passes_a_border_at_a_tag() -> None:
 
 def test_aspects_at_a_port_of_a_composite_stand_outside_of_its_border() -> None:
     """What one doubles at an input passes the border one by one; at an output, it has passed it already."""
-    model, _ = simulate(
+    simulation, _ = simulate(
         """
 composites:
   C:
@@ -136,13 +137,13 @@ aspects: {first: {type: Twofold, at: c.in}, second: {type: Twofold, at: d.out}}
 """,
         types=[*TYPES, Twofold],
     )
-    assert seen(model, "c.inner") == [(0.0, 1, (0,)), (0.0, 2, (0,))]
-    assert seen(model, "d.inner") == [(0.0, 1, (0,))]
-    assert seen(model, "other") == [(0.0, 1, (0.0, 0.0))]
+    assert seen(simulation, "c.inner") == [(0.0, 1, (0,)), (0.0, 2, (0,))]
+    assert seen(simulation, "d.inner") == [(0.0, 1, (0,))]
+    assert seen(simulation, "other") == [(0.0, 1, (0.0, 0.0))]
 
 
 def test_channels_pass_a_border_side_by_side() -> None:
-    model, _ = simulate(
+    simulation, _ = simulate(
         """
 composites:
   C:
@@ -161,7 +162,7 @@ connections: [a.output -> c.in, b.output -> twice.input, twice.output -> c.in, c
     # The second token of b, which a border holds back, comes at microstep 2; the channels keep their numbers inside.
     joined = [(0.0, 1, "[[0], [0]]"), (0.0, 2, "[[], [0]]"), (1.0, 1, "[[1], []]")]
     for channel, probe in enumerate(("one", "two")):
-        assert seen(model, probe) == [(t, m, (f"{text}/{channel}",)) for t, m, text in joined]
+        assert seen(simulation, probe) == [(t, m, (f"{text}/{channel}",)) for t, m, text in joined]
 
 
 PLANT = """
@@ -234,17 +235,18 @@ TICKS = """
 
 def test_local_time_starts_where_it_is_told_to() -> None:
     """As Ptolemy's DEinDEwithStartTimes; the log keeps the time of the model."""
-    model, results = local(TICKS, "start: 2", until=2)
+    simulation, results = local(TICKS, "start: 2", until=2)
     assert sends(results, "c.time") == [(t, 1, "c.time.output", (t + 2, 1)) for t in (0.0, 1.0, 2.0)]
-    assert seen(model) == [(t, 1, ((t + 2, 1),)) for t in (0.0, 1.0, 2.0)]
-    assert model.local_tag("c.time", Tag(10**9, 5)) == Tag(3 * 10**9, 5)
-    assert model.local_tag("c", Tag(10**9, 5)) == model.local_tag("probe", Tag(10**9, 5)) == Tag(10**9, 5)
+    assert seen(simulation) == [(t, 1, ((t + 2, 1),)) for t in (0.0, 1.0, 2.0)]
+    local_tag = simulation.model.local_tag
+    assert local_tag("c.time", Tag(10**9, 5)) == Tag(3 * 10**9, 5)
+    assert local_tag("c", Tag(10**9, 5)) == local_tag("probe", Tag(10**9, 5)) == Tag(10**9, 5)
 
 
 def test_local_time_drifts() -> None:
-    model, _ = local(TICKS, "drift: 1.25, start: -1", until=2)
-    assert [row[0] for row in seen(model)] == [0.0, 0.8, 1.6]
-    assert [row[2][0] for row in seen(model)] == [(-1.0, 1), (0.0, 1), (1.0, 1)]
+    simulation, _ = local(TICKS, "drift: 1.25, start: -1", until=2)
+    assert [row[0] for row in seen(simulation)] == [0.0, 0.8, 1.6]
+    assert [row[2][0] for row in seen(simulation)] == [(-1.0, 1), (0.0, 1), (1.0, 1)]
 
 
 def test_delays_aspects_and_simpy_inside_go_by_local_time() -> None:
@@ -257,9 +259,9 @@ def test_delays_aspects_and_simpy_inside_go_by_local_time() -> None:
       - join.output -> out
     aspects: {wait: {type: FixedWait, at: late.output, seconds: 1}}
 """
-    model, _ = local(inside, "drift: 2, start: 10", until=1.75)
+    simulation, _ = local(inside, "drift: 2, start: 10", until=1.75)
     nap = [(t / 2, ((t + 10) * 10**9, (t + 10) * 10**9)) for t in (1, 2, 3)]
-    joined = [(time, delayed, napped) for time, _, ([delayed, napped],) in seen(model)]
+    joined = [(time, delayed, napped) for time, _, ([delayed, napped],) in seen(simulation)]
     assert [(time, token) for time, _, tokens in joined for token in tokens] == nap
     # Sent at 0 s and 1 s, local 10 s and 12 s; half a second on the way and one more by the aspect, both local.
     assert [(time, token) for time, tokens, _ in joined for token in tokens] == [(0.75, (11.5, 1)), (1.75, (13.5, 1))]
@@ -276,8 +278,8 @@ def test_clocks_within_clocks() -> None:
     actors: {tick: {type: Ticker}, time: {type: Time}}
     connections: [tick.output -> time.input, time.output -> out]
 """
-    model, _ = local(inside, "drift: 4, start: 3", until=1)
-    assert [(row[0], row[2][0]) for row in seen(model)] == [(0.0, (3.0, 1)), (0.5, (4.0, 1)), (1.0, (5.0, 1))]
+    simulation, _ = local(inside, "drift: 4, start: 3", until=1)
+    assert [(row[0], row[2][0]) for row in seen(simulation)] == [(0.0, (3.0, 1)), (0.5, (4.0, 1)), (1.0, (5.0, 1))]
 
 
 def test_wakes_for_now_and_the_past_come_at_the_next_microstep(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -357,8 +359,8 @@ def test_a_composite_cannot_feed_itself_within_the_tag() -> None:
         "   help: give one of these connections a delay, best the one that leads back: "
         "{from: c1.tick, to: c1.port, delay: ...}"
     )
-    model, _ = simulate(LOOP.replace("    director: {}\n", ""), until=1, types=TYPES)  # transparent, it can
-    assert seen(model) == [(0.0, 1, (0,)), (1.0, 1, (1,))]
+    simulation, _ = simulate(LOOP.replace("    director: {}\n", ""), until=1, types=TYPES)  # transparent, it can
+    assert seen(simulation) == [(0.0, 1, (0,)), (1.0, 1, (1,))]
 
 
 def test_a_composite_that_delays_may_stand_in_a_loop() -> None:
@@ -389,9 +391,9 @@ connections: [hold.out -> more.input, more.output -> hold.in, more.output -> pro
 
 def test_processes_inside_send_at_the_first_open_microstep() -> None:
     inside = "    actors: {nap: {type: Nap}}\n    connections: [nap.output -> out]"
-    model, results = local(inside, "start: 1", until=2)
+    simulation, results = local(inside, "start: 1", until=2)
     assert [row[:2] for row in sends(results, "c.nap")] == [(1.0, 1), (2.0, 1)]
-    assert [row[:2] for row in seen(model)] == [(1.0, 1), (2.0, 1)]
+    assert [row[:2] for row in seen(simulation)] == [(1.0, 1), (2.0, 1)]
 
 
 def test_watching_a_border() -> None:

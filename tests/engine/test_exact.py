@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from epicycle.runner.engine import Results
-from epicycle.runner.engine.encoding import cell
 from epicycle.runner.engine.statistic import Quantile, Spread, TimeQuantile
-from epicycle.runner.engine.waiting import LARGE, weight
+from epicycle.runner.results.encoding import cell
+from epicycle.runner.results.waiting import LARGE, weight
 from tests.engine.engine_parts import simulate
 
 

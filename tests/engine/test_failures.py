@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from epicycle.actors import Actor, Clock, InputPort, OutputPort, Parameter, Process, Scale
-from epicycle.aspects import Aspect, ClockAspect, ExecutionAspect, Job, JoinPoint
+from epicycle.aspects import ClockAspect, ExecutionAspect, Job, JoinPoint, PortAspect
 from epicycle.aspects.execution import ActorPoint, Unit
 from epicycle.runner import Model
 from epicycle.runner.engine import ActorError, Simulation
@@ -61,7 +61,7 @@ class Worker(Process):
         yield self.wait(1)
 
 
-class Trap(Aspect):
+class Trap(PortAspect):
     """Fails at every token."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from epicycle.actors import Actor, Clock, InputPort, OutputPort, Tag
 from epicycle.runner import Model, Signal, Simulation
-from epicycle.runner.engine.interrupt import held
+from epicycle.runner.interrupt import held
 
 
 class Interrupted(Actor):

@@ -23,12 +23,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.actors import Tag
-from epicycle.runner.engine import (
-    ActorError,
+from epicycle.runner.engine import ActorError, LogFilter, Simulation
+from epicycle.runner.results import (
+    EventLog,
     LogError,
-    LogFilter,
     Record,
-    Simulation,
+    TokenError,
     canonical,
     check_log_path,
     encoding,
@@ -36,9 +36,7 @@ from epicycle.runner.engine import (
     plain,
     write_log,
 )
-from epicycle.runner.engine.encoding import TokenError
-from epicycle.runner.engine.log import EventLog
-from epicycle.runner.engine.waiting import LARGE, WaitingTokens, weight
+from epicycle.runner.results.waiting import LARGE, WaitingTokens, weight
 from tests.engine.engine_parts import Plan, load, simulate
 
 MODEL = """

@@ -20,7 +20,7 @@ def test_declaration_order_does_not_matter(order: tuple[str, ...]) -> None:
         "join": "{type: Join}",
         "probe": "{type: Probe}",
     }
-    model, results = simulate(
+    simulation, results = simulate(
         "actors:\n"
         + "".join(f"  {name}: {declared[name]}\n" for name in order)
         + "connections:\n  - join.output -> probe.input\n  - clock.output, double.output -> join.input\n"
@@ -28,12 +28,12 @@ def test_declaration_order_does_not_matter(order: tuple[str, ...]) -> None:
         until=1,
     )
     # The join of the diamond fires once a tag, with both tokens.
-    assert seen(model) == [(0.0, 1, ([[0], [0.0]],)), (1.0, 1, ([[1], [2.0]],))]
+    assert seen(simulation) == [(0.0, 1, ([[0], [0.0]],)), (1.0, 1, ([[1], [2.0]],))]
     assert results.firings == 8
 
 
 def test_delays_and_microsteps() -> None:
-    model, _ = simulate(
+    simulation, _ = simulate(
         """
 actors: {clock: {type: Ticker, limit: 1}, now: {type: Probe}, zero: {type: Probe}, some: {type: Probe}}
 connections:
@@ -42,9 +42,9 @@ connections:
   - {from: clock.output, to: some.input, delay: 250 ms}
 """
     )
-    assert seen(model, "now") == [(0.0, 1, (0,))]
-    assert seen(model, "zero") == [(0.0, 2, (0,))]
-    assert seen(model, "some") == [(0.25, 1, (0,))]
+    assert seen(simulation, "now") == [(0.0, 1, (0,))]
+    assert seen(simulation, "zero") == [(0.0, 2, (0,))]
+    assert seen(simulation, "some") == [(0.25, 1, (0,))]
 
 
 def plan(monkeypatch: pytest.MonkeyPatch, begin: Any = None, act: Any = None, until: float = 10) -> list[Tag]:
@@ -111,7 +111,7 @@ def test_a_cancelled_wake_does_not_end_the_run(monkeypatch: pytest.MonkeyPatch) 
 def test_several_tokens_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Plan, "begin", lambda actor: actor.wake_in(0))
     monkeypatch.setattr(Plan, "act", lambda actor: [actor.output.send(item) for item in "abc"])
-    model, _ = simulate(
+    simulation, _ = simulate(
         """
 actors: {a: {type: Plan}, now: {type: Probe}, later: {type: Probe}}
 connections:
@@ -119,12 +119,12 @@ connections:
   - {from: a.output, to: later.input, delay: 1 ns}
 """
     )
-    assert seen(model, "now") == [(0.0, 1, ("a", "b", "c"))]
-    assert seen(model, "later") == [(1e-9, 1, ("a", "b", "c"))]
+    assert seen(simulation, "now") == [(0.0, 1, ("a", "b", "c"))]
+    assert seen(simulation, "later") == [(1e-9, 1, ("a", "b", "c"))]
 
 
 def test_an_output_that_does_not_depend_on_the_input() -> None:
-    model, results = simulate(
+    simulation, results = simulate(
         """
 actors: {scale: {type: Scale, factor: 3}, hold: {type: Register}, probe: {type: Probe}}
 connections: [hold.output -> scale.input, scale.output -> hold.input, hold.output -> probe.input]
@@ -139,7 +139,7 @@ connections: [hold.output -> scale.input, scale.output -> hold.input, hold.outpu
     ]
     # It fires first to send, and again when its input is there: three actors, two tags, one of them twice.
     assert results.firings == 8
-    assert [row[:2] for row in seen(model)] == [(0.0, 1), (1.0, 1)]
+    assert [row[:2] for row in seen(simulation)] == [(0.0, 1), (1.0, 1)]
 
 
 def test_a_loop_through_a_zero_delay_takes_one_microstep_a_lap(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,15 +154,16 @@ def test_a_loop_through_a_zero_delay_takes_one_microstep_a_lap(monkeypatch: pyte
             actor.output.send(token)
 
     monkeypatch.setattr(type(model.graph.actors["two"]), "fire", carry_on)
+    simulation = Simulation(model)
     with pytest.raises(LoopError) as caught:
-        Simulation(model).run()
+        simulation.run()
     assert str(caught.value) == (
         "time stands still at 0 s: more than 50 microsteps; the last actors that fired: one, two, probe; "
         "give their loop a delay above zero"
     )
-    assert [row[1] for row in seen(model)] == list(range(2, 51))
-    assert isinstance(model.graph.actors["probe"], Probe)
-    assert model.graph.actors["probe"].wrapped == 1
+    assert [row[1] for row in seen(simulation)] == list(range(2, 51))
+    assert isinstance(simulation["probe"], Probe)
+    assert simulation["probe"].wrapped == 1
 
 
 def test_a_process_that_waits_for_no_time_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +195,7 @@ def test_the_stop_time_is_part_of_the_run(until: float | None, ticks: int, stopp
 
 
 def test_stop_when_finishes_the_tag() -> None:
-    model, results = simulate(
+    simulation, results = simulate(
         """
 actors: {a: {type: Ticker}, b: {type: Scale}, c: {type: Probe}, d: {type: Probe}}
 connections: [a.output -> b.input, b.output -> c.input, {from: a.output, to: d.input, delay: 0}]
@@ -202,8 +203,8 @@ run: {stop_when: a.output, stop: 9}
 """
     )
     assert (results.stopped, results.end) == ("stop_when", 1.0)
-    assert seen(model, "c") == [(0.0, 1, (0.0,)), (1.0, 1, (1.0,))]
-    assert seen(model, "d") == [(0.0, 2, (0,))]  # the next microstep is another tag
+    assert seen(simulation, "c") == [(0.0, 1, (0.0,)), (1.0, 1, (1.0,))]
+    assert seen(simulation, "d") == [(0.0, 2, (0,))]  # the next microstep is another tag
 
 
 def test_a_simulation_runs_once_and_a_model_often() -> None:

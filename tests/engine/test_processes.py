@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -182,9 +183,9 @@ def test_stop_when_from_a_process_finishes_the_tag(behave: Callable[..., Results
         self.output.send(2)
 
     monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))
-    model, results = simulate(ALONE + "run: {stop_when: a.output}\n")
+    simulation, results = simulate(ALONE + "run: {stop_when: a.output}\n")
     assert (results.stopped, results.end) == ("stop_when", 1.0)
-    assert seen(model) == [(1.0, 1, (1,))]
+    assert seen(simulation) == [(1.0, 1, (1,))]
 
 
 class FussyError(Exception):
@@ -223,14 +224,15 @@ def test_an_exception_in_a_process_names_its_actor(
         "actors:\n  t: {type: Ticker}\n  a: {type: Script}\n  probe: {type: Probe}\n"
         "connections: [t.output -> a.input]\n"
     )
+    simulation = Simulation(model)
     with pytest.raises(ActorError) as caught:
-        Simulation(model).run(until=3)
+        simulation.run(until=3)
     tag = {"start": "(0 s, 1)", "read": "(0 s, 1)", "subprocess": "(1e-09 s, 1)"}.get(resumed_by, "(1 s, 1)")
     reason = "ValueError: bad luck" if isinstance(error, ValueError) else "FussyError: 1 and 2"
     first = str(caught.value).splitlines()[0]
     assert first == f"a failed in run() at {tag}: {reason}"
     assert caught.value.where.endswith("m.yaml:4:3")
-    assert model.graph.actors["probe"].wrapped == 1  # type: ignore[attr-defined]
+    assert simulation["probe"].wrapped == 1  # type: ignore[attr-defined]
 
 
 def test_an_exception_in_a_process_of_simpys_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -280,3 +282,21 @@ def test_a_process_is_halted_in_the_step_in_which_what_it_waits_for_happens(beha
     shared: list[Any] = []
     results = behave(behaviour, "actors: {a: {type: Script}, b: {type: Script}}")
     assert [token for *_, token in sends(results)] == ["a"]
+
+
+def test_a_process_that_nobody_else_knows_goes_on_waiting_for_a_token(behave: Callable[..., Results]) -> None:
+    def behaviour(actor: Script) -> Generator[Any, Any, None]:
+        actor.environment.process(hear(actor))
+        while True:
+            yield actor.wait(0.3)
+            gc.collect()  # a process of SimPy's and the event it waits for hold each other alone
+
+    def hear(actor: Script) -> Generator[Any, Any, None]:
+        while True:
+            token = yield actor.read(actor.input)
+            actor.output.send(token)
+
+    results = behave(
+        behaviour, FED.replace("}}", "}, probe: {type: Probe}}").replace("input]", "input, a.output -> probe.input]")
+    )
+    assert len(sends(results, "a")) == len(sends(results, "t")) > 3

@@ -6,7 +6,7 @@ from collections.abc import Generator
 from typing import Any
 
 from epicycle.actors import Tag
-from epicycle.aspects import Aspect, JoinPoint
+from epicycle.aspects import JoinPoint, PortAspect
 from epicycle.runner.engine import Firing, Simulation, Tracer
 from epicycle.runner.model import load_model
 from tests.engine.engine_parts import Script, load
@@ -14,7 +14,7 @@ from tests.engine.engine_parts import Script, load
 SECOND = 10**9
 
 
-class Hold(Aspect):
+class Hold(PortAspect):
     """Keeps tokens for a quarter of a second."""
 
     events = ("held",)

@@ -37,7 +37,7 @@ class Echo(Actor):
 def test_tokens_wait_until_all_that_belongs_to_them_is_there() -> None:
     # The inputs are reached at depths 1 (early), 1 (first) and 3 (second); a token for `first` is there from the
     # beginning of the tag on, for its connection has a delay.
-    model, _ = simulate(
+    simulation, _ = simulate(
         """
 actors: {echo: {type: Echo}, clock: {type: Ticker}, a: {type: Scale}, b: {type: Scale}}
 connections:
@@ -49,7 +49,7 @@ connections:
         until=1,
         types=[Echo],
     )
-    assert model.graph.actors["echo"].firings == [  # type: ignore[attr-defined]
+    assert simulation["echo"].firings == [  # type: ignore[attr-defined]
         (0.0, True, {}),
         (0.0, False, {"early": (0,)}),
         (0.0, False, {"second": (0.0,)}),
@@ -60,7 +60,7 @@ connections:
 
 
 def test_what_an_actor_sends_itself_comes_in_a_firing_of_its_own() -> None:
-    model, results = simulate(
+    simulation, results = simulate(
         """
 actors: {echo: {type: Echo}, probe: {type: Probe}}
 connections: [echo.output -> echo.first, echo.output -> probe.input]
@@ -68,8 +68,8 @@ connections: [echo.output -> echo.first, echo.output -> probe.input]
         until=0,
         types=[Echo],
     )
-    assert model.graph.actors["echo"].firings == [(0.0, True, {}), (0.0, False, {"first": ("at 0",)})]  # type: ignore[attr-defined]
-    assert seen(model) == [(0.0, 1, ("at 0",))]
+    assert simulation["echo"].firings == [(0.0, True, {}), (0.0, False, {"first": ("at 0",)})]  # type: ignore[attr-defined]
+    assert seen(simulation) == [(0.0, 1, ("at 0",))]
     assert sends(results) == [(0.0, 1, "echo.output", "at 0")]
 
 
@@ -89,5 +89,6 @@ connections: [clock.output -> echo.second, echo.output -> probe.input, {from: cl
             patch.setattr(kind, "fire", broken)
             with pytest.raises(ActorError, match="no"):
                 Simulation(model).run(until=2)
-    Simulation(model).run(until=2)
-    assert model.graph.actors["echo"].firings == untouched.graph.actors["echo"].firings  # type: ignore[attr-defined]
+    simulation = Simulation(model)
+    simulation.run(until=2)
+    assert simulation["echo"].firings == untouched["echo"].firings  # type: ignore[attr-defined]

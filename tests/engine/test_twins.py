@@ -114,7 +114,7 @@ connections:
 def test_twins_send_the_same(seed: int, director: str) -> None:
     text = network(seed).replace("DIRECTOR", director)
     random = np.random.default_rng(seed)
-    model, reactive = simulate(text, until=6, types=TYPES)
+    simulation, reactive = simulate(text, until=6, types=TYPES)
     assert len(sends(reactive)) > 12
     for share in (1.0, 0.5):
         mixed = text
@@ -125,7 +125,7 @@ def test_twins_send_the_same(seed: int, director: str) -> None:
         other, results = simulate(mixed, until=6, types=TYPES)
         assert sends(results) == sends(reactive)
         assert results.digest == reactive.digest
-        assert seen(other) == seen(model)
+        assert seen(other) == seen(simulation)
 
 
 class Shop(Process):

@@ -12,7 +12,7 @@ from tests.engine.engine_parts import Plan, load, seen, sends, simulate
 
 
 def test_channels_are_in_the_order_of_the_connections() -> None:
-    model, _ = simulate(
+    simulation, _ = simulate(
         """
 actors:
   t: {type: Ticker, limit: 1}
@@ -31,9 +31,9 @@ connections:
   - join.output -> probe.input
 """
     )
-    assert seen(model) == [(0.0, 1, ([[0.0], [0.0], [0.0], [0.0], [0.0]],))]
-    join = model.graph.actors["join"]
-    assert [wire.source.path for wire in model.graph.wires_to(join.inputs["input"])] == [
+    assert seen(simulation) == [(0.0, 1, ([[0.0], [0.0], [0.0], [0.0], [0.0]],))]
+    join = simulation["join"]
+    assert [wire.source.path for wire in simulation.model.graph.wires_to(join.inputs["input"])] == [
         "b.output", "s[0].output", "s[1].output", "a.output", "b.output"
     ]  # fmt: skip
 
@@ -63,13 +63,13 @@ connections:
 
 
 def test_one_channel_through_composites() -> None:
-    model, results = simulate(SPREAD.format(to=-1))
-    spread = model.graph.actors["box.spread"]
+    simulation, results = simulate(SPREAD.format(to=-1))
+    spread = simulation["box.spread"]
     assert spread.outputs["output"].width == 4
-    assert seen(model, "one") == [(0.0, 1, ("0/0",))]
-    assert seen(model, "case.probe") == [(0.0, 1, ("0/1",))]
-    assert seen(model, "case.other") == [(0.0, 1, ("0/2",))]
-    assert seen(model, "two") == [(1.0, 1, ("0/3",))]
+    assert seen(simulation, "one") == [(0.0, 1, ("0/0",))]
+    assert seen(simulation, "case.probe") == [(0.0, 1, ("0/1",))]
+    assert seen(simulation, "case.other") == [(0.0, 1, ("0/2",))]
+    assert seen(simulation, "two") == [(1.0, 1, ("0/3",))]
     assert [record.channel for record in results.log.records] == [None, 0, 1, 2, 3]
 
 
@@ -84,7 +84,7 @@ def test_a_channel_that_is_not_there(to: int) -> None:
 
 
 def test_composites_three_deep_and_arrays() -> None:
-    model, results = simulate(
+    simulation, results = simulate(
         """
 composites:
   Inner:
@@ -116,7 +116,7 @@ run: {record: ["outer[*].out", "outer[0].middle.inner[2].out"]}
 metrics: {most: {of: "outer[*].out", take: max}, many: {of: "*.out", take: count}}
 """
     )
-    assert seen(model, "probe[0]") == seen(model, "probe[1]") == [
+    assert seen(simulation, "probe[0]") == seen(simulation, "probe[1]") == [
         (0.0, 1, (0.0, 0.0, 0.0)), (1.0, 1, (1.0, 2.0, 3.0))
     ]  # fmt: skip
     assert results.signals["outer[1].out"].tokens == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors import Actor, Parameter
-from epicycle.runner.model import ModelError, load_model
+from epicycle.runner.model import load_model
+from epicycle.runner.text import ModelError
 
 
 class Reader(Actor):

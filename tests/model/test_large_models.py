@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks import validation
 from epicycle.runner.model import load_model
-from epicycle.runner.model.patterns import PathIndex, matches
+from epicycle.runner.text import PathIndex, matches
 
 
 def test_two_thousand_actors_in_ten_thousand_lines(tmp_path: Path) -> None:

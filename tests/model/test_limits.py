@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from epicycle.runner.cli import main
-from epicycle.runner.model import ModelError, load_model
-from epicycle.runner.model.limits import RAISE_IT
-from epicycle.runner.model.patterns import PathIndex, compile_pattern, matches
+from epicycle.runner.model import load_model
+from epicycle.runner.text import RAISE_IT, ModelError, PathIndex, compile_pattern, matches
 
 END = "  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\nrun: {stop: 1}\n"
 HELP = f"   help: {RAISE_IT}"

@@ -39,11 +39,10 @@ COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
-    "tests/actors", "tests/api", "tests/aspects", "tests/cli/test_output.py", "tests/conformance", "tests/core",
-    "tests/engine", "tests/library",
-    "tests/model", "tests/test_models.py", "tests/test_reference.py",
+    "tests/actors", "tests/api", "tests/aspects", "tests/catalogue", "tests/cli/test_output.py", "tests/conformance",
+    "tests/engine", "tests/language", "tests/model", "tests/text", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
-TESTS_OF_KERNELS = ("tests/core", "tests/actors")
+TESTS_OF_KERNELS = ("tests/actors",)
 LONGEST = {True: 6.0, False: 4.0}  # s; a test that takes longer, compiled or not, is not asked
 STAGES = ((25, 1.5), (100, 3.0), (300, 5.0))  # so many tests, of so many seconds together; each the next ones
 

@@ -20,8 +20,8 @@ import pytest
 
 from epicycle.actors import random_stream
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.model import packaged_models
-from tests.core.test_random import CONTINUOUS, DISCRETE
+from epicycle.runner.catalogue import packaged_models
+from tests.actors.core.test_random import CONTINUOUS, DISCRETE
 from tests.test_docs import TUTORIALS, Reader, blocks
 
 DISTURBED = "collision_avoidance"
@@ -114,7 +114,7 @@ def tutorial(path: Path) -> str:
 
 def parts() -> dict[str, Callable[[], str]]:
     """What there is to compute, by name."""
-    from epicycle.runner.model.packaged import packaged_disturbances
+    from epicycle.runner.catalogue import packaged_disturbances
 
     found: dict[str, Callable[[], str]] = {"functions": functions, "functions, compiled": lambda: functions(True)}
     found["laws"] = laws

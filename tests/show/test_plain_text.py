@@ -10,12 +10,13 @@ import yaml
 
 from epicycle.actors import Clock, Parameter
 from epicycle.runner import Model, Results, Simulation
+from epicycle.runner.catalogue import Figure
 from epicycle.runner.cli import main
-from epicycle.runner.show import Figure, FigureError, draw
+from epicycle.runner.show import FigureError, draw
 from epicycle.runner.show.folder import draw_figures
 from epicycle.runner.show.graph import outline, write_graph
+from epicycle.runner.show.pen import Sheet, style
 from epicycle.runner.show.report.data import shown
-from epicycle.runner.show.report.style import Sheet, style
 
 TEXTS = ["$\\left $\\frac{a}{", "$x^" + "{" * 40, "a $b$ \x1b[31m\u202e & #1_2"]
 

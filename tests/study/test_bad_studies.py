@@ -15,13 +15,11 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from epicycle.runner import ModelError, load_model
+from epicycle.runner.catalogue import built_in, figure_types
 from epicycle.runner.cli import main
-from epicycle.runner.model import Problems
-from epicycle.runner.model.catalogue import built_in
-from epicycle.runner.model.document import parse, plain
-from epicycle.runner.model.schema import json_schema
-from epicycle.runner.show import figure_types
+from epicycle.runner.language import json_schema
 from epicycle.runner.show.report import check_figures, study_figure_types
+from epicycle.runner.text import Problems, parse, plain
 from tests import cases
 from tests.cases import Case
 from tests.study.study_parts import STUDY, plan_of, write

@@ -66,13 +66,18 @@ class Wire:
 
 @dataclass(frozen=True)
 class Pill:
-    """A badge on a line: an aspect where it stands, or the ``label`` of a connection (aspect is empty)."""
+    """A badge on a line: an aspect where it stands, or the label of a connection (aspect is empty) with its delay."""
 
     text: str
     aspect: str
     x: float
     y: float  # of its middle
-    width: float
+    delay: int | None = None  # ns
+
+    @property
+    def width(self) -> float:
+        """How wide it is."""
+        return pill_width(self.text)
 
 
 @dataclass(frozen=True)
@@ -137,8 +142,7 @@ class _Scope:
         self.inner: dict[Box, _Scope] = {}
         self.cells: dict[Box, Cell] = {}
         self.ends: dict[Pin, Port] = {}
-        self.sources: dict[str, Pin] = {}
-        self.targets: dict[str, Pin] = {}
+        self.pins: dict[str, Pin] = {}  # by the paths of their ports
         frame = [self._frame_port(port, "entry") for port in inputs]
         frame += [self._frame_port(port, "exit") for port in outputs]
         for child in box.children:
@@ -167,20 +171,19 @@ class _Scope:
 
     def _frame_port(self, port: Port, kind: str) -> Cell:
         cell = Cell(kind, width=text.width(port.name, text.PORT) + 8.0, height=ROW)
-        pin = cell.pin("right" if kind == "entry" else "left")
-        pin.offset = ROW - 3.0
-        (self.sources if kind == "entry" else self.targets)[port.path] = pin
-        self.ends[pin] = port
+        self._pin(cell, "right" if kind == "entry" else "left", port).offset = ROW - 3.0
         return cell
 
     def _add(self, child: Box) -> None:
         cell = self.cells[child] = Cell("box")
-        for port in child.inputs:
-            self.targets[port.path] = pin = cell.pin("left")
-            self.ends[pin] = port
-        for port in child.outputs:
-            self.sources[port.path] = pin = cell.pin("right")
-            self.ends[pin] = port
+        for side, ports in (("left", child.inputs), ("right", child.outputs)):
+            for port in ports:
+                self._pin(cell, side, port)
+
+    def _pin(self, cell: Cell, side: str, port: Port) -> Pin:
+        pin = self.pins[port.path] = cell.pin(side)
+        self.ends[pin] = port
+        return pin
 
     def _nets(self) -> dict[Net, list[Link]]:
         """The links that leave one port with one label are a net."""
@@ -190,7 +193,7 @@ class _Scope:
         nets = {}
         for (source, words), links in groups.items():
             size = (pill_width(words) + 8.0, PILL_HEIGHT) if words else None
-            nets[Net(self.sources[source], [self.targets[link.target] for link in links], size)] = links
+            nets[Net(self.pins[source], [self.pins[link.target] for link in links], size)] = links
         return nets
 
     def _measure(self, child: Box, cell: Cell) -> None:
@@ -201,18 +204,15 @@ class _Scope:
             )
             cell.width, cell.height = scope.width, scope.height
             for pin in (*cell.left, *cell.right):
-                path = self.ends[pin].path
-                inside = scope.sources[path] if path in scope.sources else scope.targets[path]
+                inside = scope.pins[self.ends[pin].path]
                 pin.offset = scope.top + inside.cell.y + inside.offset
             return
+        widths = []
         for pins in (cell.left, cell.right):
+            widths.append(max((text.width(self.ends[pin].name, text.PORT) for pin in pins), default=0.0))
             for row, pin in enumerate(pins):
                 pin.offset = HEADER + ROW * row + ROW / 2
         rows = max(len(cell.left), len(cell.right))
-        widths = [
-            max((text.width(self.ends[pin].name, text.PORT) for pin in pins), default=0.0)
-            for pins in (cell.left, cell.right)
-        ]
         hidden = max((pill_width(name) for name in child.aspects), default=0.0)
         names = max(text.width(child.name, text.NAME, bold=True), text.width(child.kind, text.KIND))
         names += 16.0 if child.is_closed else 0.0  # beside the sign of a closed one
@@ -225,26 +225,23 @@ class _Scope:
         """Set where each layer begins and ends, and where the tracks between them are."""
         self.begins: list[float] = []
         self.ends_at: list[float] = []
-        self.boxes_at: list[float] = []
+        self.x: dict[Cell, float] = {}
         self.trunks: dict[Run, list[Trunk]] = {}
         self.track_x: dict[Trunk, float] = {}
         x = 0.0 if self.layering.layers[0] or not self.box.path else MARGIN
         for number, cells in enumerate(self.layering.layers):
             before = max((self._margin(cell, cell.left) for cell in cells), default=0.0)
             after = max((self._margin(cell, cell.right) for cell in cells), default=0.0)
+            room = max((cell.width for cell in cells), default=0.0)
+            for cell in cells:  # boxes stand in the middle of their layer
+                self.x[cell] = x + before + (room - cell.width) // 2
             self.begins.append(x)
-            self.boxes_at.append(x + before)
-            x += before + max((cell.width for cell in cells), default=0.0) + after
+            x += before + room + after
             self.ends_at.append(x)
-            if number == len(self.layering.runs):
-                break
-            runs = self.layering.runs[number]
+            runs = self.layering.runs[number] if number < len(self.layering.runs) else []
             trunks, count = tracks(runs)
-            self.trunks.update((run, []) for run in runs)
-            for trunk in trunks:
-                for run in trunk.runs:
-                    self.trunks[run].append(trunk)
-                self.track_x[trunk] = x + PADDING + TRACK * trunk.track
+            self.trunks.update((run, [trunk for trunk in trunks if run in trunk.runs]) for run in runs)
+            self.track_x.update((trunk, x + PADDING + TRACK * trunk.track) for trunk in trunks)
             if runs:
                 x += 2 * PADDING + TRACK * max(count - 1, 0)
         self.width = x if self.layering.layers[-1] or not self.box.path else x + MARGIN
@@ -256,22 +253,13 @@ class _Scope:
         arrow = HEAD if pins is cell.left else 4.0
         return max((_pills_width(self.ends[pin]) + arrow for pin in pins), default=0.0)
 
-    def _x(self, cell: Cell) -> float:
-        """Where a box begins: boxes stand in the middle of their layer."""
-        number = cell.layer
-        room = max(other.width for other in self.layering.layers[number])
-        return self.boxes_at[number] + (room - cell.width) // 2
-
     def _pin_x(self, pin: Pin) -> float:
-        cell = pin.cell
-        is_left = pin in cell.left
+        cell, is_left = pin.cell, pin in pin.cell.left
         if cell.kind == "pass":
             return self.begins[cell.layer] if is_left else self.ends_at[cell.layer]
-        if cell.kind == "entry":
-            return 0.0
-        if cell.kind == "exit":
-            return self.width
-        return self._x(cell) if is_left else self._x(cell) + cell.width
+        if cell.kind == "box":
+            return self.x[cell] if is_left else self.x[cell] + cell.width
+        return 0.0 if cell.kind == "entry" else self.width
 
     # -- drawing --------------------------------------------------------------------------------------------------
 
@@ -281,7 +269,7 @@ class _Scope:
         linked = [*self.box.links, *(link for child in self.inner for link in child.links)]
         joined = {end for link in linked for end in (link.source, link.target)}
         for child, cell in self.cells.items():
-            left, upper = x + self._x(cell), top + cell.y
+            left, upper = x + self.x[cell], top + cell.y
             ports = []
             for side, pins in (("left", cell.left), ("right", cell.right)):
                 for pin in pins:
@@ -290,14 +278,13 @@ class _Scope:
                     ports.append(PlacedPort(port, side, edge, at, port.path in joined))
                     start = edge - HEAD - _pills_width(port) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
                     for aspect in port.aspects:
-                        drawing.pills.append(Pill(aspect, aspect, start, at, pill_width(aspect)))
+                        drawing.pills.append(Pill(aspect, aspect, start, at))
                         start += pill_width(aspect) + PILL_GAP
                     drawing.words.append(_port_name(ports[-1], child.is_open))
             drawing.words += self._names(child, left, upper, cell.width)
             hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
             for name in reversed(child.aspects):
-                wide = pill_width(name)
-                drawing.pills.append(Pill(name, name, left + (cell.width - wide) / 2, hidden, wide))
+                drawing.pills.append(Pill(name, name, left + (cell.width - pill_width(name)) / 2, hidden))
                 hidden -= PILL_HEIGHT + PILL_GAP
             drawing.boxes.append(PlacedBox(child, left, upper, cell.width, cell.height, level, tuple(ports)))
             if child in self.inner:
@@ -308,7 +295,8 @@ class _Scope:
                 cell, words = net.labelled, label(links[0])
                 forward = cell.layer > net.source.cell.layer
                 start = self.begins[cell.layer] + 4.0 if forward else self.ends_at[cell.layer] - cell.width + 4.0
-                drawing.pills.append(Pill(words, "", x + start, top + cell.y + cell.height / 2, pill_width(words)))
+                at = top + cell.y + cell.height / 2
+                drawing.pills.append(Pill(words, "", x + start, at, links[0].delay))
 
     def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
         """The name and type of a box: in one line above the inside of a composite, else one below the other."""

@@ -7,15 +7,14 @@ becomes a closed box.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 
-from ...model import Model, WovenAspect
-from ...model.clock import Clock
-from ...model.graph import Hop
+from ...model import Clock, Hop, Model, WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded if nothing else is asked for
 
@@ -155,7 +154,7 @@ class _Outliner:
         arrays: dict[str, list[str]] = {}
         for path in self.ports:
             if match := _INDEXED.match(path):
-                arrays.setdefault(match.group(1), []).append(path)
+                arrays.setdefault(match[1], []).append(path)
         return {array: paths for array, paths in arrays.items() if len(paths) > 1}
 
     def _find_alike(self) -> None:
@@ -171,29 +170,30 @@ class _Outliner:
                 return
             self.alike -= unlike
 
+    def _folded(self, path: str) -> str | None:
+        """The array, drawn as one box, of which this is an instance."""
+        match = _INDEXED.match(path)
+        return match[1] if match is not None and match[1] in self.alike else None
+
     def _look(self, instance: str) -> frozenset[object]:
         """What there is to see of an instance, its index left out: inside, aspects, and where it is connected to."""
-        match = _INDEXED.match(instance)
-        assert match is not None
-        index = match.group(2)
+        index = instance.rpartition("[")[2]
 
         def inside(path: str) -> str:
             """A path within the instance, indices of arrays that are one box left out."""
             parts, whole = [], instance
             for part in path[len(instance) :].split("."):
                 whole = f"{whole}.{part}" if part else whole
-                indexed = _INDEXED.match(whole)
-                folded = indexed is not None and indexed.group(1) in self.alike
-                parts.append(part.partition("[")[0] + "[*]" if folded else part)
+                parts.append(part if self._folded(whole) is None else part.partition("[")[0] + "[*]")
             return ".".join(parts)
 
         def beside(path: str) -> str:
             """A port next to the instance: in arrays that are one box, only "the same index" or another counts."""
             owner, _, port = path.rpartition(".")
-            indexed = _INDEXED.match(owner)
-            if owner == _owner(instance) or indexed is None or indexed.group(1) not in self.alike:
+            array = self._folded(owner)
+            if array is None or owner == _owner(instance):
                 return path
-            return f"{indexed.group(1)}[{'=' if indexed.group(2) == index else '#'}].{port}"
+            return f"{array}[{'=' if owner.rpartition('[')[2] == index else '#'}].{port}"
 
         seen: set[object] = set()
         waiting = [instance]
@@ -226,11 +226,9 @@ class _Outliner:
     def _drawn(self, path: str) -> Iterator[tuple[str, int]]:
         """The boxes directly inside a composite, and how many instances each stands for."""
         for child in self.children[path]:
-            match = _INDEXED.match(child)
-            if match is None or match.group(1) not in self.alike:
-                yield child, 1
-            elif child == self.arrays[match.group(1)][0]:
-                yield child, len(self.arrays[match.group(1)])
+            instances = self._instances(child)
+            if child == instances[0]:
+                yield child, len(instances)
 
     def _levels(self, path: str) -> int:
         """How deep composites are nested in a composite."""
@@ -239,16 +237,12 @@ class _Outliner:
 
     def _size(self, path: str, depth: int) -> int:
         """How many boxes a drawing to this depth has."""
-        size = 0
-        for child, _ in self._drawn(path):
-            size += 1 + (self._size(child, depth - 1) if depth > 0 else 0)
-        return size
+        return sum(1 + (self._size(child, depth - 1) if depth > 0 else 0) for child, _ in self._drawn(path))
 
     def _box(self, path: str, depth: int, count: int = 1) -> Box:
         name = path.rpartition(".")[2]
-        match = _INDEXED.match(name)
-        if count > 1 and match is not None:
-            name = f"{match.group(1)}[0..{count - 1}]"
+        if count > 1:
+            name = f"{name.partition('[')[0]}[0..{count - 1}]"
         box = Box(path, name, self._kind(path), count=count, is_composite=path not in self.graph.actors)
         if path in self.graph.clocks:
             box.has_director = bool(path)
@@ -261,30 +255,27 @@ class _Outliner:
             aspects = tuple(short_name(name) for name in self.standing.get(port_path, ()))
             ports = box.inputs if self.graph.direction(port_path) == "input" else box.outputs
             ports.append(Port(port_path, port_path.rpartition(".")[2], is_multi, aspects))
-        if path and box.is_composite and depth == 0:
+        if not box.is_composite:
+            box.aspects = tuple(map(short_name, self.standing.get(path, ())))
+        elif path and depth == 0:
             box.is_closed = True
-            within = [
-                woven for woven in self.model.aspects if any(_is_within(each, path) for each in _disturbed(woven))
-            ]
-            box.aspects = tuple(dict.fromkeys(short_name(woven.name) for woven in within))
-        elif box.is_composite:
+            within = (each for each in self.model.aspects if any(_is_within(at, path) for at in _disturbed(each)))
+            box.aspects = tuple(dict.fromkeys(short_name(each.name) for each in within))
+        else:
             box.children = [self._box(child, depth - 1 if path else depth, n) for child, n in self._drawn(path)]
             box.links = self._links(path)
-        else:
-            box.aspects = tuple(map(short_name, self.standing.get(path, ())))
         return box
 
     def _links(self, path: str) -> list[Link]:
         """The connections inside a composite; those of instances that are one box are one link."""
-        counts: dict[tuple[str, str, int | None], int] = {}
-        for hop in self.hops.get(path, ()):
-            key = (self._shown(hop.source), self._shown(hop.destination), hop.delay)
-            counts[key] = counts.get(key, 0) + 1
+        counts = Counter(
+            (self._shown(hop.source), self._shown(hop.destination), hop.delay) for hop in self.hops.get(path, ())
+        )
         return [Link(*key, self._how_many(path, *key[:2], count)) for key, count in counts.items()]
 
     def _how_many(self, path: str, source: str, target: str, count: int) -> str:
         """What to say of the number of connections that one link inside a composite stands for."""
-        one, other = [1 if _owner(port) == path else self._instances(port) for port in (source, target)]
+        one, other = [1 if _owner(port) == path else len(self._instances(_owner(port))) for port in (source, target)]
         if count == max(one, other):
             return ""
         if min(one, other) > 1 and count == one * other:
@@ -293,18 +284,15 @@ class _Outliner:
             return "each to all others"
         return f"×{count}"
 
-    def _instances(self, port: str) -> int:
-        """How many instances the box of a port stands for."""
-        match = _INDEXED.match(_owner(port))
-        return len(self.arrays[match.group(1)]) if match is not None and match.group(1) in self.alike else 1
+    def _instances(self, path: str) -> list[str]:
+        """The instances for which the box of an actor or composite stands."""
+        array = self._folded(path)
+        return [path] if array is None else self.arrays[array]
 
     def _shown(self, port: str) -> str:
         """The port that is drawn for a port."""
         owner, _, name = port.rpartition(".")
-        match = _INDEXED.match(owner)
-        if match is not None and match.group(1) in self.alike:
-            owner = self.arrays[match.group(1)][0]
-        return f"{owner}.{name}"
+        return f"{self._instances(owner)[0]}.{name}"
 
 
 def duration(nanoseconds: int) -> str:

@@ -7,7 +7,6 @@ Colours are Okabe and Ito's, which people with any colour vision can tell apart;
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +15,10 @@ from typing import Any
 import networkx as nx
 
 from ...model import extent
-from ..canvas import PLAIN, open_matplotlib
+from ..pen import new_canvas, save, style
 from . import text
 from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width
-from .outline import short_name
+from .outline import duration, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
 FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")
@@ -27,37 +26,19 @@ ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0
 DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
 # Of a PNG: whole pixels for a point, so that lines are sharp; how many pixels there may be, and on one side.
 DPI, PIXELS, SIDE = (288, 144, 72), 4e7, 30000
-# What matplotlib would write into a file of its own accord: names, versions, times.
-METADATA = {
-    "svg": ("Creator", "Date", "Format", "Type"),
-    "png": ("Software",),
-    "pdf": ("Creator", "Producer", "CreationDate"),
-}
 
 
 def write_picture(drawing: Drawing, path: Path) -> None:
     """Draw into a file, whose ending decides the format; the same drawing gives the same bytes."""
-    open_matplotlib()
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     legend = _legend(drawing)
     width = max([drawing.width, *(row.width + 2 * MARGIN for row in legend)])
     height = drawing.height + sum(row.height for row in legend) + (MARGIN if legend else 0.0)
-    kind = path.suffix.lower()[1:]
-    with mpl.rc_context(), warnings.catch_warnings():
-        mpl.rcdefaults()  # whatever the user's own style is
-        mpl.rcParams.update({"svg.hashsalt": "epicycle", "svg.fonttype": "path", "path.simplify": False, **PLAIN})
-        warnings.filterwarnings("ignore", message="Glyph")  # a box stands for what the font lacks
-        figure = Figure(figsize=(width / 72, height / 72))
-        FigureCanvasAgg(figure)
-        sheet = figure.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
+    with style({"path.simplify": False}):
+        canvas = new_canvas(width / 72, height / 72)
+        sheet = canvas.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
         sheet.set_axis_off()
         _Painter(sheet, drawing, legend).paint()
-        figure.savefig(
-            path, format=kind, dpi=_resolution(width, height), facecolor="white", metadata=dict.fromkeys(METADATA[kind])
-        )
+        save(canvas, path, dpi=_resolution(width, height), facecolor="white")
 
 
 def _resolution(width: float, height: float) -> float:
@@ -95,24 +76,21 @@ def _legend(drawing: Drawing) -> list[Row]:
         woven = [each for each in drawing.outline.model.aspects if short_name(each.name) == name]
         kinds = ", ".join(dict.fromkeys(each.kind for each in woven))
         rows.append(Row("aspect", name, f"aspect {kinds}, at {extent(woven)}"))
-    if labels := [pill.text for pill in drawing.pills if not pill.aspect]:
-        delayed = [words for words in labels if words[0].isdigit()]
-        if delayed:
-            rows.append(Row("label", delayed[0].partition(",")[0], "delay of a connection"))
-    if any(port.port.is_multi for placed in drawing.boxes for port in placed.ports):
-        rows.append(Row("port", "", "port for any number of connections"))
-    if any(box.count > 1 for box in boxes):
-        rows.append(Row("stack", "", "instances that are alike"))
-    if any(box.has_director for box in boxes):
-        rows.append(Row("director", "", "composite with a director of its own"))
-    if any(box.is_closed for box in boxes):
-        rows.append(Row("closed", "", "composite whose inside is not shown"))
-    return rows
+    delay = next((pill.delay for pill in drawing.pills if pill.delay is not None), None)
+    if delay is not None:
+        rows.append(Row("label", duration(delay), "delay of a connection"))
+    signs = {
+        "port": ("port for any number of connections", any(p.is_multi for b in boxes for p in (*b.inputs, *b.outputs))),
+        "stack": ("instances that are alike", any(box.count > 1 for box in boxes)),
+        "director": ("composite with a director of its own", any(box.has_director for box in boxes)),
+        "closed": ("composite whose inside is not shown", any(box.is_closed for box in boxes)),
+    }
+    return rows + [Row(sample, "", explanation) for sample, (explanation, is_seen) in signs.items() if is_seen]
 
 
 def _aspects(drawing: Drawing) -> list[str]:
     """The aspects that are seen, in the order of their declaration."""
-    seen = {pill.aspect for pill in drawing.pills} | {name for placed in drawing.boxes for name in placed.box.aspects}
+    seen = {pill.aspect for pill in drawing.pills}
     names = dict.fromkeys(short_name(woven.name) for woven in drawing.outline.model.aspects)
     return [name for name in names if name in seen]
 
@@ -121,7 +99,10 @@ class _Painter:
     """Paints a drawing and its legend on matplotlib axes, what lies below first."""
 
     def __init__(self, sheet: Any, drawing: Drawing, legend: list[Row]) -> None:
+        from matplotlib import patches
+
         self.sheet = sheet
+        self.shapes = patches
         self.drawing = drawing
         self.legend = legend
         self.colours = {name: ASPECTS[place % len(ASPECTS)] for place, name in enumerate(_aspects(drawing))}
@@ -149,23 +130,22 @@ class _Painter:
         """A box: white for an actor, shaded for a composite, doubled if that has a director."""
         box, x, y = placed.box, placed.x, placed.y
         fill = FRAMES[placed.level % len(FRAMES)] if box.is_composite else "white"
-        if box.count > 1:
-            for step in (2, 1):
-                inset = 4.0 * step
-                self.rectangle(x + inset, y + inset, placed.width - 2 * inset, placed.height - inset / 4, fill)
+        for inset in (8.0, 4.0) if box.count > 1 else ():
+            self.rectangle(x + inset, y + inset, placed.width - 2 * inset, placed.height - inset / 4, fill)
         self.rectangle(x, y, placed.width, placed.height, fill)
         if box.has_director:
             self.rectangle(x + 2.5, y + 2.5, placed.width - 5.0, placed.height - 5.0, fill)
         if box.is_closed:
             self.closed(x + placed.width - 10.0, y + 3.0)
 
-    def rectangle(self, x: float, y: float, width: float, height: float, fill: str) -> None:
+    def rectangle(
+        self, x: float, y: float, width: float, height: float, fill: str, radius: float = 3.0, **look: float
+    ) -> None:
         """A box with round corners."""
-        from matplotlib.patches import FancyBboxPatch
-
-        style = "round,pad=0,rounding_size=3"
+        style = f"round,pad=0,rounding_size={radius:g}"
+        look = {"linewidth": 1.0, **look}
         self.sheet.add_artist(
-            FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, linewidth=1.0)
+            self.shapes.FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, **look)
         )
 
     def closed(self, x: float, y: float) -> None:
@@ -175,34 +155,26 @@ class _Painter:
 
     def port(self, x: float, y: float, ink: str, is_multi: bool) -> None:
         """A mark on the edge, white if any number of connections may meet there."""
-        from matplotlib.patches import Rectangle
-
-        fill = "white" if is_multi else ink
-        self.sheet.add_artist(
-            Rectangle((x - 2.2, y - 2.2), 4.4, 4.4, facecolor=fill, edgecolor=ink, linewidth=0.8, zorder=3)
-        )
+        look: Any = {"facecolor": "white" if is_multi else ink, "edgecolor": ink, "linewidth": 0.8, "zorder": 3}
+        self.sheet.add_artist(self.shapes.Rectangle((x - 2.2, y - 2.2), 4.4, 4.4, **look))
 
     def wires(self) -> None:
-        """All lines, dots where one branches, and arrowheads where they end; lines that run together bend into it."""
-        from matplotlib.patches import Circle, Polygon
-
+        """All lines, dots where one branches, and arrowheads where they end."""
+        wires, look = self.drawing.wires, {"facecolor": INK, "edgecolor": "none", "zorder": 2.5}
         # Lines that share a port lie on each other in part: painted as one, they are no darker there.
         graph: Any = nx.Graph()
-        for wire in self.drawing.wires:
+        for wire in wires:
             graph.add_edges_from((wire, end) for end in (wire.source, *wire.targets))
         for together in nx.connected_components(graph):
-            self.path([line for wire in self.drawing.wires if wire in together for line in wire.lines], INK, 1.0)
-        dots = [dot for wire in self.drawing.wires for dot in wire.dots]
-        for dot in dots:
-            self.sheet.add_artist(Circle(dot, 1.8, facecolor=INK, edgecolor="none", zorder=2.5))
-        for x, y in [head for wire in self.drawing.wires for head in wire.heads]:
-            tip = x - 2.4
-            corners = [(tip, y), (tip - 6.0, y - 2.6), (tip - 6.0, y + 2.6)]
-            self.sheet.add_artist(Polygon(corners, closed=True, facecolor=INK, edgecolor="none", zorder=2.5))
+            self.path([line for wire in wires if wire in together for line in wire.lines], INK, 1.0)
+        for dot in (dot for wire in wires for dot in wire.dots):
+            self.sheet.add_artist(self.shapes.Circle(dot, 1.8, **look))
+        for x, y in (head for wire in wires for head in wire.heads):
+            corners = [(x - 2.4, y), (x - 8.4, y - 2.6), (x - 8.4, y + 2.6)]
+            self.sheet.add_artist(self.shapes.Polygon(corners, closed=True, **look))
 
     def path(self, lines: Iterable[Line], colour: str, width: float, radius: float = 4.0) -> None:
         """Lines with round corners."""
-        from matplotlib.patches import PathPatch
         from matplotlib.path import Path as Outline
 
         corners: list[Point] = []
@@ -217,25 +189,15 @@ class _Painter:
             corners.append(line[-1])
             codes.append(Outline.LINETO)
         if corners:
-            shape = Outline(corners, codes)
-            self.sheet.add_artist(
-                PathPatch(shape, fill=False, edgecolor=colour, linewidth=width, capstyle="round", zorder=2)
-            )
+            look = {"fill": False, "edgecolor": colour, "linewidth": width, "capstyle": "round", "zorder": 2}
+            self.sheet.add_artist(self.shapes.PathPatch(Outline(corners, codes), **look))
 
     def pill(self, words: str, aspect: str, x: float, y: float) -> None:
         """A badge: coloured for an aspect, white for what belongs to the connection."""
-        from matplotlib.patches import FancyBboxPatch
-
-        fill = self.colours[aspect] if aspect else "white"
-        half = PILL_HEIGHT / 2
-        style = f"round,pad=0,rounding_size={half}"
-        place = (x, y - half)
-        patch = FancyBboxPatch(
-            place, pill_width(words), PILL_HEIGHT, style, facecolor=fill, edgecolor=INK, linewidth=0.6, zorder=4
-        )
-        self.sheet.add_artist(patch)
+        fill, half, width = self.colours[aspect] if aspect else "white", PILL_HEIGHT / 2, pill_width(words)
+        self.rectangle(x, y - half, width, PILL_HEIGHT, fill, half, linewidth=0.6, zorder=4)
         ink = "white" if fill in DARK else INK
-        self.words(Words(words, x + pill_width(words) / 2, y + 0.35 * text.PILL, text.PILL, align="center"), ink)
+        self.words(Words(words, x + width / 2, y + 0.35 * text.PILL, text.PILL, align="center"), ink)
 
     def words(self, words: Words, colour: str = "") -> None:
         """A line of text."""
@@ -247,7 +209,6 @@ class _Painter:
             fontproperties=text.font(words.size, words.bold),
             ha=words.align,
             va="baseline",
-            parse_math=False,
             zorder=5,
         )
 
@@ -271,5 +232,5 @@ class _Painter:
 
 def _towards(start: Point, end: Point, way: float) -> Point:
     """The point a little way from one towards another."""
-    length = math.dist(start, end) or 1.0
-    return start[0] + (end[0] - start[0]) * way / length, start[1] + (end[1] - start[1]) * way / length
+    share = way / (math.dist(start, end) or 1.0)
+    return start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from ..canvas import open_matplotlib
+from ..pen import open_matplotlib
 
 FAMILY = "DejaVu Sans"
 NAME, KIND, PORT, PILL = 9.0, 7.5, 7.0, 6.5  # font sizes in points

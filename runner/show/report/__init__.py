@@ -1,11 +1,10 @@
 """The report of a study: figures, tables, claims, on one page."""
 
 from .declared import check_figures, figures_of_study, study_figure_types
-from .figure import Complaint, SignalFigure, StudyFigure
+from .figure import SignalFigure, StudyFigure
 from .write import Report, write_report
 
 __all__ = [
-    "Complaint",
     "Report",
     "SignalFigure",
     "StudyFigure",

@@ -7,7 +7,10 @@ from collections.abc import Iterable, Sequence
 
 from epicycle.actors import counted
 
-from ...study.claims import (
+from ...html import Content, Html, note, tag, wide_table
+from ...language import ALWAYS
+from ...shown import rounded
+from ...study import (
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,
@@ -15,14 +18,10 @@ from ...study.claims import (
     UNDECIDED,
     Finding,
     Judgement,
+    Recommendation,
     ranked,
 )
-from ...study.guideline import Recommendation
-from ...study.questions import ALWAYS
-from .data import Data, Names, shown
-from .html import Content, Html, table, tag, with_class
-from .numbers import estimated, rounded
-from .of_table import mean_of
+from .data import Data, Names, estimated, mean_of, shown
 
 
 def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
@@ -31,57 +30,43 @@ def claims(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
         return
     apart = list(judgements[0].where)
     if apart:
-        yield tag("div", _by_level(data.names, judgements), class_="scroll")
-        yield tag(
-            "p",
+        yield _by_level(data.names, judgements)
+        yield note(
             "The best comes first: the fewest claims that are not reproduced; then the most that hold in the means, by "
-            "chance or not, the most that are reproduced, and the largest share of agreeing comparisons.",
-            class_="note",
+            "chance or not, the most that are reproduced, and the largest share of agreeing comparisons."
         )
-    head = [*(data.names.axis(name) for name in apart), "claim", "", "verdict", "confirmed", "reversed", "undecided"]
-    head += ["agreeing", "weakest comparison"]
-    yield with_class(
-        table(
-            head,
-            [
-                [
-                    *(shown(level) for level in each.where.values()),
-                    tag("b", each.name),
-                    [each.claim.doc, " ", tag("small", each.claim.statement)],
-                    _verdict(each),
-                    *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
-                    str(each.agreeing),
-                    _weakest(data.names, each),
-                ]
-                for each in judgements
-            ],
-            names=len(apart) + 1,
-        ),
-        "words",
-    )
-    yield tag(
-        "p",
+    head = [*map(data.names.axis, apart), "claim", "", "verdict", "confirmed", "reversed", "undecided", "agreeing"]
+    rows = [
+        [
+            *map(shown, each.where.values()),
+            tag("b", each.name),
+            [each.claim.doc, " ", tag("small", each.claim.statement)],
+            _verdict(each),
+            *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
+            str(each.agreeing),
+            _weakest(data.names, each),
+        ]
+        for each in judgements
+    ]
+    yield wide_table([*head, "weakest comparison"], rows, names=len(apart) + 1, class_="words")
+    yield note(
         "A comparison is a mean of differences between runs of the same replication, with Student's 95 % interval; the "
         "p-values of one claim are corrected together (Holm). It is confirmed or reversed if the corrected p-value is "
         "below 0.05, and no more than one run in twenty is missing; otherwise undecided. agreeing: how many point the "
-        "claimed way, by chance or not.",
-        class_="note",
+        "claimed way, by chance or not."
     )
     for each in judgements:
         place = data.names.place(each.where)
         title = f"{each.name}{f' ({place})' if place else ''}: {each.verdict}"
-        yield tag(
-            "details",
-            tag("summary", f"{title}, {counted(len(each.findings), 'comparison')}"),
-            _findings(data.names, each),
-        )
+        summary = tag("summary", f"{title}, {counted(len(each.findings), 'comparison')}")
+        yield tag("details", summary, _findings(data.names, each))
 
 
 def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
     """Which claims survive which level of what they are judged for, the best first."""
     standings = ranked(judgements)
     claims = [each.name for each in standings[0].judgements]
-    return table(
+    return wide_table(
         [*map(names.axis, judgements[0].where), NOT_REPRODUCED, "hold in the means", REPRODUCED, *claims],
         [
             [
@@ -89,7 +74,7 @@ def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
                 str(each.counts(NOT_REPRODUCED)),
                 str(each.in_means),
                 str(each.counts(REPRODUCED)),
-                *map(_by_chance_or_not, each.judgements),
+                *([_verdict(judgement), _agreeing(judgement)] for judgement in each.judgements),
             ]
             for each in standings
         ],
@@ -97,8 +82,8 @@ def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
     )
 
 
-def _by_chance_or_not(judgement: Judgement) -> Content:
-    return [_verdict(judgement), tag("small", f"{judgement.agreeing} of {len(judgement.findings)} agree")]
+def _agreeing(judgement: Judgement) -> Html:
+    return tag("small", f"{judgement.agreeing} of {len(judgement.findings)} agree")
 
 
 def _verdict(judgement: Judgement) -> Html:
@@ -119,7 +104,7 @@ def _findings(names: Names, judgement: Judgement) -> Html:
         ]
         for each in judgement.findings
     ]
-    return tag("div", table([*head, *([] if is_rate else ["p (Holm)"]), "outcome"], rows), class_="scroll")
+    return wide_table([*head, *([] if is_rate else ["p (Holm)"]), "outcome"], rows)
 
 
 def _weakest(names: Names, judgement: Judgement) -> Content:
@@ -164,22 +149,14 @@ def guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:
     unit = names.unit(found[0].metric)
     yield tag("p", f"Which {choose} make the {mean_of(metric)} {which}:", class_="label")
     head = [*map(names.axis, found[0].where), f"best {choose}", mean_of(names.axis(found[0].metric))]
-    yield tag(
-        "div",
-        table(
-            [*head, "confidence", "not worse", "enough"],
-            [_row(each) for each in found],
-            names=len(found[0].where),
-        ),
-        class_="scroll",
+    yield wide_table(
+        [*head, "confidence", "not worse", "enough"], [_row(each) for each in found], names=len(found[0].where)
     )
-    yield tag(
-        "p",
+    close = f", or of those within {tolerance:g}{f' {unit}' if unit else ''} of the best." if tolerance else "."
+    yield note(
         f"best: the {which} mean. confidence: how often it is the best if the replications are drawn anew. not worse: "
         "no other is significantly better, and the truly best is among these with a confidence of 95 %. enough: the "
-        "first of these in the order of the study"
-        + (f", or of those within {tolerance:g}{f' {unit}' if unit else ''} of the best." if tolerance else "."),
-        class_="note",
+        f"first of these in the order of the study{close}"
     )
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import abridged, visible
 
-from ...study import Plan, StudyResults
-from ...study.dimensions import Factor
-from ...study.schedule import OK
+from ...language import Factor
+from ...shown import in_words, rounded
+from ...study import OK, Estimate, Plan, StudyResults
 
 MAX_LISTED = 12  # levels in a message
 MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level
@@ -28,6 +29,11 @@ class Condition:
     def good(self) -> list[dict[str, Any]]:
         """The rows of the runs that came to their end."""
         return [row for row in self.rows if row["status"] == OK]
+
+    def numbers(self, metric: str) -> list[float]:
+        """The numbers of a metric; runs that failed or have none are left out."""
+        values = (row[metric] for row in self.good)
+        return [value for value in values if value is not None and math.isfinite(value)]
 
 
 class Data:
@@ -112,13 +118,15 @@ class Names:
 
 def shown(value: Factor) -> str:
     """A level as people write it."""
-    if value is None:
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, (int, float)):
-        return f"{value:g}" if isinstance(value, float) else str(value)
-    return abridged(visible(value), MAX_LEVEL)
+    return abridged(visible(in_words(value)), MAX_LEVEL)
+
+
+def estimated(estimate: Estimate) -> str:
+    """A number with its interval, to two digits of that: ``4.81 ± 0.06``."""
+    width = estimate.high - estimate.low
+    if estimate.count == 0 or not math.isfinite(width) or width == 0:
+        return rounded(estimate.value, width)
+    return f"{rounded(estimate.value, width)} ± {rounded(width / 2, width)}"
 
 
 def _is_number(value: object) -> bool:
@@ -128,3 +136,8 @@ def _is_number(value: object) -> bool:
 def is_numeric(plan: Plan, factor: str) -> bool:
     """Whether the levels of a factor are numbers."""
     return plan.study.factors[factor] in ("int", "float")
+
+
+def mean_of(what: str) -> str:
+    """What the mean of something is called; that of a mean is one, too."""
+    return what if what.startswith("mean ") else f"mean {what}"

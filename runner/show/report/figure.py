@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar
 
 from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
 
-from ...engine import Results
-from ...model import Model
+from ...language import Dimension, Factor
+from ...model import Complaint, Model
+from ...results import Results
 from ...study import Plan
-from ...study.dimensions import Dimension, Factor
+from ..pen import MAX_LINES, MAX_PANELS, Sheet
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
-from .style import MAX_LINES, MAX_PANELS
+
+# The parameters of figures that name parts of the study, as far as a figure has them.
+_NAMED = {
+    "where": "factor",
+    "lines": "factor",
+    "panels": "factor",
+    "over": "factor",
+    "metric": "metric",
+    "metrics": "metric",
+    "labels": "column",
+}
 
 RunKey = tuple[int, int]  # a condition's number, and a replication
-
-
-@dataclass(frozen=True)
-class Complaint:
-    """What is wrong with a figure: a parameter (and the ``key`` within), what is said of it, and what to do."""
-
-    parameter: str
-    message: str
-    help: str = ""
-    key: str = ""
 
 
 @dataclass
@@ -52,19 +53,33 @@ class StudyFigure(Configurable):
         Parameter(str), {}, doc="what metrics and factors are called in it, without their units"
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        """What is wrong with the figure in this study."""
-        yield from unknown("where", list(self.where), list(plan.study.factors), "factor")
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        """What is wrong with the figure in this study: names that it does not have, levels that do not occur."""
+        factors, metrics = list(plan.study.factors), [metric.name for metric in plan.metrics]
+        known = {"factor": factors, "metric": metrics, "column": factors + metrics}
+        for parameter, noun in _NAMED.items():
+            for name in self.named(parameter):
+                if name not in known[noun]:
+                    message = f"the study has no {noun} {name!r}{did_you_mean(name, known[noun])}"
+                    yield Complaint(parameter, message, f"its {noun}s: {', '.join(known[noun]) or 'none'}", name)
         for name, wanted in self.where.items():
-            dimension = _dimension_of(plan, name)
-            if dimension is None:
-                continue
+            dimension = next((each for each in plan.study.dimensions if name in each.columns), None)
             for level in wanted if isinstance(wanted, list) else [wanted]:
-                if not _has(dimension, name, level):
-                    message = f"{name} never is {shown(level)}"
-                    yield Complaint("where", message, f"it is {_listed(dimension, name)}", name)
-        columns = [*plan.study.factors, *(metric.name for metric in plan.metrics)]
-        yield from unknown("labels", list(self.labels), columns, "column")
+                if dimension is not None and not _has(dimension, name, level):
+                    yield Complaint(
+                        "where", f"{name} never is {shown(level)}", f"it is {_listed(dimension, name)}", name
+                    )
+
+    def named(self, parameter: str) -> tuple[str, ...]:
+        """The names that a parameter holds; none if the figure has no such parameter."""
+        value = getattr(self, parameter, None) or ()
+        return (value,) if isinstance(value, str) else tuple(value)
+
+    def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
+        """Its panels and lines."""
+        over, lines = (next(iter(self.named(parameter)), None) for parameter in ("over", "lines"))
+        found = roles(data.plan, self.where, over if has_axis else None, lines, self.named("panels"), has_axis=has_axis)
+        return layout(data, self, found)
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         """Write the figure to the files, and return what is to be said of it; ``extracts`` are of repeated runs."""
@@ -82,13 +97,15 @@ class StudyFigure(Configurable):
 class SignalFigure(StudyFigure):
     """Base of the figures that are drawn from signals: a study keeps none, but runs can be repeated."""
 
+    signal_parameters: ClassVar[tuple[str, ...]] = ()  # those that hold patterns of output ports
+
     def runs_of(self, data: Data) -> list[RunKey]:
         """The runs that it wants to be repeated."""
         raise NotImplementedError
 
     def ports(self, model: Model) -> tuple[str, ...]:
         """The output ports that are to be recorded in these, as patterns."""
-        raise NotImplementedError
+        return tuple(pattern for parameter in self.signal_parameters for pattern in self.named(parameter))
 
     def extract(self, model: Model, results: Results) -> Any:
         """What it needs of one of them, as plain data; called in the process that has made the run."""
@@ -97,18 +114,6 @@ class SignalFigure(StudyFigure):
     def check_model(self, model: Model) -> Iterator[Complaint]:
         """What is wrong with it in this model, its signals apart."""
         yield from ()
-
-
-def unknown(parameter: str, names: Sequence[str], known: Sequence[str], noun: str) -> Iterator[Complaint]:
-    """Complaints about names that the study does not have."""
-    for name in names:
-        if name not in known:
-            message = f"the study has no {noun} {name!r}{did_you_mean(name, known)}"
-            yield Complaint(parameter, message, f"its {noun}s: {', '.join(known) or 'none'}", name)
-
-
-def _dimension_of(plan: Plan, factor: str) -> Dimension | None:
-    return next((each for each in plan.study.dimensions if factor in each.columns), None)
 
 
 def _has(dimension: Dimension, factor: str, level: Any) -> bool:
@@ -159,12 +164,30 @@ class Panel:
 
 @dataclass
 class Layout:
-    """All panels, what their lines are, and what had to be left out of them."""
+    """All panels, what their lines are, and what had to be left out of them; then what the legend shows."""
 
+    roles: Roles
+    names: Names
     panels: list[Panel]
     levels: list[Factor]
     omitted: str
     columns: int | None
+    handles: dict[str, Any] = field(default_factory=dict)
+
+    def sheet(self, **look: Any) -> Sheet:
+        """A sheet with these panels."""
+        return Sheet(**{"panels": [panel.title for panel in self.panels] or [""], "columns": self.columns, **look})
+
+    def show(self, level: Factor, handle: Any) -> None:
+        """Let the legend say which line is that of a level."""
+        if self.roles.lines:
+            self.handles.setdefault(self.names.level(self.roles.lines, level), handle)
+
+    def finish(self, sheet: Sheet, paths: Sequence[Path]) -> None:
+        """Add the legend, and write the files."""
+        title = self.names.words(self.roles.lines) if self.roles.lines else ""
+        sheet.legend(list(self.handles.values()), list(self.handles), title)
+        sheet.save(paths)
 
 
 def layout(data: Data, figure: StudyFigure, found: Roles) -> Layout:
@@ -189,4 +212,4 @@ def layout(data: Data, figure: StudyFigure, found: Roles) -> Layout:
         omitted.append(f"Of {counted(len(panels), 'panel')} the first {MAX_PANELS} are shown.")
     # Two factors make rows and columns.
     columns = len(choices[1]) if len(choices) == 2 and 1 < len(choices[1]) <= 4 else None
-    return Layout(panels[:MAX_PANELS], levels[:MAX_LINES], " ".join(omitted), columns)
+    return Layout(found, names, panels[:MAX_PANELS], levels[:MAX_LINES], " ".join(omitted), columns)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -23,16 +23,16 @@ from epicycle.actors import (
 )
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
-from ...engine import Results
-from ...model import Model, Problems
-from ...model.patterns import select
-from ...study import Plan
-from ...study.statistics import half_width
-from ..drawing import draw, figures_of
-from ..figures import Figure, positions
+from ...catalogue import Figure
+from ...model import Complaint, Model, figures_of
+from ...results import Results
+from ...study import Plan, half_width
+from ...text import Problems
+from ..drawing import draw
+from ..figures import positions, selected
+from ..pen import DASHES, FORMATS, PALETTE
 from .data import Condition, Data
-from .figure import Complaint, Layout, Roles, RunKey, SignalFigure, layout, roles, unknown
-from .style import DASHES, FORMATS, PALETTE, Sheet
+from .figure import Layout, Roles, RunKey, SignalFigure, layout, roles
 
 TOKEN = "token"
 MOST, LEAST = "most", "least"
@@ -46,24 +46,13 @@ class RepeatedFigure(SignalFigure):
     runs = Parameter(int, 10, min=1, max=10_000, doc="how many runs of each condition are shown, from the first one on")
     panels = texts_parameter((), doc="factors with a panel for each level; all that are left, if left out")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
-        yield from unknown("panels", self.panels, list(plan.study.factors), "factor")
-
     def runs_of(self, data: Data) -> list[RunKey]:
-        return [run for condition in self.shown(data) for run in self._first(condition)]
+        panels = self.arranged(data).panels
+        return [run for panel in panels for line in panel.lines.values() for run in self.first(line)]
 
-    def shown(self, data: Data) -> list[Condition]:
-        """The conditions that are in some panel."""
-        arranged, _ = self.arranged(data)
-        return [each for panel in arranged.panels for line in panel.lines.values() for each in line]
-
-    def arranged(self, data: Data) -> tuple[Layout, Roles]:
-        """Panels and lines."""
-        raise NotImplementedError
-
-    def _first(self, condition: Condition) -> list[RunKey]:
-        return [(condition.index, row["replication"]) for row in condition.good[: self.runs]]
+    def first(self, conditions: Iterable[Condition]) -> list[RunKey]:
+        """The runs of some conditions that are shown."""
+        return [(each.index, row["replication"]) for each in conditions for row in each.good[: self.runs]]
 
 
 class Series(RepeatedFigure):
@@ -72,6 +61,8 @@ class Series(RepeatedFigure):
     Of a run that is over nothing is known any more; the mean is drawn as long as half of the runs go on.
     """
 
+    signal_parameters = ("signal",)
+
     signal = Parameter(str, doc="an output port")
     value = PortFormulaParameter(TOKEN, given=(TOKEN,), doc="the number as an expression over its token: token.speed")
     label = Parameter(str, "", doc="what the number is, with its unit; the expression if left out")
@@ -79,9 +70,8 @@ class Series(RepeatedFigure):
         str, None, doc="factor with a line for each level; the next one if left out"
     )
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
-        yield from unknown("lines", [self.lines] if self.lines else [], list(plan.study.factors), "factor")
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         if self._formula.references:
             yield Complaint("value", f"{self._formula.references[0]!r} is no part of the token", "write 'token.name'")
 
@@ -89,9 +79,6 @@ class Series(RepeatedFigure):
     def _formula(self) -> PortFormula:
         assert self.value is not None
         return self.value
-
-    def ports(self, model: Model) -> tuple[str, ...]:
-        return (self.signal,)
 
     def extract(self, model: Model, results: Results) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Times, values, and when the run was over."""
@@ -106,31 +93,19 @@ class Series(RepeatedFigure):
         end = results.end if results.stopped != "stop time" or model.stop is None else model.stop
         return signal.times, np.array(values), end
 
-    def arranged(self, data: Data) -> tuple[Layout, Roles]:
-        found = roles(data.plan, self.where, None, self.lines, self.panels, has_axis=False)
-        return layout(data, self, found), found
-
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        names = self.names(data)
-        arranged, found = self.arranged(data)
-        sheet = Sheet(
-            [panel.title for panel in arranged.panels] or [""], columns=arranged.columns, same_x=True, same_y=True
-        )
-        handles: dict[str, Any] = {}
+        arranged = self.arranged(data)
+        sheet = arranged.sheet(same_x=True, same_y=True)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
             for number, (level, conditions) in enumerate(panel.lines.items()):
-                runs = [extracts[run] for condition in conditions for run in self._first(condition)]
-                times, means, halves = over_time(runs)
-                if not len(times):
-                    continue
-                look = {"color": PALETTE[number], "linestyle": DASHES[number]}
-                (line,) = axes.plot(times, means, **look)
-                axes.fill_between(times, means - halves, means + halves, color=PALETTE[number], alpha=0.18, linewidth=0)
-                if found.lines:
-                    handles.setdefault(names.level(found.lines, level), line)
+                times, means, halves = over_time([extracts[run] for run in self.first(conditions)])
+                if len(times):
+                    colour = PALETTE[number]
+                    (line,) = axes.plot(times, means, color=colour, linestyle=DASHES[number])
+                    axes.fill_between(times, means - halves, means + halves, color=colour, alpha=0.18, linewidth=0)
+                    arranged.show(level, line)
         sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
-        sheet.legend(list(handles.values()), list(handles), names.words(found.lines) if found.lines else "")
-        sheet.save(paths)
+        arranged.finish(sheet, paths)
         said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"
         return f"{said}, as long as half of them go on. {arranged.omitted}".rstrip()
 
@@ -166,75 +141,54 @@ class Tracks(RepeatedFigure):
     Signals are of states with a ``position``; a circle is where a way begins.
     """
 
+    signal_parameters = ("signals", "around")
+
     signals = texts_parameter(doc="signals of the states whose ways are shown (patterns)")
     around = texts_parameter((), doc="signals of further states, of the first run alone, as dashed lines (patterns)")
     marks: Parameter[Mapping[str, Any]] = MappingParameter(
         array_parameter((2,), unit="m"), {}, doc="places by what they are called, such as {goal: [0, 0]}"
     )
 
-    def ports(self, model: Model) -> tuple[str, ...]:
-        return (*self.signals, *self.around)
-
     def extract(self, model: Model, results: Results) -> dict[str, list[tuple[str, NDArray[np.float64]]]]:
         """Signals and ways, by what they are shown as."""
+        ways = (("ways", self.signals), ("around", self.around))
         return {
-            kind: [
-                (name, _way(results, name))
-                for name in dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals))
-            ]
-            for kind, patterns in (("ways", self.signals), ("around", self.around))
+            kind: [(name, positions(results[name])) for name in selected(patterns, results)] for kind, patterns in ways
         }
 
-    def arranged(self, data: Data) -> tuple[Layout, Roles]:
+    def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
         found = roles(data.plan, self.where, None, None, self.panels, has_axis=False)
-        found = Roles(None, None, (*([found.lines] if found.lines else []), *found.panels))
-        return layout(data, self, found), found
+        return layout(data, self, Roles(None, None, (*([found.lines] if found.lines else []), *found.panels)))
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        arranged, _ = self.arranged(data)
+        arranged = self.arranged(data)
         columns = arranged.columns or (1 if len(arranged.panels) == 1 else 2)
         seen = [way for extract in extracts.values() for ways in extract.values() for _, way in ways]
         points = np.concatenate([*seen, *(place[None] for place in self.marks.values())])
         low, high = points.min(axis=0), points.max(axis=0)
         room = 0.04 * max(*(high - low), 1e-9)
         width, depth = high - low + 2 * room
-        sheet = Sheet(
-            [panel.title for panel in arranged.panels] or [""],
-            columns=columns,
-            height=min(6.0, (3.8 if columns == 1 else 6.4 / columns) * depth / width + 0.35),
-            same_x=True,
-            same_y=True,
-        )
-        handles: dict[str, Any] = {}
+        height = min(6.0, (3.8 if columns == 1 else 6.4 / columns) * depth / width + 0.35)
+        sheet = arranged.sheet(columns=columns, height=height, same_x=True, same_y=True)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
-            runs = [run for conditions in panel.lines.values() for each in conditions for run in self._first(each)]
+            runs = [run for conditions in panel.lines.values() for run in self.first(conditions)]
             for number, run in enumerate(runs):
-                colour = PALETTE[number % len(PALETTE)]
                 for _, way in extracts[run]["ways"]:
-                    axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9, alpha=0.85)
+                    axes.plot(*way.T, color=PALETTE[number % len(PALETTE)], linewidth=0.9, alpha=0.85)
                     look = {"markersize": 4.5, "color": "white", "markeredgecolor": "0.2", "zorder": 4}
-                    (handles["start"],) = axes.plot(*way[:1].T, "o", **look)
+                    (arranged.handles["start"],) = axes.plot(*way[:1].T, "o", **look)
                 for name, way in extracts[run]["around"] if number == 0 else ():
-                    (handles[name.rpartition(".")[0]],) = axes.plot(
-                        way[:, 0], way[:, 1], "--", color="0.3", linewidth=1.0
-                    )
+                    (line,) = axes.plot(*way.T, "--", color="0.3", linewidth=1.0)
+                    arranged.handles[name.rpartition(".")[0]] = line
             for (name, place), marker in zip(self.marks.items(), cycle("*XPDv"), strict=False):
                 look = {"marker": marker, "markersize": 8, "color": "black", "linestyle": "none", "zorder": 5}
-                (handles[name],) = axes.plot(*place, **look)
+                (arranged.handles[name],) = axes.plot(*place, **look)
             axes.set_aspect("equal")
             axes.set_xlim(low[0] - room, high[0] + room)
             axes.set_ylim(low[1] - room, high[1] + room)
         sheet.call_axes("x (m)", "y (m)")
-        sheet.legend(list(handles.values()), list(handles))
-        sheet.save(paths)
+        arranged.finish(sheet, paths)
         return f"The first {counted(self.runs, 'run')} of each condition. {arranged.omitted}".rstrip()
-
-
-def _way(results: Results, name: str) -> NDArray[np.float64]:
-    try:
-        return positions(results[name])
-    except AttributeError:
-        raise EpicycleError(f"the tokens of {name} have no 'position'") from None
 
 
 class SingleRun(SignalFigure):
@@ -249,10 +203,6 @@ class SingleRun(SignalFigure):
         min=1,
         doc="among how many runs of each condition it is chosen, from the first one on; all if left out",
     )
-
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
-        yield from unknown("metric", [self.metric], [metric.name for metric in plan.metrics], "metric")
 
     def check_model(self, model: Model) -> Iterator[Complaint]:
         if self.figure not in model.figures:
@@ -282,11 +232,7 @@ class SingleRun(SignalFigure):
 
     def _drawn(self, model: Model) -> Figure:
         problems = Problems()
-        recorded, model.recorded = model.recorded, [*model.graph.ports]
-        try:
-            found = figures_of(model, problems)
-        finally:
-            model.recorded = recorded
+        found = figures_of(model, problems, recorded=model.graph.ports)
         problems.raise_if_any()
         return found[self.figure]
 

@@ -11,12 +11,12 @@ from typing import Any
 
 from epicycle.actors import Parameter, counted, texts_parameter
 
-from ...study import Plan
-from ...study.dimensions import Factor
-from ...study.statistics import mean
-from .data import Condition, Data, Names, is_numeric
-from .figure import Complaint, Layout, Panel, Roles, RunKey, StudyFigure, layout, roles, unknown
-from .style import DASHES, LIMIT, MARKERS, PALETTE, Sheet
+from ...language import Factor
+from ...model import Complaint
+from ...study import Plan, mean
+from ..pen import DASHES, LIMIT, MARKERS, PALETTE
+from .data import Condition, Data, Names, is_numeric, mean_of
+from .figure import Layout, Panel, RunKey, StudyFigure
 
 BOXES, CURVES = "boxes", "curves"
 
@@ -29,12 +29,6 @@ class TableFigure(StudyFigure):
     )
     panels = texts_parameter((), doc="factors with a panel for each level; all that are left, if left out")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
-        factors = list(plan.study.factors)
-        yield from unknown("lines", [self.lines] if self.lines else [], factors, "factor")
-        yield from unknown("panels", self.panels, factors, "factor")
-
 
 class Means(TableFigure):
     """The mean of a metric over a factor, with 95 % intervals (Student): a line for each level of another factor, and
@@ -46,52 +40,32 @@ class Means(TableFigure):
     )
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
-        yield from unknown("metric", [self.metric], [metric.name for metric in plan.metrics], "metric")
-        yield from unknown("over", [self.over] if self.over else [], list(plan.study.factors), "factor")
-
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        names, chosen = self.names(data), self.conditions(data)
-        found = roles(data.plan, self.where, self.over, self.lines, self.panels, has_axis=True)
-        arranged = layout(data, self, found)
-        sheet = Sheet(
-            [panel.title for panel in arranged.panels] or [""], columns=arranged.columns, same_y=self.same_scale
-        )
-        axis = _Axis(data, names, found.over, chosen)
-        handles: dict[str, Any] = {}
+        chosen, arranged = self.conditions(data), self.arranged(data, has_axis=True)
+        names, over = arranged.names, arranged.roles.over
+        sheet = arranged.sheet(same_y=self.same_scale)
+        axis = _Axis(data, names, over, chosen)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
             for number, (level, conditions) in enumerate(panel.lines.items()):
-                line = self._line(axes, axis, conditions, number, len(arranged.levels))
-                if found.lines:
-                    handles.setdefault(names.level(found.lines, level), line)
+                arranged.show(level, self._line(axes, axis, conditions, number, len(arranged.levels)))
             axis.dress(axes)
-        sheet.call_axes(names.axis(found.over) if found.over else "", mean_of(names.axis(self.metric)))
-        sheet.legend(list(handles.values()), list(handles), names.words(found.lines) if found.lines else "")
-        sheet.save(paths)
-        return " ".join(
-            part
-            for part in (
-                f"{mean_of(names.words(self.metric)).capitalize()} with its 95 % interval (Student).",
-                counts(chosen, [self.metric]),
-                arranged.omitted,
-            )
-            if part
-        )
+        sheet.call_axes(names.axis(over) if over else "", mean_of(names.axis(self.metric)))
+        arranged.finish(sheet, paths)
+        what = f"{mean_of(names.words(self.metric)).capitalize()} with its 95 % interval (Student)."
+        return _sentences(what, counts(chosen, [self.metric]), arranged.omitted)
 
     def _line(self, axes: Any, axis: _Axis, conditions: list[Condition], number: int, lines: int) -> Any:
         points = []
         for condition in conditions:
-            estimate = mean(numbers(condition, self.metric))
+            estimate = mean(condition.numbers(self.metric))
             if estimate.count:
                 half = estimate.high - estimate.value
                 points.append((axis.place(condition), estimate.value, half if math.isfinite(half) else 0.0))
         if axis.is_numeric:
             points.sort()
         shift = axis.step * 0.06 * (number - (lines - 1) / 2)  # so that intervals stand beside each other
-        where = [place + shift for place, _, _ in points]
         return axes.errorbar(
-            where,
+            [place + shift for place, _, _ in points],
             [value for _, value, _ in points],
             yerr=[half for _, _, half in points],
             color=PALETTE[number],
@@ -116,79 +90,62 @@ class Distributions(TableFigure):
     )
     limit: Parameter[float | None] = Parameter(float, None, doc="a value with a line, such as a distance to be kept")
 
-    def check(self, plan: Plan) -> Iterator[Complaint]:
-        yield from super().check(plan)
-        yield from unknown("metrics", self.metrics, [metric.name for metric in plan.metrics], "metric")
-        yield from unknown("over", [self.over] if self.over else [], list(plan.study.factors), "factor")
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
         if not self.metrics:
             yield Complaint("metrics", "there is no metric in it", "name one at least")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        names, chosen = self.names(data), self.conditions(data)
-        has_axis = self.style == BOXES
-        found = roles(
-            data.plan, self.where, self.over if has_axis else None, self.lines, self.panels, has_axis=has_axis
-        )
-        arranged = layout(data, self, found)
+        chosen, has_axis = self.conditions(data), self.style == BOXES
+        arranged = self.arranged(data, has_axis=has_axis)
         panels = [(metric, panel) for metric in self.metrics for panel in arranged.panels] or [("", Panel("", {}))]
         across = len(arranged.panels)
         is_grid = len(self.metrics) > 1 and 1 < across <= 4  # a row for each metric
-        sheet = Sheet(
-            [panel.title for _, panel in panels],
+        sheet = arranged.sheet(
+            panels=[panel.title for _, panel in panels],
             columns=across if is_grid else min(len(self.metrics), 3) if across == 1 else arranged.columns,
             same_y="row" if is_grid else len(self.metrics) == 1,
         )
-        handles: dict[str, Any] = {}
-        draw = self._boxes if has_axis else self._curves
         for axes, (metric, panel) in zip(sheet.axes, panels, strict=True):
-            for label, handle in draw(axes, data, names, metric, panel, found, arranged).items():
-                handles.setdefault(label, handle)
+            if has_axis:
+                self._boxes(axes, data, metric, panel, arranged)
+            else:
+                self._curves(axes, metric, panel, arranged)
         if is_grid or len(self.metrics) == 1:  # the panels of a row have one axis
             for axes in sheet.axes:
                 axes.label_outer(remove_inner_ticks=False)
-        sheet.legend(list(handles.values()), list(handles), names.words(found.lines) if found.lines else "")
-        sheet.save(paths)
-        parts = [
-            "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
-            if has_axis
-            else "Share of the runs whose value is no greater.",
+        arranged.finish(sheet, paths)
+        boxes = "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
+        return _sentences(
+            boxes if has_axis else "Share of the runs whose value is no greater.",
             counts(chosen, self.metrics),
-            *(self._beyond(chosen, names, metric) for metric in self.metrics),
+            *(self._beyond(chosen, arranged.names, metric) for metric in self.metrics),
             arranged.omitted,
-        ]
-        return " ".join(part for part in parts if part)
+        )
 
     def _beyond(self, chosen: list[Condition], names: Names, metric: str) -> str:
         if self.limit is None:
             return ""
-        values = [value for condition in chosen for value in numbers(condition, metric)]
+        values = [value for condition in chosen for value in condition.numbers(metric)]
         below = sum(value < self.limit for value in values)
-        unit = names.unit(metric)
-        limit = f"{self.limit:g}{f' {unit}' if unit else ''}"
+        limit = names.level(metric, self.limit)
         return f"Below {limit}: {names.words(metric)} of {below:,} of {counted(len(values), 'run')}."
 
-    def _boxes(
-        self, axes: Any, data: Data, names: Names, metric: str, panel: Panel, found: Roles, arranged: Layout
-    ) -> dict[str, Any]:
+    def _boxes(self, axes: Any, data: Data, metric: str, panel: Panel, arranged: Layout) -> None:
         from matplotlib.patches import Patch
 
-        levels = data.levels(found.over, self.conditions(data), self.where) if found.over else [None]
-        lines = len(arranged.levels)
+        names, over, lines = arranged.names, arranged.roles.over, len(arranged.levels)
+        levels = data.levels(over, self.conditions(data), self.where) if over else [None]
         width = 0.8 / lines
-        handles: dict[str, Any] = {}
         for number, (line, conditions) in enumerate(panel.lines.items()):
             colour = PALETTE[number]
-            groups = {
-                place: [
-                    value
-                    for condition in conditions
-                    if not found.over or condition.values[found.over] == level
-                    for value in numbers(condition, metric)
-                ]
-                for place, level in enumerate(levels)
-            }
-            groups = {place: values for place, values in groups.items() if values}
+            groups: dict[int, list[float]] = {}
+            for place, level in enumerate(levels):
+                here = [each for each in conditions if not over or each.values[over] == level]
+                if values := [value for condition in here for value in condition.numbers(metric)]:
+                    groups[place] = values
             if groups:
+                thin = {"color": colour, "linewidth": 0.9}
                 axes.boxplot(
                     list(groups.values()),
                     positions=[place + width * (number - (lines - 1) / 2) for place in groups],
@@ -198,58 +155,38 @@ class Distributions(TableFigure):
                     patch_artist=True,
                     boxprops={"facecolor": colour, "alpha": 0.35, "edgecolor": colour, "linewidth": 0.8},
                     medianprops={"color": colour, "linewidth": 1.6},
-                    whiskerprops={"color": colour, "linewidth": 0.9},
-                    capprops={"color": colour, "linewidth": 0.9},
+                    whiskerprops=thin,
+                    capprops=thin,
                     flierprops={"marker": ".", "markersize": 3.5, "markerfacecolor": colour, "markeredgewidth": 0},
                 )
-            if found.lines:
-                handles[names.level(found.lines, line)] = Patch(facecolor=colour, alpha=0.5, edgecolor=colour)
+            arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
         axes.set_xlim(-0.6, len(levels) - 0.4)
         every = -(-len(levels) // 16)
-        texts = [names.level("", level) if found.over else "" for level in levels[::every]]
+        texts = [names.level("", level) if over else "" for level in levels[::every]]
         _texts_along(axes, range(0, len(levels), every), texts)
-        axes.set_xlabel(names.axis(found.over) if found.over else "")
+        axes.set_xlabel(names.axis(over) if over else "")
         axes.set_ylabel(fill(names.axis(metric), 30))
         axes.grid(axis="x", visible=False)
         if self.limit is not None:
             axes.axhline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
-        return handles
 
-    def _curves(
-        self, axes: Any, data: Data, names: Names, metric: str, panel: Panel, found: Roles, arranged: Layout
-    ) -> dict[str, Any]:
-        handles: dict[str, Any] = {}
+    def _curves(self, axes: Any, metric: str, panel: Panel, arranged: Layout) -> None:
         for number, (line, conditions) in enumerate(panel.lines.items()):
-            values = sorted(value for condition in conditions for value in numbers(condition, metric))
-            if not values:
-                continue
-            shares = [(place + 1) / len(values) for place in range(len(values))]
-            (curve,) = axes.plot(
-                [values[0], *values],
-                [0.0, *shares],
-                drawstyle="steps-post",
-                color=PALETTE[number],
-                linestyle=DASHES[number],
-            )
-            if found.lines:
-                handles[names.level(found.lines, line)] = curve
+            values = sorted(value for condition in conditions for value in condition.numbers(metric))
+            if values:
+                shares = [place / len(values) for place in range(len(values) + 1)]
+                look = {"drawstyle": "steps-post", "color": PALETTE[number], "linestyle": DASHES[number]}
+                (curve,) = axes.plot([values[0], *values], shares, **look)
+                arranged.show(line, curve)
         axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel(names.axis(metric))
+        axes.set_xlabel(arranged.names.axis(metric))
         axes.set_ylabel("share of runs")
         if self.limit is not None:
             axes.axvline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
-        return handles
 
 
-def mean_of(what: str) -> str:
-    """What the mean of something is called; that of a mean is one, too."""
-    return what if what.startswith("mean ") else f"mean {what}"
-
-
-def numbers(condition: Condition, metric: str) -> list[float]:
-    """The numbers of a metric in a condition; runs that failed or have none are left out."""
-    values = (row[metric] for row in condition.good)
-    return [value for value in values if value is not None and math.isfinite(value)]
+def _sentences(*parts: str) -> str:
+    return " ".join(part for part in parts if part)
 
 
 def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
@@ -260,7 +197,7 @@ def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
     if bad:
         parts.append(f"{bad:,} of them failed")
     for metric in metrics:
-        missing = runs - bad - sum(len(numbers(condition, metric)) for condition in chosen)
+        missing = runs - bad - sum(len(condition.numbers(metric)) for condition in chosen)
         if missing:
             parts.append(f"{missing:,} have no {metric}")
     return f"{', '.join(parts)}."
@@ -274,18 +211,14 @@ class _Axis:
         self._levels: list[Factor] = data.levels(factor, chosen) if factor else [None]
         self._texts = [names.level("", level) if factor else "" for level in self._levels]
         self.is_numeric = bool(factor) and is_numeric(data.plan, str(factor)) and None not in self._levels
-        places = sorted({self.of(level) for level in self._levels})
-        gaps = [after - before for before, after in pairwise(places)]
-        self.step = min(gaps, default=1.0)
+        self._places = [self._of(level) for level in self._levels]  # in the order of the study
+        places = sorted(set(self._places))
+        self.step = min((after - before for before, after in pairwise(places)), default=1.0)
         dimension = next((each for each in data.plan.study.dimensions if factor in each.columns), None)
         # The points of a hypercube come in no order.
-        self.is_connected = dimension is not None and (len(dimension.columns) == 1 or places == self.given())
+        self.is_connected = dimension is not None and (len(dimension.columns) == 1 or places == self._places)
 
-    def given(self) -> list[float]:
-        """The places in the order of the study."""
-        return [self.of(level) for level in self._levels]
-
-    def of(self, level: Factor) -> float:
+    def _of(self, level: Factor) -> float:
         """The place of a level."""
         if self.is_numeric and isinstance(level, (int, float)):
             return float(level)
@@ -293,15 +226,14 @@ class _Axis:
 
     def place(self, condition: Condition) -> float:
         """The place of a condition."""
-        return self.of(condition.values[self._factor]) if self._factor else 0.0
+        return self._of(condition.values[self._factor]) if self._factor else 0.0
 
     def dress(self, axes: Any) -> None:
-        """Ticks where levels are, if they are few."""
-        places = self.given()
-        if len(places) <= 12:
-            _texts_along(axes, places, self._texts)
+        """Ticks where levels are, if they are few, and not strewn over the axis like the points of a hypercube."""
+        if len(self._places) <= 12 and (self.is_connected or not self.is_numeric):
+            _texts_along(axes, self._places, self._texts)
         if not self.is_numeric:
-            axes.set_xlim(-0.5, len(places) - 0.5)
+            axes.set_xlim(-0.5, len(self._places) - 0.5)
 
 
 def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str]) -> None:

@@ -12,18 +12,16 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, abridged
 
-from ...model import ModelError, Problems, describe, raised_at
-from ...study import StudyResults, plan_of_folder
-from ...study.claims import ranked
-from ...study.replays import Replay, repeat
-from ...study.store import replace_file
+from ...model import describe, raised_at
+from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
+from ...text import ModelError, Problems
 from ..drawing import FigureError
 from ..folder import MAX_NAME
+from ..pen import FORMATS, style
 from .data import Data
 from .declared import figures_of_study
 from .figure import RunKey, SignalFigure, StudyFigure
 from .page import Picture, report_page
-from .style import FORMATS, style
 
 Extracts = dict[str, dict[RunKey, Any]]  # by figure and run
 

@@ -17,7 +17,7 @@ from epicycle.actors import (
     UnscentedEstimator,
     Vehicle,
 )
-from tests.actors.harness import Harness
+from epicycle.actors.testing import Harness
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

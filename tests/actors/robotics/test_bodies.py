@@ -18,7 +18,7 @@ from epicycle.actors import (
     SeparationMonitor,
     Vehicle,
 )
-from tests.actors.harness import Harness
+from epicycle.actors.testing import Harness
 
 
 def body(x: float, y: float, time: float = 0.0, velocity: tuple[float, float] = (0.0, 0.0)) -> BodyState:

@@ -25,7 +25,7 @@ from epicycle.actors import (
     UnscentedEstimator,
 )
 from epicycle.actors.robotics.numerics import warm_up
-from tests.actors.harness import Harness
+from epicycle.actors.testing import Harness
 from tests.actors.robotics.scenario import _Recorder, play
 
 COMPILING = "compiling the numeric kernels (once, about 20 s) ..."

@@ -19,7 +19,7 @@ from epicycle.actors import (
     Sensor,
     UnscentedEstimator,
 )
-from tests.actors.harness import Harness
+from epicycle.actors.testing import Harness
 
 FILTERS = (
     "KalmanFilter",

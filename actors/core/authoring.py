@@ -1,0 +1,82 @@
+"""What authors of actors need again and again: tokens that belong together, and work that waits for its time.
+
+The k-th tokens of all channels form the k-th round, so that with one token per channel and tag there is one round.
+This is what Ptolemy does, where an actor takes one token per channel and is fired again for the rest.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Sequence
+from itertools import count, zip_longest
+from typing import Any, Generic, TypeVar
+
+from .actor import Actor, Wake
+from .ports import InputPort
+from .tag import Tag
+
+T = TypeVar("T")
+ABSENT: Any = type("_Absent", (), {"__repr__": lambda self: "absent"})()
+
+
+def rounds(*ports: InputPort[Any]) -> Iterator[list[list[Any]]]:
+    """The tokens of the present tag round by round: for each port a list with an entry per channel, or ``ABSENT``."""
+    channels = [channel for port in ports for channel in port.by_channel()]
+    for tokens in zip_longest(*channels, fillvalue=ABSENT):
+        entries = iter(tokens)
+        yield [[next(entries) for _ in range(port.width)] for port in ports]
+
+
+def present(tokens: Sequence[Any]) -> list[Any]:
+    """The tokens that are there."""
+    return [token for token in tokens if token is not ABSENT]
+
+
+class Latest:
+    """Keeps the latest token of each of several single inputs, for actors that need all of them at once.
+
+    With ``hold`` an input that is silent in a round counts with its latest token; without, a round in which one is
+    silent gives nothing.
+    """
+
+    def __init__(self, ports: Sequence[InputPort[Any]], *, hold: bool) -> None:
+        # An optional input that nothing is connected to stays out of it.
+        self._ports = [port for port in ports if port.width]
+        self._hold = hold
+        self._tokens: dict[str, Any] = {}
+
+    def rounds(self) -> Iterator[dict[str, Any]]:
+        """For each round in which every connected input has a value, the values by the names of the ports."""
+        for entries in rounds(*self._ports):
+            if not self._hold:
+                self._tokens.clear()
+            for port, (token,) in zip(self._ports, entries, strict=True):
+                if token is not ABSENT:
+                    self._tokens[port.name] = token
+            if len(self._tokens) == len(self._ports):
+                yield dict(self._tokens)
+
+
+class Pending(Generic[T]):
+    """Values that wait for their time: ``put`` them in ``fire``, and take those whose time has come with ``due``."""
+
+    def __init__(self, actor: Actor) -> None:
+        self._actor = actor
+        # The number keeps the order of entry among equals, and values are never compared.
+        self._heap: list[tuple[Tag, int, Wake, T]] = []
+        self._number = count()
+
+    def __len__(self) -> int:
+        return len(self._heap)
+
+    def put(self, value: T, delay: float) -> None:
+        """Keep a value for ``delay`` seconds; 0 is the next microstep."""
+        wake = self._actor.wake_in(delay)
+        heapq.heappush(self._heap, (wake.tag, next(self._number), wake, value))
+
+    def due(self) -> list[T]:
+        """Take the values whose time is the present tag, in the order in which they were put."""
+        values = []
+        while self._heap and self._heap[0][2].due:
+            values.append(heapq.heappop(self._heap)[3])
+        return values

@@ -1,0 +1,296 @@
+"""Solution: the solution of an ODE from one discontinuity on, and where guard functions cross zero along it.
+
+The steps, and with them every digit, do not depend on when somebody looks at the solution.  Between the points at
+which a function is evaluated, anything may hide; where nobody has said how long a step may be, interval arithmetic
+tells where nothing does.  There steps are as long as the tolerances allow, and guards are not looked at; elsewhere
+the solution and its guards are sampled within ``WINDOW``.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+from .core import EpicycleError
+from .integration import STEPPERS, Bounds, Derivative, Limits, Piece, State, root
+
+WINDOW: Final = 1.0  # s, within which things may hide
+CELLS: Final = 8  # a window is searched for changes of sign in so many parts
+LONGEST: Final = 1e6  # s, of a step
+_HALVINGS: Final = 12
+_NOISE: Final = 1e-11  # what counts as zero beside the value at the far end of a cell
+_MAX_PATIENCE: Final = 64
+
+
+@dataclass
+class Guard:
+    """A function whose zero crossings count; ``side`` is the sign that it had last, 0 where that is open.
+
+    ``bounds`` are what the function lies between, from a time to another, for states between bounds.
+    """
+
+    value: Callable[[float, State], float]
+    bounds: Callable[[float, float, Sequence[Bounds]], Bounds]
+    rising: bool
+    falling: bool
+    side: int = 0
+
+    def counts(self, side: int) -> bool:
+        """Whether a crossing to this side counts."""
+        return self.rising if side > 0 else self.falling
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where guards cross zero first: the time, and for each that does, its number and the side it crosses to."""
+
+    time: float
+    sides: dict[int, int]
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The derivatives of the states at a time, and what they lie between, for times and states between bounds."""
+
+    rates: Derivative
+    bounds: Callable[[float, float, Sequence[Bounds]], list[Bounds]]
+
+
+class Solution:
+    """A solution that starts at time 0 and is extended as far as it is asked for, or searched to the first crossing.
+
+    Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        state: State,
+        guards: Sequence[Guard],
+        *,
+        method: str,
+        tolerance: tuple[float, float],
+        max_step: float | None,
+    ) -> None:
+        self._equations = equations
+        self._watched = max_step is None
+        self._window = WINDOW if max_step is None else max_step
+        self._patience, self._taken = 1, 0  # so many steps must be taken before longer ones are tried; so many were
+        self._stepper = STEPPERS[method](
+            equations.rates, state, Limits(*tolerance, LONGEST if max_step is None else max_step)
+        )
+        self._guards = guards
+        self._start = state
+        self._piece: Piece | None = None
+        self._before: Piece | None = None  # a look at the past may reach back by a fraction of a nanosecond
+        self._ahead: list[tuple[float, float, list[int]]] = []  # what is to be searched for which guards, the next last
+        self._turns: list[tuple[float, float, Guard, int]] = []  # from, to, and the side of a guard before
+        self.searched = 0.0
+        self.crossing: Crossing | None = None
+
+    @property
+    def end(self) -> float:
+        """How far the solution is known."""
+        return self._stepper.time
+
+    def extend(self) -> None:
+        """Take one step; raises ``EpicycleError`` if there is none to take."""
+        start = self.end
+        self._before = self._piece or self._before
+        self._piece = None
+        if not self._advance():
+            raise EpicycleError(
+                f"the solution cannot be continued beyond {start:.9g} s from here: "
+                "Required step size is less than spacing between numbers."
+            )
+        if self._guards:
+            self._ahead.append((start, self.end, list(range(len(self._guards)))))
+
+    def at(self, time: float) -> State:
+        """The state at a time; steps are taken up to there."""
+        while self.end < time:
+            self.extend()
+        if self.end == 0.0 or time <= 0.0:
+            return self._start
+        piece = self._latest()
+        if time < piece.start and self._before is not None:
+            piece = self._before
+        return piece.at(time)
+
+    def _latest(self) -> Piece:
+        """The solution along the latest step, which costs something and is computed when it is asked for."""
+        if self._piece is None:
+            self._piece = self._stepper.piece()
+        return self._piece
+
+    # -- steps ----------------------------------------------------------------------------------------------------
+
+    def _advance(self) -> bool:
+        """Take one step, which is longer than the window only if nothing hides in it; False if there is none."""
+        while True:
+            before = copy.copy(self._stepper) if self._watched and self._stepper.next_step > WINDOW else None
+            if not self._stepper.step():
+                return False
+            self._taken += 1
+            if before is None or self.end - before.time <= WINDOW or not self._hides(before.time):
+                break
+            # Where that is so, it is likely to stay so: a longer step is tried less and less often.
+            length = self.end - before.time
+            self._stepper, self._piece = before, None
+            self._limit(length / 4.0)
+            self._patience, self._taken = min(2 * self._patience, _MAX_PATIENCE), 0
+        if self._watched and self._taken >= self._patience:
+            self._limit(self._stepper.limits.max_step * 4.0)
+            self._taken = 0
+        return True
+
+    def _limit(self, longest: float) -> None:
+        longest = min(max(longest, WINDOW), LONGEST)
+        self._stepper.limits = replace(self._stepper.limits, max_step=longest)
+
+    def _hides(self, start: float) -> bool:
+        """Whether a derivative may be far from all that the latest step has made of it.
+
+        That is its values at both ends, also with the states at the corners of their bounds, and the slopes of the
+        solution between.  To look within the step would be wrong: what is seen there, the stepper may have missed.
+        """
+        end, piece = self.end, self._latest()
+        bounds = piece.bounds(start, end)
+        lows, highs = [low for low, _ in bounds], [high for _, high in bounds]
+        mixed = [pair[number % 2] for number, pair in enumerate(bounds)]
+        quarter = 0.25 * (end - start)
+        states = [piece.at(start), *(piece.at(start + number * quarter) for number in (1, 2, 3)), piece.at(end)]
+        places = [(start, states[0]), (end, states[4]), (start, lows), (end, highs), (end, mixed)]
+        try:
+            found = [self._equations.rates(time, state) for time, state in places]
+        except EpicycleError:  # a corner may lie where the derivatives are not defined
+            return True
+        found += [[(new - old) / quarter for old, new in zip(*pair, strict=True)] for pair in pairwise(states)]
+        possible = self._equations.bounds(start, end, bounds)
+        for (low, high), values in zip(possible, zip(*found, strict=True), strict=True):
+            least, most = min(values), max(values)
+            margin = 2.0 * (most - least) + _NOISE * max(abs(least), abs(most))
+            if not (least - margin <= low and high <= most + margin):
+                return True
+        return False
+
+    # -- crossings ------------------------------------------------------------------------------------------------
+
+    def search(self, time: float) -> None:
+        """Search for the first crossing up to a time, or a little further."""
+        while self.crossing is None and self.searched < time:
+            self.look()
+
+    def look(self) -> None:
+        """Search the next part of the solution, a step if need be: a window, or more where no guard can cross."""
+        if not self._ahead:
+            self.extend()
+        left, right, numbers = self._ahead.pop()
+        bounds = self._latest().bounds(left, right)
+        numbers = [number for number in numbers if not self._stays(number, left, right, bounds)]
+        if numbers and right - left > self._window:
+            middle = left + 0.5 * (right - left)
+            self._ahead += [(middle, right, numbers), (left, middle, numbers)]
+            return
+        if numbers:
+            width = (right - left) / CELLS
+            places = [left + cell * width for cell in range(CELLS)] + [right]
+            for start, end in pairwise(places):
+                self.crossing = self._cross(start, end, numbers)
+                if self.crossing is not None:
+                    return
+        self.searched = right
+
+    def rewind(self, time: float) -> None:
+        """Give guards the sides that they have at a time, which the search has passed: the solution is left there."""
+        state = self.at(time)
+        for left, right, guard, side in reversed(self._turns):
+            if right > time:
+                guard.side = side if left >= time else sign_of(guard.value(time, state)) or side
+        self._turns.clear()
+
+    def _turn(self, number: int, side: int, left: float, right: float) -> None:
+        """Take a guard to a side on which it is after a part of the search."""
+        guard = self._guards[number]
+        if guard.side != side:
+            self._turns.append((left, right, guard, guard.side))
+            guard.side = side
+
+    def _stays(self, number: int, left: float, right: float, bounds: Sequence[Bounds]) -> bool:
+        """Whether a guard certainly keeps its side from one time to another."""
+        guard = self._guards[number]
+        low, high = guard.bounds(left, right, bounds)
+        side = 1 if low > 0.0 else -1 if high < 0.0 else 0
+        if side == 0 or guard.side == -side:
+            return False
+        self._turn(number, side, left, right)
+        return True
+
+    def _cross(self, left: float, right: float, numbers: Sequence[int]) -> Crossing | None:
+        """The first crossing that counts in a cell."""
+        sides = {number: self._side(self._guards[number], left, right) for number in numbers}
+        found = {
+            number: self._root(self._guards[number], *bracket)
+            for number, (_, after, bracket) in sides.items()
+            if bracket is not None and self._guards[number].counts(after)
+        }
+        if not found:
+            for number, (_, after, _) in sides.items():
+                self._turn(number, after, left, right)
+            return None
+        time = min(found.values())
+        crossed = {}
+        for number, (before, after, _) in sides.items():
+            sign = self._sign(self._guards[number], time)
+            # Rounding may put one of two equal roots a hair behind the other: what has crossed by now is here, too.
+            if number in found and (found[number] == time or sign == after):
+                crossed[number] = after
+            elif number not in found:
+                self._turn(number, sign or before, left, right)
+        return Crossing(time, crossed)
+
+    def _side(self, guard: Guard, left: float, right: float) -> tuple[int, int, tuple[float, float] | None]:
+        """The side of a guard before and after a cell, and between which times it crosses, if it does."""
+        before, after = guard.side, self._sign(guard, right)
+        if before == 0:
+            # It starts at zero, as after a bounce. It may go to one side and be back on the other within the cell.
+            inner = self._excursion(guard, left, right, after)
+            if inner is None:
+                return before, after, None
+            return -after, after, inner
+        if after in (0, before):
+            return before, before, None
+        return before, after, (left, right)
+
+    def _excursion(self, guard: Guard, left: float, right: float, after: int) -> tuple[float, float] | None:
+        """Where a guard that starts at zero and ends on a side has been on the other one before."""
+        if after == 0:
+            return None
+        noise = _NOISE * abs(guard.value(right, self.at(right)))
+        far, share = right, 1.0
+        for _ in range(_HALVINGS):
+            share *= 0.5
+            near = left + (right - left) * share
+            if -after * guard.value(near, self.at(near)) > noise:
+                return near, far
+            far = near
+        return None
+
+    def _sign(self, guard: Guard, time: float) -> int:
+        return sign_of(guard.value(time, self.at(time)))
+
+    def _root(self, guard: Guard, left: float, right: float) -> float:
+        def value(time: float) -> float:
+            return guard.value(time, self.at(time))
+
+        if value(left) == 0.0 or value(left) * value(right) > 0.0:
+            return left  # it was at zero already, or beyond by rounding
+        return root(value, left, right)
+
+
+def sign_of(value: float) -> int:
+    """1, 0 or -1."""
+    return (value > 0) - (value < 0)

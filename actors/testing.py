@@ -1,0 +1,121 @@
+"""Tests of an actor by itself: tokens in at given times, and what it sends, without a model around it.
+
+>>> harness = Harness(Scale("scale", factor=3))
+>>> harness.run(until=2.0, input=[(0.5, 1.0), (1.5, 2.0)])
+>>> harness.sent["output"]
+[(0.5, 3.0), (1.5, 6.0)]
+
+``epicycle.aspects.testing`` has what tests of aspects need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import simpy
+
+from .core import Actor, Tag, Wake, to_nanoseconds
+
+
+class Harness:
+    """A run in which there is one actor, reactive or a process; its time begins at 0 s.
+
+    ``sent``: what the actor has sent, as (seconds, token) by output port.  ``channels``: the channel of each, None for
+    all of them.  ``wakes``: the wake-ups that are still to come.  ``stopped``: why the actor has ended the run, if so.
+
+    Ports that need not be connected are not, unless ``widths`` says how many connections they have or a token comes.
+    """
+
+    def __init__(self, actor: Actor, *, seed: int = 1, widths: Mapping[str, int] | None = None) -> None:
+        self.actor = actor
+        self.tag = Tag(0, 0)
+        self.seed = seed
+        self.environment = simpy.Environment()
+        self.wakes: list[Wake] = []
+        self.stopped: str | None = None
+        self.sent: dict[str, list[tuple[float, Any]]] = {name: [] for name in actor.outputs}
+        self.channels: dict[str, list[int | None]] = {name: [] for name in actor.outputs}
+        for name, port in actor.inputs.items():
+            port.width = (widths or {}).get(name, int(port.required))
+        for name, output in actor.outputs.items():
+            output.width = (widths or {}).get(name, 1)
+            output.connect(lambda token, channel=None, name=name: self._keep(name, token, channel))
+        actor.enter(self)
+        actor.initialize()
+
+    def _keep(self, name: str, token: Any, channel: int | None) -> None:
+        self.sent[name].append((self.tag.seconds, token))
+        self.channels[name].append(channel)
+
+    def wake(self, actor: Actor, time: int) -> Wake:
+        """What the actor asks for with ``wake_in`` and ``wake_at``."""
+        tag = Tag(time, 1) if time > self.tag.time else Tag(self.tag.time, self.tag.microstep + 1)
+        self.wakes.append(Wake(tag))
+        return self.wakes[-1]
+
+    def stop(self, reason: str) -> None:
+        """What the actor asks for with ``context.stop``."""
+        self.stopped = reason
+
+    def fire(self, seconds: float, microstep: int = 1, **tokens: Any) -> None:
+        """Fire once at a tag, with a token for each of these inputs; wake-ups of this tag are due.
+
+        A list of tokens goes to the channels of a port that takes several connections, one each, None left out.
+        """
+        self._fire(Tag(to_nanoseconds(seconds), microstep), tokens.items())
+
+    def run(self, until: float, **inputs: Iterable[tuple[float, Any]]) -> None:
+        """Let time pass up to and including ``until`` s: fire for these tokens, (seconds, token) by port, and wake-ups.
+
+        A token stands for several in the same way as for ``fire``; those of one time are there at the same tag.
+        """
+        coming: dict[int, list[tuple[str, Any]]] = {}
+        for name, feed in inputs.items():
+            for seconds, token in feed:
+                coming.setdefault(to_nanoseconds(seconds), []).append((name, token))
+        end = to_nanoseconds(until)
+        while self.stopped is None:
+            self.wakes = [wake for wake in self.wakes if not wake.cancelled]
+            tags = [wake.tag for wake in self.wakes] + [Tag(time, 1) for time in coming]
+            tag = min(tags, default=Tag(end + 1, 0))
+            if self.environment.peek() <= min(tag.time, end):
+                self._resume()
+            elif tag.time > end:
+                break
+            else:
+                self._fire(tag, coming.pop(tag.time, []) if tag.microstep == 1 else [])
+
+    def _resume(self) -> None:
+        """Let SimPy's next event happen, which may resume a process."""
+        self.tag = max(self.tag, Tag(int(self.environment.peek()), 1))
+        self.environment.step()
+
+    def _fire(self, tag: Tag, tokens: Iterable[tuple[str, Any]]) -> None:
+        self.tag = tag
+        if tag.time > self.environment.now:
+            self.environment.run(until=tag.time)
+        for name, token in tokens:
+            port = self.actor.inputs[name]
+            each_channel = token if port.multi else [token]
+            port.width = max(port.width, len(each_channel))
+            put, put_channel = port.entry()
+            for channel, each in enumerate(each_channel):
+                if each is not None:
+                    put(each)
+                    put_channel(channel)
+        due = [wake for wake in self.wakes if wake.tag == tag and not wake.cancelled]
+        for wake in due:
+            wake.due = True
+            self.wakes.remove(wake)
+        self.actor.fire()
+        for port in self.actor.inputs.values():
+            port.clear()
+
+    def tokens(self, port: str) -> list[Any]:
+        """What one port has sent, without the times."""
+        return [token for _, token in self.sent[port]]
+
+    def last(self, port: str) -> Any:
+        """What one port has sent last."""
+        return self.sent[port][-1][1]

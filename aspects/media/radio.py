@@ -1,0 +1,233 @@
+"""A radio channel that robots share: carrier sense, backoff, collisions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from epicycle.actors import EpicycleError, Parameter, to_nanoseconds, to_seconds
+
+from ..core import JoinPoint, WaitingLine
+from .medium import Medium, Message
+
+
+class RadioMedium(Medium):
+    """One radio channel that all stations hear: who sends while another does spoils both messages.
+
+    A *station* is the actor or composite whose port a message comes from (over the connection, for an aspect at an
+    input).  It has one radio: it sends one message at a time, and its others wait, ``capacity`` of them.
+
+    A transmission takes ``overhead`` + length / ``rate``.  Before it, the station draws a whole number of slots from 0
+    to window - 1 and counts them down while the channel is idle.  A slot in which another begins to send is counted,
+    the next one begins when the channel is idle again (CSMA/CA).  Two whose numbers run out together collide.  Who
+    sends learns at the end whether the message came through; if not, it doubles its window, up to ``max_window``, and
+    tries again, up to ``retries`` times (binary exponential backoff).  Without ``carrier_sense`` slots are always
+    counted (ALOHA).
+
+    Weave it where a broadcast passes once: at the output ports of the senders, or at the input of the channel actor
+    that copies it.  There the airtime grows with the number of senders.  At the inputs of n receivers it is n
+    transmissions, as of a radio that sends to one after the other.
+
+    Events: ``delayed``, when a message arrives, with the seconds since it came; ``collided`` and ``lost``, for a
+    transmission in vain; ``dropped``, for want of a place or after the last retry.  Reported over the time from 0 to
+    the end of the run: ``utilisation``, the share in which someone sends; ``throughput``, the share taken by
+    transmissions that came through; ``collision_rate``, the share of transmissions that collided; ``mean_delay``, the
+    mean time from coming to arriving.
+
+    Stations that always have something to send collide with probability p = 1 - (1 - t)^(n - 1), where
+    t = 2 (1 - 2p) / ((1 - 2p) (W + 1) + p W (1 - (2p)^m)) for a window W that doubles m times (Bianchi, IEEE J. Sel.
+    Areas Commun. 18, 2000; the better the more stations).  Of many stations without carrier sense and retries, Poisson
+    arrivals of rate a and an airtime s, the share exp(-2 a s) comes through (Abramson, AFIPS 1970).
+    A message without airtime passes at once.  Distances and walls are not its matter: see the losses by range.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("delayed", "collided", "lost", "dropped")
+    reports: ClassVar[dict[str, str]] = {
+        "utilisation": "1",
+        "throughput": "1",
+        "collision_rate": "1",
+        "mean_delay": "s",
+    }
+
+    message_length = Parameter(float, 0.0, min=0.0, unit="bit", doc="length of a message")
+    number_length = Parameter(float, 0.0, min=0.0, unit="bit", doc="what each number in the message adds to its length")
+    rate = Parameter(float, above=0, unit="bit/s", doc="speed of transmission")
+    overhead = Parameter(
+        float, 0.0, min=0.0, unit="s", doc="what each transmission takes besides: spacing, preamble, acknowledgement"
+    )
+    carrier_sense = Parameter(bool, True, doc="whether a station waits while another sends")
+    slot = Parameter(float, 9e-6, above=0, unit="s", doc="time that a backoff counts in; IEEE 802.11: 9 or 20 us")
+    window = Parameter(int, 16, min=1, max=65536, doc="slots of the first backoff; 1: none")
+    max_window = Parameter(int, 1024, min=1, max=65536, doc="slots of the longest backoff")
+    retries = Parameter(
+        int, 7, min=0, doc="further tries of a message; 0 for broadcasts that nobody acknowledges, as in IEEE 802.11"
+    )
+    capture = Parameter(
+        float, 0.0, min=0.0, max=1.0, unit="1", doc="probability that the first of those that collide comes through"
+    )
+    loss = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability that noise spoils a transmission")
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        if self.max_window < self.window:
+            raise EpicycleError(f"max_window {self.max_window} is below window {self.window}")
+        if self.length_field is None and not (self.message_length or self.number_length or self.overhead):
+            raise EpicycleError("messages take no time: give message_length, number_length, length_field or overhead")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        airtime = to_nanoseconds(self.overhead + self.length_of(token) / self.rate)
+        if airtime == 0:
+            point.forward(token)
+            return
+        air: _Air = point.shared.setdefault("air", _Air())
+        station = air.stations.setdefault(point.source.rpartition(".")[0], _Station())
+        frame = _Frame(self.priority_of(token), token, point, airtime, self, station)
+        frame.number, air.come = air.come, air.come + 1
+        if not station.is_busy:
+            station.is_busy = True
+            air.contend(frame)
+        elif dropped := station.line.add(frame, frame.came, self.capacity, self.overflow):
+            dropped.point.act("dropped", dropped.passing)
+
+    def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
+        air: _Air = shared.get("air", _Air())
+        return {
+            "utilisation": air.busy_until(end) / end if end else None,
+            "throughput": air.useful / end if end else None,
+            "collision_rate": air.collisions / air.transmissions if air.transmissions else None,
+            "mean_delay": to_seconds(air.delays) / air.arrivals if air.arrivals else None,
+        }
+
+
+class _Station:
+    """One sender: it has the messages that wait, and is busy while it deals with another."""
+
+    def __init__(self) -> None:
+        self.line: WaitingLine[_Frame] = WaitingLine()
+        self.is_busy = False
+
+
+@dataclass(order=True)
+class _Frame(Message):
+    """A message and its tries; times in ns."""
+
+    radio: RadioMedium = field(compare=False)  # that it was declared by
+    station: _Station = field(compare=False)
+    attempt: int = field(default=0, compare=False)
+    slots: int = field(default=0, compare=False)  # of its backoff, still to be counted
+    since: int | None = field(default=None, compare=False)  # when counting began; None: the channel is not idle
+    begun: int = field(default=0, compare=False)  # when its transmission began
+    collided: bool = field(default=False, compare=False)
+    is_first: bool = field(default=False, compare=False)  # of those that collide, the one that can be captured
+
+    @property
+    def slot(self) -> int:
+        return to_nanoseconds(self.radio.slot)
+
+    @property
+    def due(self) -> int | None:
+        """When its transmission begins, unless another does before."""
+        return None if self.since is None else self.since + self.slots * self.slot
+
+    @property
+    def end(self) -> int:
+        """When its transmission ends."""
+        return self.begun + self.duration
+
+
+class _Air:
+    """The channel: it is called when the next transmission begins or ends, and settles all that this changes."""
+
+    def __init__(self) -> None:
+        self.stations: dict[str, _Station] = {}
+        self.contending: list[_Frame] = []
+        self.sending: list[_Frame] = []
+        self.come = 0  # messages
+        self.transmissions = 0  # that are over
+        self.collisions = 0  # of these
+        self.arrivals = 0  # of messages
+        self.delays = 0  # of these, in ns
+        self.useful = 0  # their airtime (ns)
+        self._busy = 0  # ns in which someone sent, until the channel was idle last
+        self._busy_since = 0
+        self._next: int | None = None  # when it is called again
+
+    def busy_until(self, end: int) -> int:
+        """How long someone sent before ``end``, which is not before the present (ns)."""
+        return self._busy + (end - self._busy_since if self.sending else 0)
+
+    def contend(self, frame: _Frame) -> None:
+        """Begin the backoff before a transmission."""
+        window = min(frame.radio.window << min(frame.attempt, 20), frame.radio.max_window)
+        frame.slots = frame.point.random.below(window)
+        frame.since = None if self.sending and frame.radio.carrier_sense else frame.point.tag.time
+        self.contending.append(frame)
+        self._call_again(frame.point)
+
+    def _call_again(self, point: JoinPoint) -> None:
+        """See to it that it is called when next something begins or ends."""
+        starts = [due for frame in self.contending if (due := frame.due) is not None]
+        upcoming = min([*starts, *(frame.end for frame in self.sending)], default=None)
+        if upcoming is not None and (self._next is None or upcoming < self._next):
+            self._next = upcoming
+            point.later(to_seconds(upcoming - point.tag.time), lambda at: self._settle(at, point), upcoming)
+
+    def _settle(self, now: int, point: JoinPoint) -> None:
+        """End what is over, then begin what is due."""
+        if now != self._next:  # another call has taken the place of this one
+            return
+        self._next = None
+        over = [frame for frame in self.sending if frame.end == now]
+        self.sending = [frame for frame in self.sending if frame.end != now]
+        if over and not self.sending:
+            self._busy += now - self._busy_since
+            for frame in self.contending:
+                frame.since = now if frame.since is None else frame.since
+        for frame in over:
+            self._end(frame, now)
+        if due := [frame for frame in self.contending if frame.due == now]:
+            self._begin(due, now)
+        self._call_again(point)
+
+    def _begin(self, due: list[_Frame], now: int) -> None:
+        """Transmissions begin together."""
+        self.contending = [frame for frame in self.contending if frame not in due]
+        if not self.sending:
+            self._busy_since = now
+            # Of those that begin at the same time, none is the first by its place in the model.
+            first = due[0].point.random.below(len(due)) if len(due) > 1 else 0
+            due[first].is_first = True
+        for frame in due:
+            frame.begun = now
+        self.sending += due
+        if len(self.sending) > 1:
+            for frame in self.sending:
+                frame.collided = True
+        for frame in self.contending:
+            if frame.since is not None and frame.radio.carrier_sense:
+                frame.slots -= (now - frame.since) // frame.slot + 1  # the present slot counts
+                frame.since = None
+
+    def _end(self, frame: _Frame, now: int) -> None:
+        """What becomes of a message when its transmission is over."""
+        radio, point = frame.radio, frame.point
+        captured, spoilt = point.random.random(2) < (radio.capture, radio.loss)
+        in_vain = frame.collided and not (captured and frame.is_first)
+        self.transmissions += 1
+        self.collisions += frame.collided
+        frame.collided = frame.is_first = False
+        if in_vain or spoilt:
+            point.act("collided" if in_vain else "lost", frame.passing)
+            if frame.attempt < radio.retries:
+                frame.attempt += 1
+                self.contend(frame)
+                return
+            point.act("dropped", frame.passing)
+        frame.station.is_busy = bool(frame.station.line.tasks)
+        if frame.station.is_busy:
+            self.contend(frame.station.line.pop(now))
+        if not (in_vain or spoilt):
+            self.arrivals += 1
+            self.delays += now - frame.came
+            self.useful += frame.duration
+            frame.arrive()

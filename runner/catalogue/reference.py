@@ -1,0 +1,211 @@
+"""What actors, aspects and the other parts of a model declare, as plain data: ports, parameters, events, docs."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from inspect import cleandoc
+from pathlib import Path
+
+import numpy as np
+
+from epicycle.actors import (
+    Actor,
+    Configurable,
+    Parameter,
+    declared_parameters,
+    declared_ports,
+    has_own_ports,
+    type_name,
+    variants,
+)
+from epicycle.aspects import Aspect
+
+
+@dataclass(frozen=True)
+class PortReference:
+    """A port of an actor type; ``depends_on`` is for outputs, None where it is all inputs."""
+
+    name: str
+    direction: str
+    type: str
+    multi: bool
+    required: bool
+    depends_on: tuple[str, ...] | None
+    doc: str
+    triggers: bool = True  # of an input: whether a token there makes the actor do its work
+
+
+@dataclass(frozen=True)
+class ParameterReference:
+    """A parameter of a type; ``type`` is in words, ``default`` as it would stand in a model file.
+
+    ``part`` is the base of the types that its value may have, if it is a mapping with a type.
+    """
+
+    name: str
+    type: str
+    part: str
+    unit: str
+    required: bool
+    optional: bool
+    default: object
+    min: float | None
+    above: float | None
+    max: float | None
+    choices: tuple[str, ...]
+    doc: str
+
+
+@dataclass(frozen=True)
+class TypeReference:
+    """A type that a model may name, and all that it declares.
+
+    ``has_own_ports``: an instance has further ports, which follow from its parameters.
+    """
+
+    name: str
+    kind: str
+    group: str
+    about_group: str
+    doc: str
+    ports: tuple[PortReference, ...]
+    parameters: tuple[ParameterReference, ...]
+    has_own_ports: bool
+    stands_at: tuple[str, ...]
+    events: tuple[str, ...]
+    alters_parameters: bool
+    reports: dict[str, str]  # figures at the end of a run, and their units
+
+    @property
+    def summary(self) -> str:
+        """The first sentence of the doc."""
+        return first_sentence(self.doc)
+
+
+def describe(name: str, cls: type[Configurable]) -> TypeReference:
+    """What a type declares."""
+    group, about = _group(cls)
+    return TypeReference(
+        name=name,
+        kind="actor" if issubclass(cls, Actor) else "aspect" if issubclass(cls, Aspect) else "part",
+        group=group,
+        about_group=about,
+        doc=doc_of(cls),
+        ports=tuple(
+            PortReference(
+                port.name,
+                port.direction,
+                type_name(port.type),
+                port.multi,
+                getattr(port, "required", False),
+                getattr(port, "depends_on", None),
+                port.doc,
+                getattr(port, "triggers", True),
+            )
+            for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
+        ),
+        parameters=tuple(_parameter(each) for each in declared_parameters(cls).values()),
+        has_own_ports=issubclass(cls, Actor) and has_own_ports(cls),
+        stands_at=tuple(sorted(cls.stands_at)) if issubclass(cls, Aspect) else (),
+        events=tuple(cls.events) if issubclass(cls, Aspect) else (),
+        alters_parameters=issubclass(cls, Aspect) and cls.alters_parameters,
+        reports=dict(cls.reports) if issubclass(cls, Aspect) else {},
+    )
+
+
+def _parameter(parameter: Parameter[object]) -> ParameterReference:
+    return ParameterReference(
+        parameter.name,
+        parameter.describe_type(),
+        parameter.type.__name__ if is_part(parameter) else "",
+        parameter.unit if parameter.unit != "1" else "",
+        parameter.required,
+        parameter.optional,
+        None if parameter.required else as_written(parameter.default),
+        parameter.min,
+        parameter.above,
+        parameter.max,
+        parameter.choices,
+        parameter.doc,
+    )
+
+
+def parts_of(types: Iterable[type[Configurable]]) -> dict[type[Configurable], dict[str, type[Configurable]]]:
+    """The bases whose variants are values of parameters (of these types, or of such variants), and their variants."""
+    found: dict[type[Configurable], dict[str, type[Configurable]]] = {}
+    waiting = list(types)
+    while waiting:
+        for parameter in declared_parameters(waiting.pop(0)).values():
+            if is_part(parameter) and parameter.type not in found:
+                found[parameter.type] = dict(sorted(variants(parameter.type).items()))
+                waiting += found[parameter.type].values()
+    return found
+
+
+def is_part(parameter: Parameter[object]) -> bool:
+    """Whether the parameter's value is a mapping with a type of its own."""
+    return isinstance(parameter.type, type) and issubclass(parameter.type, Configurable)
+
+
+def as_written(value: object) -> object:
+    """A default as it would stand in a model file."""
+    if isinstance(value, Configurable):
+        declared = declared_parameters(type(value))
+        given = {name: getattr(value, name) for name in declared}
+        changed = {n: as_written(v) for n, v in given.items() if as_written(v) != as_written(declared[n].default)}
+        return {"type": type(value).__name__, **changed}
+    if isinstance(value, np.ndarray):
+        return as_written(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [as_written(each) for each in value]
+    if isinstance(value, Mapping):
+        return {str(key): as_written(each) for key, each in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"  # JSON has no such numbers
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return int(value)
+    return str(value) if isinstance(value, Path) else value
+
+
+def shown(value: object) -> str:
+    """A value of ``as_written`` on one line of YAML."""
+    if value is None:
+        return "none"
+    if isinstance(value, str):
+        return value or '""'
+    if isinstance(value, list):
+        return f"[{', '.join(map(shown, value))}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key}: {shown(each)}' for key, each in value.items())}}}"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def doc_of(cls: type) -> str:
+    """The docstring of the class itself: a line for each paragraph, code in single backquotes as in Markdown."""
+    own = vars(cls).get("__doc__") or ""
+    paragraphs = re.sub(r"``(.+?)``", r"`\1`", cleandoc(own), flags=re.DOTALL).split("\n\n")
+    # Lists and examples keep their lines.
+    return "\n\n".join(
+        each if re.search(r"^( |[-*>] )", each, re.MULTILINE) else " ".join(each.split()) for each in paragraphs
+    )
+
+
+def first_sentence(doc: str) -> str:
+    """The first sentence of a doc, on one line."""
+    paragraph = " ".join(doc.partition("\n\n")[0].split())
+    return re.split(r"(?<=[.!?:]) (?=[A-Z`])", paragraph)[0].rstrip(".:")
+
+
+def _group(cls: type) -> tuple[str, str]:
+    """The topic under which a type is listed, and what its module says of it."""
+    parts = cls.__module__.split(".")
+    # epicycle.actors.robotics.sensor is about robotics; acme_robots.lidar is of acme_robots.
+    depth = 3 if parts[0] == "epicycle" else 1
+    module = sys.modules.get(".".join(parts[:depth]))
+    return parts[depth - 1] if len(parts) >= depth else parts[-1], first_sentence(getattr(module, "__doc__", "") or "")

@@ -1,0 +1,201 @@
+"""Which types a model may name: Epicycle's own, those of installed packages, and the caller's.
+
+A package offers types as entry points (``Name = "package.module:Name"``) of the groups ``epicycle.actors`` and
+``epicycle.aspects``.  They are known by name and imported when a model names them.  Epicycle's own names always mean
+Epicycle's types; where a name is taken, or two packages offer it, ``package.Name`` says which one is meant.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from inspect import isabstract
+from typing import Any, Generic, TypeVar
+
+import epicycle.actors
+import epicycle.aspects
+from epicycle.actors import Actor, Configurable, EpicycleError, Process
+from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
+
+from ..text import note_package
+
+GROUPS: dict[type, str] = {Actor: "epicycle.actors", Aspect: "epicycle.aspects"}
+_ENTRY = re.compile(r"[A-Za-z_][\w.]*\s*:\s*[A-Za-z_][\w.]*\s*(\[.*\])?\Z", re.ASCII)
+
+T = TypeVar("T", bound=Configurable)
+
+
+class CatalogueError(EpicycleError):
+    """A type that cannot be had, or a name that means two; ``help`` says what to do."""
+
+    def __init__(self, message: str, *help: str) -> None:
+        self.message = message
+        self.help = help
+        super().__init__(message, *help)
+
+    def __str__(self) -> str:
+        return "\n   help: ".join((self.message, *self.help))
+
+
+@dataclass(frozen=True)
+class _Offer:
+    """A type that a package declares as an entry point."""
+
+    point: EntryPoint
+    base: type
+
+    @property
+    def distribution(self) -> str:
+        """What pip calls the package."""
+        return self.point.dist.name if self.point.dist is not None else self.point.module.partition(".")[0]
+
+    @property
+    def qualified(self) -> str:
+        """``package.Name``."""
+        return f"{re.sub(r'[-_.]+', '_', self.distribution).lower()}.{self.point.name}"
+
+    def load(self) -> type:
+        """Import it; raises ``CatalogueError`` naming the package for whatever goes wrong."""
+        kind = self.base.__name__
+        if not _ENTRY.match(self.point.value):
+            raise self._error("its entry point is not of the form package.module:Class")
+        try:
+            found = self.point.load()
+        except (Exception, SystemExit) as error:  # whatever a module of somebody else's does while it is imported
+            raise self._error(f"{type(error).__name__}: {error}") from error
+        if not (isinstance(found, type) and issubclass(found, self.base)) or isabstract(found):
+            raise self._error(f"{self.point.value} is not a complete subclass of {kind}")
+        if found.__name__ != self.point.name:
+            raise self._error(f"the class is called {found.__name__}, and its entry point must be, too")
+        return found
+
+    def _error(self, reason: str) -> CatalogueError:
+        return CatalogueError(
+            f"{self.base.__name__.lower()} {self.point.name!r} of the package {self.distribution!r} cannot be loaded: "
+            f"{reason}",
+            f"its entry point in the group {self.point.group} is {self.point.name} = {self.point.value}",
+            f"mend or uninstall {self.distribution!r}",
+        )
+
+
+class Types(Mapping[str, type[T]], Generic[T]):
+    """Types by name; to look one up may import it, which raises ``CatalogueError`` if that fails."""
+
+    def __init__(self, base: type[T], own: Mapping[str, type[T]], points: Iterable[EntryPoint] = ()) -> None:
+        self._own = dict(own)
+        self._kind = base.__name__.lower()
+        self._loaded: dict[str, type[T] | CatalogueError] = {}
+        self._offers: dict[str, _Offer] = {}
+        for offer in sorted((_Offer(point, base) for point in points), key=lambda offer: offer.qualified):
+            self._offers.setdefault(offer.qualified, offer)
+        self._by_name: dict[str, list[str]] = {}
+        for qualified, offer in self._offers.items():
+            self._by_name.setdefault(offer.point.name, []).append(qualified)
+
+    def __getitem__(self, name: str) -> type[T]:
+        if name in self._own:
+            return self._own[name]
+        qualified = self._by_name.get(name, [name])
+        if len(qualified) > 1:
+            packages = " and ".join(repr(self._offers[each].distribution) for each in qualified)
+            raise CatalogueError(
+                f"{self._kind} type {name!r} is offered by the packages {packages}", f"write {' or '.join(qualified)}"
+            )
+        offer = self._offers[qualified[0]]
+        if qualified[0] not in self._loaded:
+            try:
+                self._loaded[qualified[0]] = offer.load()
+            except CatalogueError as error:
+                self._loaded[qualified[0]] = error
+        found = self._loaded[qualified[0]]
+        if isinstance(found, CatalogueError):
+            raise found
+        if (distribution := offer.point.dist) is not None:
+            note_package(distribution.name, distribution.version)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._own or name in self._by_name or name in self._offers
+
+    def __iter__(self) -> Iterator[str]:
+        """The shortest name of each type."""
+        yield from self._own
+        for name, qualified in self._by_name.items():
+            yield from [name] if len(qualified) == 1 and name not in self._own else qualified
+
+    def __len__(self) -> int:
+        return len(self._own) + len(self._offers)
+
+    def with_types(self, own: Mapping[str, type[T]]) -> Types[T]:
+        """The same with further types, which go before others of their name."""
+        result = Types.__new__(Types)
+        result.__dict__.update(self.__dict__, _own={**self._own, **own})
+        return result
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """Actor and aspect types by name."""
+
+    actors: Mapping[str, type[Actor]]
+    aspects: Mapping[str, type[Aspect]]
+
+    def with_types(self, types: Iterable[type]) -> Catalogue:
+        """The catalogue with further types, by the names of their classes; of two with one name, the last counts."""
+        actors: dict[str, type[Actor]] = {}
+        aspects: dict[str, type[Aspect]] = {}
+        for each in types:
+            if issubclass(each, Actor):
+                actors[each.__name__] = each
+            elif issubclass(each, Aspect):
+                aspects[each.__name__] = each
+            else:
+                raise TypeError(f"{each.__name__} is neither an Actor nor an Aspect")
+        return Catalogue(_with(self.actors, actors), _with(self.aspects, aspects))
+
+    def loaded(self) -> tuple[Catalogue, list[CatalogueError]]:
+        """The catalogue with every type imported, and what is wrong with those that are left out."""
+        (actors, wrong), (aspects, wrong_too) = load_all(self.actors), load_all(self.aspects)
+        return Catalogue(actors, aspects), [*wrong, *wrong_too]
+
+
+@cache
+def built_in() -> Catalogue:
+    """What Epicycle's public faces offer; bases that define no behaviour are left out."""
+    actors = {name: each for name, each in _public(epicycle.actors, Actor) if each not in (Actor, Process)}
+    bases = (Aspect, JoinPointAspect, CompositeAspect, CompositeExecutionAspect)  # types of the last two are composites
+    aspects = {name: each for name, each in _public(epicycle.aspects, Aspect) if each not in bases}
+    return Catalogue(actors, aspects)
+
+
+@cache
+def installed() -> Catalogue:
+    """What Epicycle and the installed packages offer."""
+    own = built_in()
+    return Catalogue(
+        Types(Actor, own.actors, entry_points(group=GROUPS[Actor])),
+        Types(Aspect, own.aspects, entry_points(group=GROUPS[Aspect])),
+    )
+
+
+def _with(types: Mapping[str, type[T]], more: dict[str, type[T]]) -> Mapping[str, type[T]]:
+    return types.with_types(more) if isinstance(types, Types) else {**types, **more}
+
+
+def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[CatalogueError]]:
+    """All types that can be imported, and what is wrong with the others."""
+    found, errors = {}, []
+    for name in types:
+        try:
+            found[name] = types[name]
+        except CatalogueError as error:
+            errors.append(error)
+    return found, errors
+
+
+def _public(module: Any, base: type) -> list[tuple[str, Any]]:
+    found = ((name, getattr(module, name)) for name in module.__all__)
+    return [(n, o) for n, o in found if isinstance(o, type) and issubclass(o, base) and not isabstract(o)]

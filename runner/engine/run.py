@@ -1,0 +1,228 @@
+"""Run: a model, compiled into all that changes while it runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from epicycle.actors import Actor, to_seconds
+
+from ..collection import without_collection
+from ..interrupt import between_steps
+from ..model import Model, WovenAspect, describe, raised_at
+from ..results import EventLog, Record, Results, Signal
+from .copies import Copies
+from .director import ActorError, Director
+from .local_time import Deliver
+from .measurement import Measurement
+from .pace import Pace
+from .trace import Tracer, TracingDirector, TracingLog
+from .ways import Ways
+
+Keeps = Callable[[str, str, str, str], bool]
+
+
+class Run:
+    """The state of one run: actors and aspects of its own, the ways between them, agenda, log, and what is measured.
+
+    The model is what it was made from, and nothing in it is changed.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        seed: int,
+        keeps: Keeps | None = None,
+        log_to: Callable[[Record], None] | None = None,
+        tracer: Tracer | None = None,
+    ) -> None:
+        self.model = model
+        self.seed = seed
+        self.is_begun = self.is_over = False
+        self.stopped = ""  # why there is nothing more to do, once there is not
+        self._tracer = tracer
+        self._stop: int | None = None  # until when (ns) it has been let go on
+        self._spent = 0.0  # s of the wall clock
+        self._initialized: list[Actor] = []
+        self._unreported: ActorError | None = None
+        order, limits = model.order(), model.graph.limits
+        self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
+        self.director = (
+            Director(order, seed, limits) if tracer is None else TracingDirector(order, seed, tracer, limits)
+        )
+        self.log.crowd = self.director.crowd.add
+        self.signals = {name: Signal(name) for name in model.recorded}
+        self._units = {metric.name: metric.unit for metric in model.metrics}
+        self._measurements = {metric.name: Measurement(metric) for metric in model.metrics}
+        try:
+            with without_collection():
+                self.outside: list[object] = [model, model.graph]  # with what else leads there
+                copies = Copies(self.outside, self.outside)
+                self.actors = {path: copies.of(actor) for path, actor in model.graph.actors.items()}
+                self.aspects = [replace(woven, aspect=copies.of(woven.aspect)) for woven in model.aspects]
+                listeners = self._listeners()
+                self._ways = Ways(
+                    model.graph, self.actors, self.aspects, self.director, self.log, listeners, self.signals
+                )
+        except ActorError as error:  # of a clock that is wrong in a way that cannot be told
+            raise self._placed(error) from _cause(error)
+
+    # -- what is watched ------------------------------------------------------------------------------------------
+
+    def _listeners(self) -> dict[str, list[Deliver]]:
+        """Recorders, metrics and the stop rule, by the path of the port that they listen to."""
+        found: dict[str, list[Deliver]] = {}
+        for name, signal in self.signals.items():
+            found.setdefault(name, []).append(partial(self._record, signal))
+        for metric in self.model.metrics:
+            for path in metric.ports:
+                found.setdefault(path, []).append(partial(self._measure, self._measurements[metric.name], path))
+        for path in self.model.stop_ports:
+            found.setdefault(path, []).append(partial(self._ask_to_stop, path))
+        return found
+
+    def _record(self, signal: Signal, token: Any) -> None:
+        signal.add(self.director.tag, token)
+
+    def _measure(self, measurement: Measurement, path: str, token: Any) -> None:
+        measurement.add(path, self.director.tag.time, token)
+
+    def _ask_to_stop(self, path: str, token: Any) -> None:
+        try:
+            if token:
+                self.director.stop("stop_when")
+        except ValueError as error:  # arrays are neither true nor false
+            raise ActorError("stop_when", self.director.tag, f"asking {path}", describe(error)) from error
+
+    # -- running --------------------------------------------------------------------------------------------------
+
+    def go(
+        self,
+        stop: int | None,
+        *,
+        most: int | None = None,
+        progress: Callable[[float], None] | None = None,
+        pace: Pace | None = None,
+    ) -> str:
+        """Go on until ``stop`` (ns), for ``most`` steps; why there is nothing more to do until then, if so.
+
+        An exception ends the run; one of an actor is raised as ``ActorError``.
+        """
+        self._stop = stop
+        started = time.perf_counter()
+        try:
+            if not self.is_begun:
+                self._begin()
+            with nullcontext() if most == 1 else between_steps(self.director.interrupt):
+                self.stopped = self.director.run(stop, list(self.actors.values()), progress, pace, most)
+        except BaseException as error:
+            self.end()
+            if isinstance(error, ActorError):
+                raise self._placed(error) from _cause(error)
+            raise
+        finally:
+            self._spent += time.perf_counter() - started
+        return self.stopped
+
+    def _begin(self) -> None:
+        self.is_begun = True
+        for path, actor in self.actors.items():
+            actor.enter(self._ways.context_of(path))
+        for actor in self.actors.values():
+            self._call(actor, "initialize")
+            self._initialized.append(actor)
+        self._ways.begin()
+        # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
+        self._ways.open()
+
+    def end(self) -> ActorError | None:
+        """Let every actor wrap up, whatever happened before; the first error of these is returned."""
+        self.is_over = True
+        self._ways.close()
+        if self._tracer is not None:
+            self._tracer.end()
+        first = None
+        for actor in self._initialized:
+            try:
+                self._call(actor, "wrapup")
+            except ActorError as error:
+                first = first or error
+        return first
+
+    def finish(self) -> Results:
+        """End the run; what has come of it."""
+        late = self.end()
+        results = self.results(self.stopped or "the program")
+        late = late or self._unreported
+        if late is not None:
+            raise self._placed(late) from _cause(late)
+        return results
+
+    def results(self, stopped: str) -> Results:
+        """What has come of the run so far; ``stopped`` says why it is over."""
+        end = self.director.last.time
+        if stopped == "stop time" and self._stop is not None:
+            end = max(end, self._stop)  # what stood at the last event stands until then
+        # Of copies, for what is asked of a measurement has an end.
+        outcomes = {name: Copies().of(each).outcome(end) for name, each in self._measurements.items()}
+        return Results(
+            model=self.model.name,
+            seed=self.seed,
+            parameters=dict(self.model.parameters),
+            metrics={name: each.value for name, each in outcomes.items()},
+            aspects=self._figures(),
+            signals=self.signals,
+            log=self.log,
+            end=to_seconds(self.director.last.time),
+            stopped=stopped,
+            firings=self.director.firings,
+            wall_time=self._spent,
+            units=dict(self._units),
+            outcomes=outcomes,
+        )
+
+    def _call(self, actor: Actor, method: str) -> None:
+        try:
+            getattr(actor, method)()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            raise ActorError(actor.path, self.director.tag, f"{method}()", describe(error)) from error
+
+    def _placed(self, error: ActorError) -> ActorError:
+        """The error with the place in the model file where its actor is declared, and the user's line it comes from."""
+        position = self.model.position_of(error.path)
+        where = f"{position.file}:{position.line}:{position.column}" if position else ""
+        return ActorError(error.path, error.tag, error.doing, error.reason, where, raised_at(_cause(error)))
+
+    def _figures(self) -> dict[str, dict[str, float | None]]:
+        """How often each event of each aspect happened, over all its ports, and what the aspect reports."""
+        figures: dict[str, dict[str, float | None]] = {}
+        for woven in self.aspects:
+            total = dict.fromkeys(woven.aspect.events, 0)
+            for point in self._ways.points[woven.name]:
+                for event, number in point.counts.items():
+                    total[event] = total.get(event, 0) + number
+            figures[woven.name] = {**total, **self._report(woven)}
+        return figures
+
+    def _report(self, woven: WovenAspect) -> dict[str, float | None]:
+        """What an aspect reports; if it fails, that is told when all results are there."""
+        try:
+            return dict(woven.aspect.report(self._ways.shared(woven), self.director.last.time))
+        except Exception as error:
+            self._unreported = ActorError(f"aspect {woven.name}", self.director.tag, "report()", describe(error))
+            self._unreported.__cause__ = error
+            return {}
+
+
+def _cause(error: ActorError) -> BaseException | None:
+    """What an actor really raised: SimPy raises a copy of an error, whose cause the error itself is."""
+    cause = error.__cause__
+    while isinstance(cause, ActorError):
+        cause = cause.__cause__
+    return cause

@@ -1,0 +1,474 @@
+"""Ways: the ways that tokens take, from every output port to the ports behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar
+
+from epicycle.actors import (
+    Actor,
+    Context,
+    Emit,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    PortError,
+    Tag,
+    counted,
+    declared_parameters,
+)
+from epicycle.aspects import (
+    ActorPoint,
+    ClockAspect,
+    ExecutionAspect,
+    Job,
+    JoinPoint,
+    JoinPointAspect,
+    Medium,
+    PortAspect,
+    Unit,
+    aspect_stream,
+)
+
+from ..model import Clock, Hop, ModelGraph, WovenAspect, describe
+from ..results import EventLog, Signal, Write
+from .director import ActorError, CrowdError, Director, LoopError
+from .execution import Execution
+from .local_time import Deliver, LocalDirector, Passage
+from .parameters import VaryingParameter
+from .requests import Requests
+
+T = TypeVar("T")
+P = TypeVar("P", bound=JoinPoint)
+
+
+class Ways:
+    """What ``send`` does at each port of a run: through delays, borders and join points to where a token is heard.
+
+    ``actors`` and ``aspects`` are those of the run; of the ``graph`` nothing is changed.
+    ``listeners`` are told of every token that leaves the port of their path, be it an actor's or a composite's.
+    ``signals`` is where aspects record what they see.
+    """
+
+    def __init__(
+        self,
+        graph: ModelGraph,
+        actors: dict[str, Actor],
+        aspects: list[WovenAspect],
+        director: Director,
+        log: EventLog,
+        listeners: dict[str, list[Deliver]],
+        signals: dict[str, Signal],
+    ) -> None:
+        self.graph = graph
+        self.actors = actors
+        self.director = director
+        self.log = log
+        self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in aspects}
+        self._wrong_clocks = [(woven, aspect) for woven in aspects if isinstance(aspect := woven.aspect, ClockAspect)]
+        self._to_begin: list[tuple[WovenAspect, ExecutionAspect, Unit]] = []
+        self._units: dict[tuple[str, str], Unit] = {}
+        self._listeners = listeners
+        self._signals = signals
+        self._points_at: dict[tuple[str, str], JoinPoint] = {}
+        self._woven_at: dict[str, list[WovenAspect]] = {}
+        self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
+        self._requests = {woven.name: Requests(woven) for woven in aspects if woven.model is not None}
+        self._shared: dict[object, dict[Any, Any]] = {}
+        self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
+        for woven in aspects:
+            for path in (*woven.ports, *(woven.actors if isinstance(woven.aspect, ExecutionAspect) else ())):
+                self._woven_at.setdefault(path, []).append(woven)
+            for connection in woven.connections:
+                self._woven_on.setdefault(connection, []).append(woven)
+        for woven in aspects:
+            if woven.model is not None:
+                listeners.setdefault(woven.model.response, []).append(partial(self._answer, woven))
+        for path in dict.fromkeys(path for woven in aspects for path in woven.looks_at):
+            listeners.setdefault(path, []).append(partial(self._latest.__setitem__, path))
+        self._directors: dict[str, Director | LocalDirector] = {}
+        self._passages: dict[str, Passage] = {}
+        for composite, clock in self.graph.clocks.items():
+            self._directors[composite] = director if clock.is_global else LocalDirector(director, clock)
+            for paths in self.graph.borders(composite):
+                self._passages.update({path: Passage(path, director) for path in paths})
+        changed = {path.rpartition(".")[0] for woven in aspects for path in woven.parameters}
+        self._executions = {
+            path: Execution(actor, director, self._by_clock(path))
+            for path, actor in actors.items()
+            if path in self._woven_at or path in changed
+        }
+        self._emits = self._find()
+        self._varying: list[VaryingParameter] = []
+        self._vary_parameters(aspects)
+        for path, execution in self._executions.items():
+            execution.way = self._scheduled(path, execution.execute)
+            execution.forget = partial(self._forget, path)
+
+    def _vary_parameters(self, aspects: list[WovenAspect]) -> None:
+        """Let the aspects that stand at a parameter change it before each firing of its actor."""
+        standing: dict[str, list[WovenAspect]] = {}
+        for woven in aspects:
+            for path in woven.parameters:
+                standing.setdefault(path, []).append(woven)
+        for path, there in standing.items():
+            owner, _, name = path.rpartition(".")
+            actor = self.actors[owner]
+            varying = VaryingParameter(actor, declared_parameters(type(actor))[name])
+            entry: Deliver = varying.set
+            for woven in reversed(there):
+                entry = self._through(woven, path, path, entry)
+            self._executions[owner].refresh.append(partial(entry, varying.nominal))
+            self._varying.append(varying)
+
+    def director_of(self, path: str) -> Director | LocalDirector:
+        """The director that an actor or composite stands under, with its time."""
+        return self._directors[self.graph.director_of(path)]
+
+    def context_of(self, path: str) -> Context:
+        """What an actor sees of the run."""
+        return self._executions.get(path) or self._by_clock(path)
+
+    def _by_clock(self, path: str) -> Director | LocalDirector:
+        """The director by the clock of an actor, if that is wrong."""
+        clock = before = self.graph.clocks[self.graph.director_of(path)]
+        for woven, aspect in self._wrong_clocks:
+            if path in woven.actors:
+                try:
+                    ahead, speed = aspect.error(aspect_stream(self.director.seed, woven.actors[path], woven.name))
+                except Exception as error:
+                    raise self._error(woven, f"error() at {path}", error) from error
+                clock = Clock(clock.start + ahead, clock.rate * speed)
+        if clock == before:
+            return self.director_of(path)
+        return self.director if clock.is_global else LocalDirector(self.director, clock)
+
+    def open(self) -> None:
+        """From now on tokens can be sent."""
+        for output, emit in self._emits:
+            output.connect(emit)
+
+    def close(self) -> None:
+        """From now on none can."""
+        for output, _ in self._emits:
+            output.disconnect()
+        for varying in self._varying:
+            varying.restore()
+
+    def _find(self) -> list[tuple[OutputPort[Any], Emit]]:
+        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
+        channels: dict[tuple[Hop, ...], int] = {}
+        for actor in self.actors.values():
+            for port in actor.inputs.values():
+                wires = self.graph.wires_to(port)
+                port.width = len(wires)
+                channels.update({wire.hops: channel for channel, wire in enumerate(wires)})
+        emits = [
+            (output, self._emit(output, channels))
+            for actor in self.actors.values()
+            for output in actor.outputs.values()
+        ]
+        self._open_requests(channels)
+        return emits
+
+    def _open_requests(self, channels: dict[tuple[Hop, ...], int]) -> None:
+        """Find the ways from the request ports of aspects that are models to the actors inside."""
+        ways: dict[str, Deliver] = {}
+        for requests in self._requests.values():
+            for place, path in requests.model.requests.items():
+                if path not in ways:
+                    ways[path] = _all(self._branches(path, (), channels))
+                passage = self._passages.get(path)
+                onward = ways[path] if passage is None else passage.lane(place, ways[path])
+                requests.entries[place] = self._woven(path, path, onward)
+
+    def _emit(self, port: OutputPort[Any], channels: dict[tuple[Hop, ...], int]) -> Emit:
+        """What ``port.send`` does."""
+        listeners = self._listeners.get(port.path, [])
+        everywhere = _all(listeners + self._branches(port.path, (), channels))
+        wires = self.graph.wires_from(port)
+        # To single channels, made when the first token takes them: few ever do.
+        ways: dict[int, tuple[Write, Deliver]] = {}
+        port.width = len(wires)
+        log, director, path, name = self.log, self.director, port.actor.path, port.name
+        write = log.writer("send", path, name, None, "")
+
+        def emit_one(token: Any, channel: int | None = None) -> None:
+            if channel is None:
+                write(director.present or director.tag, token)
+                everywhere(token)
+                return
+            way = ways.get(channel)
+            if way is None:
+                if not 0 <= channel < len(wires):
+                    known = f"it has {counted(len(wires), 'channel')}, counted from 0"
+                    raise PortError(f"{port.path} has no channel {channel}: {known}")
+                hops = wires[channel].hops
+                along = _all([*listeners, self._way(hops, channels[hops])])
+                way = ways[channel] = log.writer("send", path, name, channel, ""), along
+            write_one, onward = way
+            write_one(director.present or director.tag, token)
+            onward(token)
+
+        # An aspect at an output stands before the send itself: what it drops has not been sent.
+        if port.path not in self._woven_at:
+            return emit_one
+        entries: dict[int | None, Deliver] = {}
+
+        def emit_woven(token: Any, channel: int | None = None) -> None:
+            entry = entries.get(channel)
+            if entry is None:
+                # The channel of a send travels past the aspects in this closure, for they may forward it later.
+                entry = entries[channel] = self._woven(port.path, port.path, lambda passed: emit_one(passed, channel))
+            entry(token)
+
+        return emit_woven
+
+    def _branches(self, path: str, hops: tuple[Hop, ...], channels: dict[tuple[Hop, ...], int]) -> list[Deliver]:
+        """The ways onward from a port, one for each connection that leaves it."""
+        ways = []
+        for hop in self.graph.outgoing(path):
+            far, taken = hop.destination, (*hops, hop)
+            port = self.graph.ports.nodes[far]["port"]
+            if isinstance(port, InputPort):
+                onward = self._put(far, channels[taken])
+            else:
+                onward = _all(self._listeners.get(far, []) + self._branches(far, taken, channels))
+            ways.append(self._over(hop, onward, taken))
+        return ways
+
+    def _way(self, hops: tuple[Hop, ...], channel: int) -> Deliver:
+        """The way along one wire alone, for tokens that are sent to one channel."""
+        onward = self._put(hops[-1].destination, channel)
+        for hop in reversed(hops):
+            onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]), hops)
+        return onward
+
+    def _over(self, hop: Hop, onward: Deliver, channel: tuple[Hop, ...]) -> Deliver:
+        """One connection: its delay, and the aspects and the passage at its far end."""
+        far = hop.destination
+        passage = self._passages.get(far)
+        is_output = self.graph.direction(far) == "output"
+        source = far if is_output else hop.source
+        # Aspects at a port of a composite stand outside of it.
+        if passage is not None and not is_output:
+            onward = self._woven(far, source, passage.lane(channel, onward))
+        elif passage is not None:
+            onward = passage.lane(channel, self._woven(far, source, onward))
+        else:
+            onward = self._woven(far, source, onward)
+        for woven in reversed(self._woven_on.get((hop.source, far), [])):
+            onward = self._through(woven, far, source, onward, f"{hop.source} -> {far}")
+        return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
+
+    def _put(self, path: str, channel: int) -> Deliver:
+        owner, _, name = path.rpartition(".")
+        port, execution = self.actors[owner].inputs[name], self._executions.get(owner)
+        return self.director.entry(port, channel, None if execution is None else execution.turn_of(port))
+
+    def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:
+        later = self._directors[self.graph.director_over(hop)].later
+        return lambda token: later(delay, onward, token)
+
+    def _woven(self, path: str, source: str, onward: Deliver) -> Deliver:
+        """``onward`` with the aspects that stand at a port before it, the first declared outermost."""
+        for woven in reversed(self._woven_at.get(path, [])):
+            onward = self._through(woven, path, source, onward)
+        return onward
+
+    def _through(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str = "") -> Deliver:
+        """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
+        aspect = woven.aspect
+        assert isinstance(aspect, PortAspect)
+        point = self._point(JoinPoint, woven, aspect, path, onward, place or path, source)
+        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()")
+
+    def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
+        """``onward`` with the aspects that stand at an actor before it, the first declared outermost."""
+        for woven in reversed(self._woven_at.get(path, [])):
+            aspect = woven.aspect
+            assert isinstance(aspect, ExecutionAspect)
+            point = self._point(ActorPoint, woven, aspect, path, onward, path)
+            self._join(point, woven, aspect)
+            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()")
+        return onward
+
+    def _guarded(
+        self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
+    ) -> Callable[[T], None]:
+        """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
+        path = point.port
+
+        def through(passing: T) -> None:
+            try:
+                act(passing, point)
+            except (ActorError, LoopError):  # of what comes behind it
+                raise
+            except Exception as error:
+                raise self._error(woven, f"{name} at {path}", error) from error
+
+        if aspect.is_always_active:
+            return through
+
+        def through_if_active(passing: T) -> None:
+            doing = "is_due()"
+            try:
+                if aspect.is_due(point.tag.time) and self._holds(woven, aspect, point):
+                    through(passing)
+                else:
+                    doing = "pass_by()"
+                    aspect.pass_by(passing, point)
+            except (ActorError, LoopError):  # of what comes behind it
+                raise
+            except Exception as error:
+                raise self._error(woven, f"{doing} at {path}", error) from error
+
+        return through_if_active
+
+    def _answer(self, woven: WovenAspect, request: Any) -> None:
+        """Let a token go on that has come through an aspect's composite."""
+        try:
+            self._requests[woven.name].answer(request)
+        except (ActorError, LoopError):  # of what comes behind it
+            raise
+        except EpicycleError as error:
+            raise self._error(woven, "delivering", error) from None
+
+    def _holds(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
+        """Whether the ``when`` of an aspect is true of what the ports have sent last; before they have, it is not."""
+        if aspect.when is None:
+            return True
+        try:
+            return bool(point.value_of(aspect.when))
+        except EpicycleError as error:
+            raise self._error(woven, "when", error) from None
+
+    def _error(self, woven: WovenAspect, doing: str, error: Exception) -> ActorError:
+        return ActorError(f"aspect {woven.name}", self.director.tag, doing, describe(error))
+
+    def shared(self, woven: WovenAspect) -> dict[Any, Any]:
+        """What an aspect remembers for all its ports; one for all declarations of a medium."""
+        key: object = woven.name
+        if isinstance(woven.aspect, Medium) and woven.aspect.medium is not None:
+            key = (type(woven.aspect), woven.name.rpartition(".")[0], woven.aspect.medium)
+        return self._shared.setdefault(key, {})
+
+    def _point(
+        self,
+        kind: type[P],
+        woven: WovenAspect,
+        aspect: JoinPointAspect[T, P],
+        path: str,
+        onward: Callable[[T], None],
+        place: str,
+        source: str = "",
+    ) -> P:
+        """Where an aspect stands: at a port or parameter, or at an actor."""
+        name, owner = woven.name, path if kind is ActorPoint else self.graph.owner(path)
+        local = self.director if aspect.in_model_time else self.director_of(owner)
+        blame = partial(self._error, woven, f"later() at {path}")
+        context = EngineContext(local, self.director, self.log, self._latest, self._signals, blame)
+        point = kind(name, path, context, onward, self.shared(woven), place, woven.readings, source, woven.selections)
+        if woven.model is not None:
+            point.enter = self._requests[name].add_way(point, place)
+        first = self._points_at.setdefault((name, place), point)
+        if first is point:
+            self.points[name].append(point)
+        else:
+            point.share(first)
+        return point
+
+    def _join(self, point: ActorPoint, woven: WovenAspect, aspect: ExecutionAspect) -> None:
+        """Make the join point of an actor part of what the aspect was aimed at."""
+        aimed = woven.name, woven.actors[point.port]
+        if aimed not in self._units:
+            self._units[aimed] = Unit(aimed[1], point)
+            self.points[woven.name].append(self._units[aimed])
+            self._to_begin.append((woven, aspect, self._units[aimed]))
+        point.keeper, point.unit = self._executions[point.port], self._units[aimed]
+        point.unit.points.append(point)
+
+    def _forget(self, path: str) -> None:
+        """Tell the aspects at an actor that it has lost its state."""
+        for woven in self._woven_at.get(path, ()):
+            aspect, point = woven.aspect, self._points_at[woven.name, path]
+            assert isinstance(aspect, ExecutionAspect)
+            assert isinstance(point, ActorPoint)
+            try:
+                aspect.forget(point)
+            except Exception as error:
+                raise self._error(woven, f"forget() at {path}", error) from error
+
+    def begin(self) -> None:
+        """Let the aspects begin that act of their own accord."""
+        for woven, aspect, unit in self._to_begin:
+            try:
+                aspect.begin(unit)
+            except (ActorError, LoopError):
+                raise
+            except Exception as error:
+                raise self._error(woven, f"begin() at {unit.port}", error) from error
+
+
+class EngineContext:
+    """What the engine offers to a join point: the time of the director that it stands under, the log and signals."""
+
+    def __init__(
+        self,
+        local: Director | LocalDirector,
+        director: Director,
+        log: EventLog,
+        latest: dict[str, Any],
+        signals: dict[str, Signal],
+        blame: Callable[[Exception], ActorError],
+    ) -> None:
+        self.seed = director.seed
+        self.latest = latest.get
+        self.stop = director.stop
+        self.hold = director.hold
+        self._blame = blame
+        self._local = local
+        self._director = director
+        self._log = log
+        self._signals = signals
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag."""
+        return self._local.tag
+
+    def later(self, delay: int, deliver: Deliver, token: Any) -> None:
+        """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
+        try:
+            self._local.later(delay, partial(self._deliver, deliver), token)
+        except CrowdError as error:
+            raise error.of(self._blame(error).path) from None
+
+    def _deliver(self, deliver: Deliver, token: Any) -> None:
+        try:
+            deliver(token)
+        except (ActorError, LoopError):  # of what comes behind it
+            raise
+        except Exception as error:
+            raise self._blame(error) from error
+
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        """Write an act of an aspect into the log."""
+        self._log.add(self._director.tag, event, owner, port, None, aspect, token)
+
+    def record(self, signal: str, token: Any) -> None:
+        """Append a token to a signal of the results."""
+        self._signals.setdefault(signal, Signal(signal)).add(self._director.tag, token)
+
+
+def _all(ways: list[Deliver]) -> Deliver:
+    """One way that takes all of them."""
+    if len(ways) == 1:
+        return ways[0]
+
+    def onward(token: Any) -> None:
+        for way in ways:
+            way(token)
+
+    return onward

@@ -1,0 +1,83 @@
+"""A page of HTML from nested elements; whatever is text is escaped, and what would hide in it is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+from typing import TypeAlias
+
+from epicycle.actors import visible_lines
+
+_VOID = frozenset({"img", "meta", "br"})
+
+
+class Html(str):
+    """Text that is HTML already."""
+
+    __slots__ = ()
+
+
+Content: TypeAlias = "str | Html | Iterable[Content] | None"
+
+
+def html(content: Content) -> Html:
+    """Escape what is text; what is HTML stays, lists are put together, and None is nothing."""
+    if content is None:
+        return Html("")
+    if isinstance(content, Html):
+        return content
+    if isinstance(content, str):
+        return Html(escape(visible_lines(content)))
+    return Html("".join(html(each) for each in content))
+
+
+def tag(element: str, /, *content: Content, **attributes: str | None) -> Html:
+    """An element; ``class_`` is the attribute 'class', and an attribute that is None is left out."""
+    said = "".join(f' {key.rstrip("_")}="{escape(value)}"' for key, value in attributes.items() if value is not None)
+    inner = html(content)
+    return Html(f"<{element}{said}>" if element in _VOID else f"<{element}{said}>{inner}</{element}>")
+
+
+def table(
+    head: Iterable[Content],
+    rows: Iterable[Iterable[Content]],
+    *,
+    names: int = 1,
+    class_: str | None = None,
+    scopes: bool = True,
+) -> Html:
+    """A table whose first ``names`` columns are what the others are about; ``scopes``: it says so to screen readers."""
+
+    def heading(cell: Content, scope: str) -> Html:
+        return tag("th", cell, scope=scope if scopes else None)
+
+    body = [
+        tag("tr", [heading(cell, "row") if at < names else tag("td", cell) for at, cell in enumerate(row)])
+        for row in rows
+    ]
+    header = tag("tr", [heading(cell, "col") for cell in head])
+    return tag("table", tag("thead", header), tag("tbody", body), class_=class_)
+
+
+def wide_table(
+    head: Iterable[Content], rows: Iterable[Iterable[Content]], *, names: int = 1, class_: str | None = None
+) -> Html:
+    """A table that is scrolled by itself where the page is narrower."""
+    return tag("div", table(head, rows, names=names, class_=class_), class_="scroll")
+
+
+def note(text: str) -> Html:
+    """A paragraph that explains."""
+    return tag("p", text, class_="note")
+
+
+def page(title: str, style: str, *content: Content) -> str:
+    """A whole document, which loads nothing from anywhere."""
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", title),
+        tag("style", Html(style)),
+    )
+    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', content), lang='en')}\n"

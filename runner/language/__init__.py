@@ -1,0 +1,98 @@
+"""What a file says: models, composites, disturbances, studies and what is set from outside, as declared constructs."""
+
+from .claims import ALWAYS, FALLS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection
+from .declarations import (
+    CompositeText,
+    ConnectionText,
+    MetricText,
+    ModelText,
+    ParameterText,
+    PartText,
+    PointcutText,
+    PortText,
+)
+from .dimensions import Dimension, Factor, Level, Listed, Ranged, in_si, split_number
+from .disturbance import (
+    COMPOSITE_THERE,
+    PARAMETER_THERE,
+    Disturbance,
+    add_disturbances,
+    joined,
+    load_disturbance,
+    load_disturbances,
+)
+from .files import find_model, read_library, read_model
+from .inheritance import inherit
+from .models import DeclarationReader
+from .schema import CONSTRUCTS, json_schema, schema_text
+from .settings import Setting, Settings, change_aspect, parse_setting, put_aspect, read_overrides, settings_in, without
+from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, find_study, is_study, read_study, study_of_text
+from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
+from .usage import check_own_usage, check_usage
+from .values import Values
+
+__all__ = [
+    "ALWAYS",
+    "ASPECTS",
+    "COMPOSITE_THERE",
+    "CONSTRUCTS",
+    "FALLS",
+    "GREATER",
+    "LESS",
+    "MAX_REPLICATIONS",
+    "MAX_STUDY_SEED",
+    "NUMBERS",
+    "PARAMETER_THERE",
+    "RESERVED",
+    "RISES",
+    "SIGNALS",
+    "Claim",
+    "CompositeText",
+    "ConnectionText",
+    "DeclarationReader",
+    "Dimension",
+    "Disturbance",
+    "Factor",
+    "Guideline",
+    "Level",
+    "Listed",
+    "MetricText",
+    "ModelText",
+    "ParameterText",
+    "PartText",
+    "PointcutText",
+    "PortText",
+    "Questions",
+    "Ranged",
+    "Selection",
+    "Setting",
+    "Settings",
+    "Study",
+    "StudyMetric",
+    "Values",
+    "add_disturbances",
+    "asks_for_none",
+    "change_aspect",
+    "check_own_usage",
+    "check_usage",
+    "find_model",
+    "find_study",
+    "in_si",
+    "inherit",
+    "is_study",
+    "joined",
+    "json_schema",
+    "load_disturbance",
+    "load_disturbances",
+    "parse_setting",
+    "put_aspect",
+    "read_library",
+    "read_model",
+    "read_overrides",
+    "read_study",
+    "schema_text",
+    "settings_in",
+    "split_number",
+    "study_of_text",
+    "without",
+]

@@ -1,0 +1,140 @@
+"""What a file says, as objects: models, composite classes and their parts, each with its place in the text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from epicycle.aspects import FiringTime
+
+from ..text import Entry, Node, Position, Text
+
+
+@dataclass(frozen=True)
+class ParameterText:
+    """A parameter that a model or composite declares."""
+
+    name: str
+    position: Position
+    value: Node | None = None
+    unit: str = ""
+    min: float | None = None
+    max: float | None = None
+    choices: tuple[str, ...] = ()
+    doc: str = ""
+    spoilt: bool = False  # the declaration is wrong and has been told so: values are not checked against it
+    given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
+
+
+@dataclass(frozen=True)
+class PortText:
+    """A port that a composite declares; without a type it is as the ports that are connected to it."""
+
+    name: str
+    position: Position
+    type: Text | None = None
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class PointcutText:
+    """Where an aspect stands: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
+
+    For an aspect that is a model, ``request`` is the port by which tokens or firings come in, ``time`` says that it
+    stands at actors and how long their firings take; ``firing_time`` is its value.
+    One that holds neither pattern, type nor tag is misshapen, and has been told so.
+    """
+
+    text: str
+    position: Position
+    exclude: bool = False
+    type: Text | None = None
+    tag: Text | None = None
+    port: Text | None = None
+    parameter: Text | None = None
+    request: Text | None = None
+    time: Node | None = None
+    firing_time: FiringTime = 0.0
+
+    @classmethod
+    def of(cls, text: Text) -> PointcutText:
+        """``pattern``, or ``!pattern`` for where an aspect does not stand."""
+        pattern = text.text.strip()
+        exclude = pattern.startswith("!")
+        return cls(pattern[1:].strip() if exclude else pattern, text.position, exclude)
+
+
+@dataclass(frozen=True)
+class PartText:
+    """An actor, aspect or figure: a type and values for its parameters.
+
+    In a class that extends another, the type may be empty, which leaves the inherited one.
+    """
+
+    name: str
+    position: Position
+    type: Text
+    values: dict[str, Entry] = field(default_factory=dict)
+    count: Node | None = None
+    at: tuple[PointcutText, ...] = ()
+    enabled: Node | None = None
+    priority: Node | None = None
+    removes: bool = False  # it takes the inherited part of that name away
+    tags: tuple[Text, ...] = ()
+
+
+@dataclass(frozen=True)
+class ConnectionText:
+    """One entry of ``connections``; with ``to_all``, of several on both sides each goes to all, else in pairs."""
+
+    sources: tuple[Text, ...]
+    destinations: tuple[Text, ...]
+    position: Position
+    delay: Node | None = None
+    to_all: bool = False
+    removes: Position | None = None  # where it is said that these are taken away from the inherited ones
+
+
+@dataclass(frozen=True)
+class MetricText:
+    """A number taken from what a port sends; ``values`` are those of a ``Measure``."""
+
+    name: str
+    port: Text
+    values: dict[str, Entry]
+    position: Position
+
+
+@dataclass(frozen=True)
+class CompositeText:
+    """A composite class, or the model itself, which is the outermost one."""
+
+    name: str
+    position: Position
+    doc: str = ""
+    extends: Text | None = None
+    parameters: dict[str, ParameterText] = field(default_factory=dict)
+    inputs: dict[str, PortText] = field(default_factory=dict)
+    outputs: dict[str, PortText] = field(default_factory=dict)
+    director: dict[str, Entry] | None = None  # what is said of its own one
+    actors: dict[str, PartText] = field(default_factory=dict)
+    connections: tuple[ConnectionText, ...] = ()
+    is_wired: bool = True  # whether all its connections could be read
+    aspects: dict[str, PartText] = field(default_factory=dict)
+    removed: dict[str, Position] = field(default_factory=dict)  # inherited actors that it does without
+    spoilt: bool = False  # it could not be read as a whole, or made from its base: what is missing is no news
+
+    def ports(self, direction: str) -> dict[str, PortText]:
+        """Its ``input`` or ``output`` ports."""
+        return self.inputs if direction == "input" else self.outputs
+
+
+@dataclass(frozen=True)
+class ModelText:
+    """A whole model file, without what it includes."""
+
+    root: CompositeText
+    include: tuple[Text, ...] = ()
+    composites: dict[str, CompositeText] = field(default_factory=dict)
+    run: dict[str, Entry] = field(default_factory=dict)
+    metrics: tuple[MetricText, ...] = ()
+    figures: dict[str, PartText] = field(default_factory=dict)

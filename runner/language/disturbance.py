@@ -1,0 +1,129 @@
+"""Disturbances: aspects in files of their own, which are added to a model from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TypeVar
+
+from ..catalogue import find, packaged_disturbances
+from ..text import Mapping, Node, NodeReader, Problems, read
+from .declarations import CompositeText, ModelText, ParameterText
+from .fields import NAMED, Construct, Key
+from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, parts
+from .settings import Setting, put_aspect, settings_like
+from .usage import check_own_usage
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A file of aspects, with parameters and classes of their own and values for parameters of the model."""
+
+    text: CompositeText
+    composites: dict[str, CompositeText] = field(default_factory=dict)
+    settings: tuple[Setting, ...] = ()
+
+
+T = TypeVar("T", CompositeText, ParameterText)
+PARAMETER_THERE, COMPOSITE_THERE = "the model has a parameter {!r} already", "there is a composite {!r} already"
+
+# Its aspects may take over the ports of those whose places they take.
+DISTURBANCE = Construct(
+    "Aspects in a file of their own, to be added to a model.",
+    {
+        "disturbance": Key(
+            NAMED,
+            "The name of the disturbance.",
+            "the disturbance's name",
+            missing=(
+                "the disturbance has no name",
+                "begin the file with a line like 'disturbance: my_disturbance'",
+            ),
+            name="name",
+        ),
+        "doc": DOC,
+        "set": Key(
+            settings_like("observer[*].sensor.max_range: 5 m"),
+            "Values for parameters of the model: 'path: value', as for --set.",
+        ),
+        "parameters": PARAMETERS,
+        "composites": COMPOSITES,
+        "aspects": Key(parts("aspect", "added_aspect"), ASPECTS.doc),
+    },
+)
+
+
+def find_disturbance(name: str, problems: Problems) -> Path | None:
+    """The file of a disturbance: a path if it looks like one, otherwise a packaged disturbance's name."""
+    return find(name, "disturbance", packaged_disturbances, problems)
+
+
+def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
+    """A disturbance by its name or path; None if it cannot be read at all."""
+    path = find_disturbance(name, problems)
+    node = None if path is None else read(path, problems)
+    return None if node is None else _declared(node, problems)
+
+
+def _declared(node: Node, problems: Problems) -> Disturbance | None:
+    """What a file declares; whatever is misshapen is a problem and left out."""
+    if isinstance(node, Mapping) and "model" in node.entries and "disturbance" not in node.entries:
+        problems.add(
+            f"{node.position.file} is a model, not a disturbance",
+            node.entries["model"].key.position,
+            "a disturbance begins with a line like 'disturbance: my_disturbance'",
+        )
+        return None
+    reader = NodeReader(problems)
+    entries = DISTURBANCE.entries(reader, node, "the disturbance")
+    if entries is None:
+        return None
+    before = len(problems)
+    said = DISTURBANCE.values(reader, entries, "the disturbance", node.position)
+    composites, settings = said.pop("composites", {}), said.pop("set", ())
+    text = CompositeText(said.pop("name", "disturbance"), node.position, **said)
+    if len(problems) == before:
+        check_own_usage(text, problems)
+    return Disturbance(text, composites, settings)
+
+
+def load_disturbances(names: Iterable[str], problems: Problems) -> list[Disturbance]:
+    """Disturbances by their names or paths."""
+    found: dict[str, Disturbance | None] = {}
+    for name in names:
+        if name in found:
+            problems.add(f"the disturbance {name} is given twice", None, "leave one of them out")
+        else:
+            found[name] = load_disturbance(name, problems)
+    return [disturbance for disturbance in found.values() if disturbance is not None]
+
+
+def add_disturbances(
+    text: ModelText, disturbances: Iterable[Disturbance], problems: Problems
+) -> tuple[ModelText, list[Setting]]:
+    """A model with what disturbances hold, and what they set of the model's own parameters.
+
+    Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
+    after the model's own, but one that has the name of another stands in its place.
+    """
+    settings: list[Setting] = []
+    for disturbance in disturbances:
+        parameters = joined(text.root.parameters, disturbance.text.parameters, PARAMETER_THERE, problems)
+        text = replace(text, root=replace(text.root, parameters=parameters))
+        for part in disturbance.text.aspects.values():
+            text = put_aspect(text, part)
+        settings += disturbance.settings
+    return text, settings
+
+
+def joined(known: dict[str, T], more: dict[str, T], message: str, problems: Problems) -> dict[str, T]:
+    """What two files declare; of two things of one name the first one counts, and the second is a problem."""
+    for name, second in more.items():
+        if (first := known.get(name)) is not None:
+            problems.add(
+                message.format(name),
+                second.position,
+                f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
+            )
+    return {**known, **more, **known}

@@ -1,0 +1,205 @@
+"""What the language is declared with: shapes, keys and constructs.
+
+A key of the language is declared once.  From it come what reads its value, what is told of a wrong, unknown or missing
+one, and what the JSON Schema says of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from epicycle.actors import Parameter, ParameterError
+
+from ..catalogue import as_written
+from ..text import Entry, Node, NodeReader, Position, Scalar, Sequence, Text, is_empty
+
+Schema: TypeAlias = dict[str, Any]
+
+NAME = "[A-Za-z_][A-Za-z0-9_]*"
+EXPRESSION = r"\$\{"
+NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
+QUANTITY = rf"^\s*{NUMBER}\s*([A-Za-z%°µμ1(].*)?$"
+
+
+# -- schemas ------------------------------------------------------------------------------------------------------
+
+
+def ref(name: str) -> Schema:
+    """What ``$defs`` says under a name."""
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def looks_like(pattern: str, message: str) -> Schema:
+    """What a text must look like; the message is what editors show, which would be the pattern otherwise."""
+    return {"pattern": pattern, "patternErrorMessage": message}
+
+
+def one_or_more(item: Schema) -> Schema:
+    """One, or a list; empty entries are left out."""
+    return {"anyOf": [item, {"type": "array", "items": {"anyOf": [item, {"type": "null"}]}}, {"type": "null"}]}
+
+
+def names_of(item: Schema) -> Schema:
+    """A mapping from names; nothing at all counts as empty."""
+    return {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": item}
+
+
+def computed(kind: str, low: float | None = None, high: float | None = None, unit: str = "") -> Schema:
+    """A number within bounds, a text with a unit, or an expression."""
+    article = "an" if kind == "integer" else "a"
+    found: Schema = {"type": [kind, "string"], **looks_like(EXPRESSION, f"expected {article} {kind}")}
+    if unit or kind == "number":
+        where = "" if unit in ("", "1") else f" in {unit}"
+        found |= looks_like(f"{EXPRESSION}|{QUANTITY}", f"expected {article} {kind}{where}, alone or with its unit")
+    for key, bound in (("minimum", low), ("maximum", high)):
+        if bound is not None and math.isfinite(bound):
+            found[key] = as_written(bound)
+    return found
+
+
+# -- shapes -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What may stand somewhere.
+
+    ``read`` takes a reader, a node and what messages call it; it gives the value, or None if there is none or what is
+    wrong with it has been told.
+    """
+
+    schema: Schema
+    read: Callable[[Any, Node, str], Any]
+
+    def described(self, schema: Schema) -> Shape:
+        """The same with another schema."""
+        return Shape(schema, self.read)
+
+
+def _positioned(reader: NodeReader, node: Node, what: str) -> Text | None:
+    said = reader.text(node, what)
+    return None if said is None else Text(said, node.position)
+
+
+def _flag(reader: NodeReader, node: Node, what: str) -> bool | None:
+    if isinstance(node, Scalar) and isinstance(node.value, bool):
+        return node.value
+    reader.problems.add(f"{what} is neither true nor false", node.position)
+    return None
+
+
+def _names(reader: NodeReader, node: Node, what: str) -> tuple[Text, ...]:
+    return tuple(reader.texts(node, what))
+
+
+def node_as(schema: Schema) -> Shape:
+    """A node as it is, for a value that may be computed, or that others read."""
+    return Shape(schema, lambda reader, node, what: node)
+
+
+def number(kind: type, low: float | None = None, high: float | None = None) -> Shape:
+    """A number that is written out."""
+    parameter: Parameter[Any] = Parameter(kind, min=low, max=high)
+    schema: Schema = {"type": "integer" if kind is int else "number"}
+    schema |= {key: as_written(bound) for key, bound in (("minimum", low), ("maximum", high)) if bound is not None}
+
+    def read(reader: NodeReader, node: Node, what: str) -> Any:
+        try:
+            return parameter.convert(node.value if isinstance(node, Scalar) else "a list")
+        except ParameterError as error:
+            reader.problems.add(f"{what}: {error}", node.position)
+            return None
+
+    return Shape(schema, read)
+
+
+def named(schema: Schema, read: Callable[[Any, str, Entry], Any]) -> Shape:
+    """A mapping from names to things, each read with its name; those that cannot be read are left out."""
+
+    def read_all(reader: NodeReader, node: Node, what: str) -> dict[str, Any]:
+        found = {name: read(reader, name, entry) for name, entry in reader.named(node, what)}
+        return {name: each for name, each in found.items() if each is not None}
+
+    return Shape(names_of(schema), read_all)
+
+
+QUANTITY_SCHEMA: Schema = {
+    "type": ["number", "string"],
+    **looks_like(QUANTITY, "expected a number, alone or with its unit"),
+}
+LABEL: Schema = {"type": ["string", "number", "boolean", "null"]}  # any single value, taken as it is written
+TEXT = Shape(ref("text"), NodeReader.text)
+NAMED = Shape(ref("name"), NodeReader.name)
+AT = Shape(ref("text"), _positioned)  # a text with its place
+TEXTS = Shape(one_or_more({"type": "string"}), _names)
+FLAG = Shape({"type": "boolean"}, _flag)
+
+
+# -- constructs ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a construct: what stands there, and what it means.
+
+    In ``called``, which is how messages call the value, and in ``missing``, which is what they say and advise if there
+    is none, ``{what}`` is the construct and ``{key}`` the key.  ``name`` is the attribute of the object that is made,
+    if that is not called as the key.
+    """
+
+    shape: Shape
+    doc: str
+    called: str = "{key}"
+    missing: tuple[str, ...] = ()
+    name: str = ""
+
+    @property
+    def schema(self) -> Schema:
+        """What editors know of it."""
+        return {**self.shape.schema, "description": self.doc}
+
+
+class Construct:
+    """A mapping with these keys and no others; ``rules`` are what else its schema says."""
+
+    def __init__(self, doc: str, keys: Mapping[str, Key], **rules: Any) -> None:
+        self.doc = doc
+        self.keys = dict(keys)
+        self.rules = rules
+
+    @property
+    def schema(self) -> Schema:
+        """What editors know of it."""
+        properties = {key: each.schema for key, each in self.keys.items()}
+        found: Schema = {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
+        return {**({"description": self.doc} if self.doc else {}), **found, **self.rules}
+
+    def entries(self, reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | None:
+        """What is written under its keys, unknown ones told; None if it is no mapping."""
+        return reader.entries(node, what, tuple(self.keys))
+
+    def values(self, reader: NodeReader, entries: Mapping[str, Entry], what: str, at: Position) -> dict[str, Any]:
+        """What its keys say, by attribute; what is missing is told ``at`` a place, what cannot be read is left out."""
+        found = {}
+        for key, each in self.keys.items():
+            if key in entries and not (each.missing and is_empty(entries[key].value)):
+                value = each.shape.read(reader, entries[key].value, each.called.format(what=what, key=key))
+                if value is not None:
+                    found[each.name or key] = value
+            elif each.missing:
+                message, *hints = (said.format(what=what, key=key) for said in each.missing)
+                reader.problems.add(message, at, *hints)
+        return found
+
+    def read(self, reader: NodeReader, node: Node, what: str, at: Position | None = None) -> dict[str, Any] | None:
+        """What a node says, by attribute; None if it is no mapping."""
+        entries = self.entries(reader, node, what)
+        return None if entries is None else self.values(reader, entries, what, at or node.position)
+
+
+def items_of(node: Node) -> tuple[Node, ...]:
+    """The items of a list, or what stands in place of one."""
+    return node.items if isinstance(node, Sequence) else (node,)

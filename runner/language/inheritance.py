@@ -1,0 +1,237 @@
+"""``extends``: a composite class that takes another one over and changes it.
+
+What a class says comes on top of what its base says, name by name:
+
+- a parameter or port of the base's stays; the keys that are given anew (a default, a bound, a type) replace the old;
+- an actor or aspect with the same ``type``, or none, keeps its values but for those given anew; another ``type`` drops
+  the old values and keeps its place: ``count``, ``priority``, ``at``, ``enabled``, ``tags``; ``name: null`` takes it
+  away, with the base's connections to it and the pointcuts at it;
+- connections are added; ``remove: a.out -> b.in`` takes one of the base's away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from ..text import NORMAL, RAISE_IT, Limits, Position, Problems, Text, did_you_mean
+from .declarations import CompositeText, ConnectionText, PartText, PointcutText, PortText
+
+MAX_BASES = 50
+
+
+def inherit(
+    composites: dict[str, CompositeText],
+    actor_types: Collection[str],
+    problems: Problems,
+    limits: Limits = NORMAL,
+) -> tuple[dict[str, CompositeText], set[str]]:
+    """The classes with what they inherit, and the names of those that cannot be made for lack of a base."""
+    whole = {name: text for name, text in composites.items() if text.extends is None}
+    broken: set[str] = set()
+    inherited = 0
+    for each in composites:
+        name = each
+        # From the class up to the first base that is done with, then back down: no recursion, however long the way.
+        way: list[CompositeText] = []
+        while name not in whole and name not in broken:
+            text = composites[name]
+            base = text.extends
+            assert base is not None
+            way.append(text)
+            if not _is_sound(way, composites, actor_types, problems):
+                broken.update(text.name for text in way)
+                break
+            name = base.text
+        for text in reversed(way):
+            base = text.extends
+            assert base is not None
+            if base.text in broken:
+                broken.add(text.name)
+            if text.name not in broken:
+                inherited += _size(whole[base.text])
+                if inherited > limits.inherited:
+                    most = f"{limits.inherited:,} actors, aspects, connections, ports and parameters"
+                    problems.add(f"{text.name}: the classes take over more than {most}", base.position, RAISE_IT)
+                    problems.raise_if_any()
+                whole[text.name] = _Heir(whole[base.text], text, problems).composite()
+    return {name: whole[name] for name in composites if name in whole}, broken
+
+
+def _size(text: CompositeText) -> int:
+    """How much there is to be taken over from a class."""
+    parts = (text.actors, text.aspects, text.connections, text.inputs, text.outputs, text.parameters)
+    return sum(map(len, parts))
+
+
+def _is_sound(
+    way: list[CompositeText], composites: dict[str, CompositeText], actor_types: Collection[str], problems: Problems
+) -> bool:
+    """Whether the last class of the way extends one that is there and not on the way already."""
+    last = way[-1]
+    base = last.extends
+    assert base is not None
+    names = [text.name for text in way]
+    if base.text not in composites:
+        if base.text in actor_types:
+            message, hint = f"{base.text} is an actor type, and only composites can be extended", "use it as an actor"
+        elif base.text:
+            known = [name for name in composites if name != last.name]
+            message = f"there is no composite {base.text!r} to extend{did_you_mean(base.text, known)}"
+            hint = f"composites: {', '.join(known) or 'none'}"
+        else:
+            return False  # told when it was read
+        problems.add(f"{last.name}: {message}", base.position, hint)
+        return False
+    if base.text in names:
+        loop = way[names.index(base.text) :]
+        problems.add(
+            f"{base.text} extends itself: {' -> '.join([*(text.name for text in loop), base.text])}",
+            loop[0].extends.position if loop[0].extends is not None else None,
+            *(f"{text.name} extends {text.extends.text} at {text.extends.position}" for text in loop if text.extends),
+        )
+        return False
+    if len(way) > MAX_BASES:
+        problems.add(f"{way[0].name} has more than {MAX_BASES} bases, one upon the other", base.position)
+        return False
+    return True
+
+
+class _Heir:
+    """Puts one class on top of its base."""
+
+    def __init__(self, base: CompositeText, text: CompositeText, problems: Problems) -> None:
+        self.base = base
+        self.text = text
+        self.problems = problems
+
+    def composite(self) -> CompositeText:
+        """The whole class."""
+        base, text = self.base, self.text
+        removed = {name: part.position for name, part in text.actors.items() if part.removes}
+        parameters = dict(base.parameters)
+        for name, parameter in text.parameters.items():
+            old = base.parameters.get(name)
+            given = {key: getattr(parameter, key) for key in parameter.given}
+            parameters[name] = parameter if old is None else replace(old, position=parameter.position, **given)
+        kept = [each for old in base.connections for each in self._kept(old, removed)]
+        result = replace(
+            text,
+            doc=text.doc or base.doc,
+            parameters=parameters,
+            inputs=self._ports("input"),
+            outputs=self._ports("output"),
+            director=base.director if text.director is None else text.director,
+            actors=self._parts("actor", base.actors, text.actors),
+            aspects=self._parts("aspect", self._still_aimed(removed), text.aspects),
+            connections=(*kept, *(each for each in text.connections if not each.removes)),
+            is_wired=text.is_wired and base.is_wired,
+            removed={**{name: at for name, at in base.removed.items() if name not in text.actors}, **removed},
+            spoilt=text.spoilt or base.spoilt,
+        )
+        for name, part in result.actors.items():
+            is_port = name in result.inputs or name in result.outputs
+            # If both are new, it was told when the class was read.
+            if is_port and (name in text.actors) != (name in text.inputs or name in text.outputs):
+                self._problem(f"{name!r} is the name of an actor and of a port", part.position, "rename one")
+        self._check_removals()
+        return result
+
+    def _problem(self, message: str, position: Position, *hints: str) -> None:
+        self.problems.add(f"{self.text.name}: {message}", position, *hints)
+
+    def _ports(self, direction: str) -> dict[str, PortText]:
+        other = "output" if direction == "input" else "input"
+        ports = dict(self.base.ports(direction))
+        for name, port in self.text.ports(direction).items():
+            old, crossed = ports.get(name), self.base.ports(other).get(name)
+            if crossed is not None:
+                self._problem(
+                    f"{name!r} is an {other} of {self.base.name} and cannot become an {direction}",
+                    port.position,
+                    f"{self.base.name} declares it at {crossed.position}",
+                )
+                continue
+            ports[name] = port if old is None else replace(port, type=port.type or old.type, doc=port.doc or old.doc)
+        return ports
+
+    def _parts(self, kind: str, old: dict[str, PartText], new: dict[str, PartText]) -> dict[str, PartText]:
+        """Actors or aspects, those of the base in their order, then new ones."""
+        parts = dict(old)
+        for name, part in new.items():
+            before = old.get(name)
+            if before is None and (part.removes or not part.type.text):
+                what = "to remove" if part.removes else "to change"
+                self._problem(
+                    f"{self.base.name} has no {kind} {name!r} {what}{did_you_mean(name, list(old))}",
+                    part.position,
+                    f"its {kind}s: {', '.join(old) or 'none'}" + ("" if part.removes else "; a new one needs a type"),
+                )
+            elif part.removes:
+                del parts[name]
+            elif before is None:
+                parts[name] = part
+            else:
+                same = part.type.text in ("", before.type.text)
+                parts[name] = replace(
+                    part,
+                    type=part.type if part.type.text else before.type,
+                    values={**before.values, **part.values} if same else part.values,
+                    count=part.count or before.count,
+                    priority=part.priority or before.priority,
+                    at=part.at or before.at,
+                    enabled=part.enabled or before.enabled,
+                    tags=part.tags or before.tags,
+                )
+        return parts
+
+    def _still_aimed(self, removed: Collection[str]) -> dict[str, PartText]:
+        """The base's aspects without the pointcuts at removed actors, and without those that lose all of them."""
+        aspects = {}
+        for name, part in self.base.aspects.items():
+            at = tuple(pointcut for pointcut in part.at if _head(pointcut) not in removed)
+            if at or not part.at or name in self.text.aspects:
+                aspects[name] = replace(part, at=at)
+        return aspects
+
+    def _kept(self, connection: ConnectionText, removed: Collection[str]) -> list[ConnectionText]:
+        """What is left of a connection of the base's, in parts if only some of its pairs are taken away."""
+        cut = {pair for each in self.text.connections if each.removes for pair in _pairs(each)}
+        left = [
+            replace(connection, sources=(source,), destinations=destinations)
+            for source in connection.sources
+            if (
+                destinations := tuple(
+                    end
+                    for end in connection.destinations
+                    if (source.text, end.text) not in cut and _head(source) not in removed and _head(end) not in removed
+                )
+            )
+        ]
+        return [connection] if sum(map(len, map(_pairs, left))) == len(_pairs(connection)) else left
+
+    def _check_removals(self) -> None:
+        """A connection that is to be removed must be there."""
+        known = {pair for each in self.base.connections for pair in _pairs(each)}
+        written = [f"{source} -> {end}" for source, end in sorted(known)]
+        for connection in self.text.connections:
+            if not connection.removes:
+                continue
+            for source, end in _pairs(connection):
+                if (source, end) not in known:
+                    wanted = f"{source} -> {end}"
+                    self._problem(
+                        f"{self.base.name} has no connection {wanted!r} to remove{did_you_mean(wanted, written)}",
+                        connection.position,
+                        f"write both ends as {self.base.name} does",
+                    )
+
+
+def _pairs(connection: ConnectionText) -> list[tuple[str, str]]:
+    return [(source.text, end.text) for source in connection.sources for end in connection.destinations]
+
+
+def _head(text: Text | PointcutText) -> str:
+    """The actor that an endpoint or pointcut names first; nothing for an own port."""
+    first, dot, _ = text.text.partition(".")
+    return first.partition("[")[0] if dot or isinstance(text, PointcutText) else ""

@@ -1,0 +1,422 @@
+"""Model files, and files of composite classes: the keys of all that they declare, and what reads them."""
+
+from __future__ import annotations
+
+from keyword import iskeyword, kwlist
+from typing import Any
+
+from epicycle.actors import Actor, Parameter, UnitError, declared_parameters, parse_unit
+from epicycle.actors.expression import CONSTANTS, FUNCTIONS
+from epicycle.aspects import Aspect
+
+from ..catalogue import TAKES, Measure, take_problem
+from ..text import (
+    MAX_SEED,
+    NAME,
+    NORMAL,
+    SURE,
+    Entry,
+    Mapping,
+    Node,
+    NodeReader,
+    Position,
+    Scalar,
+    Text,
+    is_empty,
+    nearest,
+)
+from .declarations import CompositeText, ConnectionText, MetricText, ModelText, ParameterText, PartText, PortText
+from .fields import (
+    AT,
+    LABEL,
+    NAMED,
+    TEXT,
+    TEXTS,
+    Construct,
+    Key,
+    Schema,
+    Shape,
+    computed,
+    named,
+    names_of,
+    node_as,
+    number,
+    one_or_more,
+    ref,
+)
+from .fields import NAME as NAME_PATTERN
+from .parameter_schema import COMPUTED_FLAG, about, schema_of
+from .places import CONNECTIONS, PATTERN_SCHEMA, PATTERNS, POINTCUTS, connection
+
+# -- ports and parameters -----------------------------------------------------------------------------------------
+
+PORT = Construct(
+    "A port of a composite: its type, or {type, doc}.",
+    {
+        "type": Key(
+            AT,
+            "What travels through it, such as float, 'float | int', array[2] or a token class.",
+            called="the type of {what}",
+        ),
+        "doc": Key(TEXT, "What it is."),
+    },
+    type=["object", "string", "null"],
+)
+
+
+def _ports(reader: NodeReader, node: Node, what: str) -> dict[str, PortText]:
+    """``[a, b]`` or ``{a: type, b: {type: ..., doc: ...}, c: }``."""
+    if isinstance(node, Mapping):
+        found = [_port(reader, name, entry) for name, entry in node.entries.items()]
+    else:
+        found = [PortText(text.text, text.position) for text in reader.texts(node, what)]
+    ports: dict[str, PortText] = {}
+    for port in found:
+        if not NAME.match(port.name):
+            reader.problems.add(f"{port.name!r} is not a port name", port.position)
+            continue
+        if port.name in ports:
+            reader.problems.add(f"port {port.name!r} is declared twice", port.position)
+        ports[port.name] = port
+    return ports
+
+
+def _port(reader: NodeReader, name: str, entry: Entry) -> PortText:
+    what = f"port {name!r}"
+    if isinstance(entry.value, Mapping):
+        said = PORT.read(reader, entry.value, what) or {}
+    else:
+        said = {} if is_empty(entry.value) else {"type": AT.read(reader, entry.value, f"the type of {what}")}
+    return PortText(name, entry.key.position, **said)
+
+
+def _unit(reader: NodeReader, node: Node, what: str) -> str | None:
+    unit = reader.text(node, f"unit of {what}")
+    try:
+        if unit:
+            parse_unit(unit)
+    except UnitError as error:
+        reader.problems.add(f"{what}: {error}", node.position)
+    return unit
+
+
+def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...]:
+    before = len(reader.problems)
+    found = tuple(text.text for text in reader.texts(node, "choices"))
+    if not found and len(reader.problems) == before:
+        reader.problems.add(f"{what} has no choices to choose from", node.position)
+    return found
+
+
+_OF_PARAMETER = "{key} of {what}"
+PARAMETER = Construct(
+    "",
+    {
+        "value": Key(node_as({}), "The default; without one, a value must be given."),
+        "unit": Key(Shape(ref("text"), _unit), "What numbers count in, such as m/s; 1 for a pure number.", "{what}"),
+        "min": Key(number(float), "The smallest value.", _OF_PARAMETER),
+        "max": Key(number(float), "The greatest value.", _OF_PARAMETER),
+        "choices": Key(Shape(one_or_more(LABEL), _choices), "The texts to choose from.", "{what}"),
+        "doc": Key(TEXT, "What it is.", _OF_PARAMETER),
+    },
+    type=["object", "array", "string", "number", "boolean", "null"],
+)
+
+
+def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
+    """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
+    if name in _NO_PARAMETERS or iskeyword(name):
+        meaning = "which instance of an array it is" if name == "index" else "something else"
+        reader.problems.add(
+            f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}",
+            entry.key.position,
+            "give it another name",
+        )
+    if not isinstance(entry.value, Mapping):
+        return ParameterText(name, entry.key.position, entry.value)
+    what = f"parameter {name!r}"
+    entries = PARAMETER.entries(reader, entry.value, what) or {}
+    before = len(reader.problems)
+    said = PARAMETER.values(reader, entries, what, entry.key.position)
+    low, high = said.get("min"), said.get("max")
+    if low is not None and high is not None and low > high:
+        reader.problems.add(f"{what}: min is greater than max", entries["min"].value.position)
+    is_spoilt = len(reader.problems) > before
+    return ParameterText(name, entry.key.position, **said, spoilt=is_spoilt, given=tuple(entries))
+
+
+_NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
+
+# -- actors, aspects and figures ----------------------------------------------------------------------------------
+
+# What stands beside the parameters of an actor or aspect.
+BESIDE = {
+    "count": Key(
+        node_as(computed("integer", 0, NORMAL.actors)), "How many instances, name[0] to name[count - 1]; see 'index'."
+    ),
+    "priority": Key(
+        node_as(computed("integer")),
+        "Of two actors that could fire at the same tag and depth, the smaller one is first.",
+    ),
+    "at": Key(
+        POINTCUTS,
+        "Where it stands: patterns of ports or actors, 'a.out -> b.in', {type, port} or {tag, port}; not at !pattern.",
+    ),
+    "tags": Key(TEXTS.described(one_or_more(ref("text"))), "Names by which aspects can choose it: 'at: {tag: ...}'."),
+    "enabled": Key(node_as(COMPUTED_FLAG), "Whether it does anything (default: true)."),
+}
+RESERVED = {"actor": Actor.reserved, "aspect": Aspect.reserved, "figure": frozenset({"type"})}
+
+
+def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: bool = False) -> PartText | None:
+    """``name: {type: ..., ...}``; in a class that extends another also without type, and ``name: null``."""
+    problems = reader.problems
+    if derived and is_empty(entry.value):
+        return PartText(name, entry.key.position, Text("", entry.key.position), removes=True)
+    if not isinstance(entry.value, Mapping):
+        said = entry.value.value if isinstance(entry.value, Scalar) else None
+        type_said = said if isinstance(said, str) and NAME.match(said) else "..."
+        problems.add(
+            f"{kind} {name!r} is not a mapping",
+            entry.value.position,
+            f"write '{name}: {{type: {type_said}}}' with the {kind}'s type and parameters",
+        )
+        return None
+    values = dict(entry.value.entries)
+    kind_entry = values.pop("type", None)
+    if (kind_entry is None and not derived) or (kind_entry is not None and is_empty(kind_entry.value)):
+        meant = None if kind_entry is not None else nearest("type", values, SURE)
+        near = f", did you mean 'type' by {meant!r}?" if meant is not None else ""
+        at = entry.key if meant is None else values[meant].key
+        problems.add(f"{kind} {name!r} has no type{near}", at.position, *(() if near else ("add 'type: ...'",)))
+        return None
+    type_name = Text("", entry.key.position)
+    if kind_entry is not None:
+        type_name = AT.read(reader, kind_entry.value, f"the type of {name!r}")
+        if type_name is None:
+            return None
+    beside = {key: values.pop(key).value for key in sorted(RESERVED[kind]) if key in values}
+    read = {key: BESIDE[key].shape.read(reader, node, key) for key, node in beside.items()}
+    return PartText(name, entry.key.position, type_name, values, **read)
+
+
+def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
+    """Actors, aspects or figures by name."""
+    return named(ref(definition or kind), lambda reader, name, entry: part(reader, name, entry, kind, derived=derived))
+
+
+# -- composite classes --------------------------------------------------------------------------------------------
+
+DIRECTOR = Construct(
+    "A director of its own, with a local clock.",
+    {
+        "start": Key(
+            node_as(computed("number", unit="s")), "The local time when the run begins (default: as around it)."
+        ),
+        "drift": Key(node_as(computed("number", unit="1")), "How fast local time goes, 1 being as fast as around it."),
+    },
+)
+DOC = Key(TEXT, "What it shows or does.")
+INCLUDE = Key(TEXTS, "Files of composite classes, in or below this folder.")
+PARAMETERS = Key(
+    Shape(
+        {
+            **names_of(ref("parameter")),
+            "propertyNames": {"pattern": f"^{NAME_PATTERN}$", "not": {"enum": sorted({*_NO_PARAMETERS, *kwlist})}},
+        },
+        named({}, _parameter).read,
+    ),
+    "Parameters: 'name: value' or 'name: {value, unit, min, max, choices, doc}'.",
+)
+_PORTS = Shape({"anyOf": [one_or_more(ref("name")), names_of(ref("port_declaration"))]}, _ports)
+_SAID_OF_PORTS = "a list of names, or 'name: type' or 'name: {type, doc}'."
+ACTORS = Key(parts("actor"), "The actors of the graph: 'name: {type, count, <parameter>: <value>, ...}'.")
+ASPECTS = Key(parts("aspect"), "What is woven around ports: 'name: {type, at, enabled, <parameter>: <value>}'.")
+
+
+def _base(reader: NodeReader, node: Node, what: str) -> Text:
+    """The name of a class; an empty one if it is none, which has been told."""
+    return Text(reader.name(node, what) or "", node.position)
+
+
+COMPOSITE = Construct(
+    "A composite class: a graph with ports of its own.",
+    {
+        "doc": DOC,
+        "extends": Key(
+            Shape(ref("name"), _base),
+            "The composite class that this one takes over and changes.",
+            "the class to extend",
+        ),
+        "parameters": PARAMETERS,
+        "inputs": Key(_PORTS, f"The input ports: {_SAID_OF_PORTS}"),
+        "outputs": Key(_PORTS, f"The output ports: {_SAID_OF_PORTS}"),
+        "director": Key(
+            Shape(ref("director"), lambda reader, node, what: DIRECTOR.entries(reader, node, what) or {}),
+            "A director of its own: the composite fires as one actor, in local time.",
+            "the director of {what}",
+        ),
+        "actors": ACTORS,
+        "connections": Key(
+            CONNECTIONS,
+            "Wires: 'actor.port -> actor.port, actor.port', '=>' for all to all; or {from, to, all, delay}.",
+        ),
+        "aspects": ASPECTS,
+    },
+)
+# Where a class extends another, its actors and aspects may be changes to inherited ones.
+_CHANGES = {
+    "actors": Key(parts("actor", "changed_actor", derived=True), ACTORS.doc),
+    "aspects": Key(parts("aspect", "changed_aspect", derived=True), ASPECTS.doc),
+}
+HEIR = Construct(COMPOSITE.doc, {**COMPOSITE.keys, **_CHANGES})
+
+
+def composite_schema() -> Schema:
+    """What editors know of a composite class, which may extend another."""
+    found = COMPOSITE.schema
+    for key, changes in _CHANGES.items():
+        found["properties"][key] = {"description": changes.doc}
+    return {
+        **found,
+        "if": {"required": ["extends"]},
+        "then": {"properties": {key: each.shape.schema for key, each in _CHANGES.items()}},
+        "else": {"properties": {key: COMPOSITE.keys[key].shape.schema for key in _CHANGES}},
+    }
+
+
+def _composite(reader: NodeReader, name: str, entry: Entry) -> CompositeText | None:
+    entries = COMPOSITE.entries(reader, entry.value, f"composite {name!r}")
+    return None if entries is None else composite(reader, name, entries, entry.key.position)
+
+
+def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position: Position) -> CompositeText:
+    """The keys that a model and a composite class share."""
+    problems = reader.problems
+    before = len(problems)
+    derived = "extends" in entries
+    said = (HEIR if derived else COMPOSITE).values(reader, entries, repr(name), position)
+    inputs, outputs = said.get("inputs", {}), said.get("outputs", {})
+    for port in outputs.values():
+        if port.name in inputs:
+            problems.add(f"port {port.name!r} is declared twice", port.position)
+    for actor in said.get("actors", {}).values():
+        if actor.name in inputs or actor.name in outputs:
+            problems.add(f"{actor.name!r} is the name of an actor and of a port", actor.position, "rename one")
+    written: tuple[ConnectionText | None, ...] = said.pop("connections", (None,) if "connections" in entries else ())
+    connections = [each for each in written if each is not None]
+    for each in connections:
+        if each.removes is not None and not derived:
+            problems.add(f"{name} extends no class whose connections it could remove", each.removes)
+    return CompositeText(
+        name,
+        position,
+        **said,
+        connections=tuple(each for each in connections if derived or each.removes is None),
+        is_wired=None not in written,
+        spoilt=len(problems) > before or (derived and not said["extends"].text),
+    )
+
+
+COMPOSITES = Key(named(ref("composite"), _composite), "Composite classes, for the types of actors.")
+
+# -- whole files --------------------------------------------------------------------------------------------------
+
+RUN = Construct(
+    "How long a run takes, and what it records.",
+    {
+        "stop": Key(node_as(computed("number", 0.0, unit="s")), "Time at which a run ends, such as 30 s."),
+        "stop_when": Key(PATTERNS, "Output ports that end the run when they send true or a number other than 0."),
+        "seed": Key(node_as(computed("integer", 0, MAX_SEED)), "Seed of all random streams."),
+        "record": Key(PATTERNS, "Output ports whose tokens are kept, as patterns."),
+    },
+)
+
+
+def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
+    schema = ref("text") if key in ("unit", "to", "doc") else schema_of(parameter)
+    if key == "take":
+        schema = {"enum": list(TAKES), "enumDescriptions": [f"{each.doc} ({each.over})" for each in TAKES.values()]}
+    return Key(node_as(schema), about(parameter))
+
+
+METRIC = Construct(
+    "A number taken from what a port sends.",
+    {
+        "of": Key(
+            node_as(PATTERN_SCHEMA),
+            "The output port (or a pattern for several).",
+            missing=("{what} does not say of what", "add 'of: actor.port'"),
+        ),
+        **{key: _of_metric(key, each) for key, each in declared_parameters(Measure).items()},
+    },
+    type="object",
+    required=["of"],
+)
+
+
+def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
+    """``name: {of: port, take: last, unit: s, doc: ...}``."""
+    entries = METRIC.entries(reader, entry.value, f"metric {name!r}")
+    if entries is None:
+        return None
+    said = METRIC.values(reader, entries, f"metric {name!r}", entry.key.position)
+    port = AT.read(reader, said["of"], "of") if "of" in said else None
+    take = reader.text(said["take"], "take") if "take" in said else "last"
+    if take is not None and (problem := take_problem(name, take)):
+        reader.problems.add(problem[0], entries["take"].value.position, problem[1])
+    if port is None or take not in TAKES:
+        return None
+    return MetricText(name, port, {key: each for key, each in entries.items() if key != "of"}, entry.key.position)
+
+
+METRICS = named(ref("metric"), _metric)
+LIBRARY = Construct("", {"doc": DOC, "include": INCLUDE, "composites": COMPOSITES})
+MODEL = Construct(
+    "",
+    {
+        "model": Key(
+            NAMED,
+            "The name of the model.",
+            "the model's name",
+            missing=("the model has no name", "begin the file with a line like 'model: my_model'"),
+            name="name",
+        ),
+        "doc": DOC,
+        "include": INCLUDE,
+        "parameters": PARAMETERS,
+        "composites": COMPOSITES,
+        "actors": ACTORS,
+        "connections": COMPOSITE.keys["connections"],
+        "aspects": ASPECTS,
+        "run": Key(Shape(ref("run"), RUN.entries), RUN.doc),
+        "metrics": Key(
+            Shape(METRICS.schema, lambda reader, node, what: tuple(METRICS.read(reader, node, what).values())),
+            "Numbers taken from what ports send: 'name: {of, take, after, unit, ...}'.",
+        ),
+        "figures": Key(parts("figure"), "Pictures of a run: 'name: {type, ...}'."),
+    },
+)
+_OF_FILE = Construct("", {key: each for key, each in MODEL.keys.items() if key not in COMPOSITE.keys})
+
+
+class DeclarationReader(NodeReader):
+    """Reads one file's nodes; whatever is misshapen is added to ``problems`` and left out."""
+
+    def model(self, node: Node) -> ModelText | None:
+        """A file that is a model: it has the key ``model``."""
+        entries = MODEL.entries(self, node, "the model")
+        if entries is None:
+            return None
+        said = _OF_FILE.values(self, entries, "the model", node.position)
+        own = {key: entry for key, entry in entries.items() if key in COMPOSITE.keys}
+        return ModelText(composite(self, said.pop("name", "model"), own, node.position), **said)
+
+    def included(self, node: Node) -> ModelText | None:
+        """A file of composite classes."""
+        said = LIBRARY.read(self, node, "an included file")
+        return None if said is None else ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)
+
+    def connection(self, node: Node) -> ConnectionText | None:
+        """One entry of ``connections``."""
+        return connection(self, node)

@@ -1,0 +1,370 @@
+"""The keys of claims and of a guideline, and what reads them, and checks them against the study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from epicycle.actors.expression import ExpressionError, Formula
+
+from ..catalogue import packaged_studies
+from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence, Text, did_you_mean, inside, parse
+from ..text import Mapping as MappingNode
+from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
+from .dimensions import Dimension, Factor, as_factor
+from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, names_of, node_as, number, ref
+from .files import named_file
+
+if TYPE_CHECKING:
+    from .study import Study
+
+MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which look at all of them
+
+
+def without(node: Node, *keys: str) -> Node:
+    """A mapping without some of its entries."""
+    if not isinstance(node, MappingNode):
+        return node
+    return replace(node, entries={key: entry for key, entry in node.entries.items() if key not in keys})
+
+
+def levels_of(dimensions: Iterable[Dimension], factor: str) -> list[Factor]:
+    """The values that a factor takes, each once, in the order of the study."""
+    for dimension in dimensions:
+        if factor in dimension.columns:
+            values = (dimension.level(index).values[factor] for index in range(dimension.size))
+            return list(dict.fromkeys(values))
+    raise KeyError(factor)
+
+
+class QuestionReader(NodeReader):
+    """Reads ``claims`` and ``guideline`` of a study; what is misshapen or not in the study is told and left out.
+
+    ``factors_of`` says what another study varies, from its text's node and file.
+    """
+
+    def __init__(
+        self, problems: Problems, study: Study, factors_of: Callable[[Node, Path, Problems], Mapping[str, str]]
+    ) -> None:
+        super().__init__(problems)
+        self.study = study
+        self.factors_of = factors_of
+        self.dimensions = study.dimensions
+        self.kinds = study.factors
+
+    def questions(self, entries: Mapping[str, Entry], lender: tuple[str, str] | None = None) -> Questions:
+        """All that is asked; ``lender``: file and text of the study whose claims these are, if they are known."""
+        asked = [entries[key] for key in ("claims", "guideline") if key in entries]
+        if asked and prod(dimension.size for dimension in self.dimensions) > MAX_CONDITIONS:
+            self.problems.add(
+                f"a study of more than {MAX_CONDITIONS:,} conditions can have no claims and no guideline",
+                asked[0].key.position,
+            )
+            return Questions()
+        guideline = self.guideline(entries["guideline"]) if "guideline" in entries else None
+        node = entries["claims"].value if "claims" in entries else None
+        if node is None:
+            return Questions(guideline=guideline)
+        if not isinstance(node, Scalar) or node.value is None:
+            return Questions(self.claims(node), guideline)
+        lender = lender or self.lender(node)
+        borrowed = None if lender is None else self.borrowed(node, *lender)
+        if borrowed is None:
+            return Questions(guideline=guideline)
+        tree, factors = borrowed
+        misfits = Problems()
+        claims = QuestionReader(misfits, self.study, self.factors_of).claims(tree)
+        if first := next(iter(misfits.found), None):
+            more = f", and {len(misfits) - 1} more" if len(misfits) > 1 else ""
+            self.problems.add(
+                f"claims: those of {node.text!r} do not fit this study: {first.message}{more}",
+                node.position,
+                *first.help,
+            )
+        apart = tuple(name for name in self.kinds if name not in factors)
+        return Questions(claims, guideline, apart, lender)
+
+    def lender(self, node: Scalar) -> tuple[str, str] | None:
+        """File and text of the study that is named in the place of claims."""
+        said = Text(node.text, node.position)
+        path = named_file(said, self.study.path.parent, "study", packaged_studies, self.problems, "claims: ")
+        return None if path is None else (str(path), path.read_text(encoding="utf-8", errors="replace"))
+
+    def borrowed(self, node: Scalar, file: str, text: str) -> tuple[Node, Mapping[str, str]] | None:
+        """The claims of another study, and what it varies."""
+        problems = Problems()
+        tree = parse(text, file, problems)
+        factors = {} if tree is None else self.factors_of(tree, Path(file), problems)
+        claims = tree.entries.get("claims") if isinstance(tree, MappingNode) else None
+        if len(problems):
+            self.problems.add(
+                f"claims: the study {node.text!r} is not valid", node.position, f"see 'epicycle validate {file}'"
+            )
+        elif claims is None or not isinstance(claims.value, MappingNode):
+            self.problems.add(f"claims: the study {node.text!r} has no claims of its own", node.position)
+        else:
+            return claims.value, factors
+        return None
+
+    # -- claims ---------------------------------------------------------------------------------------------------
+
+    def claims(self, node: Node) -> tuple[Claim, ...]:
+        """A mapping from names to claims."""
+        found = (self.claim(name, entry) for name, entry in self.named(node, "claims"))
+        return tuple(claim for claim in found if claim is not None)
+
+    def claim(self, name: str, entry: Entry) -> Claim | None:
+        """One claim: one of the forms, and what belongs to it."""
+        before = len(self.problems)
+        what, position = f"claim {name}", entry.key.position
+        entries = CLAIM.entries(self, entry.value, what)
+        if entries is None:
+            return None
+        forms = [form for form in FORMS if form in entries]
+        if len(forms) != 1:
+            reason = f"says {' and '.join(forms)} at once" if forms else "claims nothing"
+            self.problems.add(f"{what} {reason}", position, f"give one of {', '.join(FORMS)}")
+            return None
+        form = forms[0]
+        for key in entries.keys() - {"doc", form, *FORMS[form]}:
+            takes = ", ".join(FORMS[form])
+            self.problems.add(
+                f"{what}: {key!r} does not go with {form!r}", entries[key].key.position, f"what does: {takes}"
+            )
+        for key in {"at", "over"} & set(FORMS[form]) - entries.keys():
+            example = "at: {load: 0.5}" if key == "at" else "over: load"
+            self.problems.add(f"{what} has no {key!r}", position, f"add {example!r} or the like")
+        if len(self.problems) > before:
+            return None
+        said = CLAIM.values(self, entries, what, position)
+        where = self.selection(entries, "where", what)
+        condition, metrics = "", list(said.get(form, ())) if form != ALWAYS else []
+        if form == ALWAYS:
+            condition, metrics = self.condition(entries[form].value, what)
+        elif not metrics and len(self.problems) == before:
+            self.problems.add(f"{what} names no metric", entries[form].value.position)
+        at = self.selection(entries, "at", what)
+        than = self.selection(entries, "than", what) if "than" in entries else None
+        if than is not None and than.keys() != at.keys() and len(self.problems) == before:
+            self.problems.add(
+                f"{what}: 'at' and 'than' give levels of other factors",
+                entries["than"].key.position,
+                f"at: {', '.join(at)}; than: {', '.join(than) or 'none'}",
+            )
+        over = self.trend(entries, "over", what)
+        per = self.trend(entries, "per", what)
+        if len(self.problems) > before:
+            return None
+        claim = Claim(
+            name,
+            form,
+            tuple(metrics),
+            position,
+            said.get("doc", ""),
+            condition,
+            at,
+            than,
+            over,
+            per,
+            where,
+            said.get("share", 1.0),
+        )
+        self.compares(claim, position)
+        return claim if len(self.problems) == before else None
+
+    def condition(self, node: Node, what: str) -> tuple[str, list[Text]]:
+        """An expression over metrics that is true or false."""
+        text = self.text(node, what)
+        if text is None or not isinstance(node, Scalar):
+            return "", []
+        try:
+            formula = Formula(text)
+        except ExpressionError as error:
+            part = text[error.offset : error.offset + max(error.length, 1)]
+            self.problems.add(f"{what}: {error}", inside(node, text, error.offset, part))
+            return "", []
+        if not formula.is_condition or not formula.names:
+            self.problems.add(
+                f"{what}: {text!r} is no condition on metrics", node.position, "write 'longest_wait < 30' or the like"
+            )
+        return text, [Text(name, inside(node, text, max(text.find(name), 0), name)) for name in formula.names]
+
+    def selection(self, entries: Mapping[str, Entry], key: str, what: str) -> Selection:
+        """``{factor: level}`` or ``{factor: [level, ...]}``, with levels of the study."""
+        if key not in entries:
+            return {}
+        node = entries[key].value
+        if not isinstance(node, MappingNode) or not node.entries:
+            self.problems.add(
+                f"{what}: {key!r} is not a mapping from factors to levels",
+                node.position,
+                "write {load: 0.5} or {load: [0.5, 0.7]}",
+            )
+            return {}
+        found: Selection = {}
+        for factor, entry in node.entries.items():
+            if self.is_factor(factor, entry.key.position, what):
+                items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
+                if not items:
+                    self.problems.add(f"{what}: {key!r} gives no level of {factor}", entry.value.position)
+                levels = (self.level(factor, item, what) for item in items)
+                found[factor] = tuple(dict.fromkeys(level[0] for level in levels if level is not None))
+        return found
+
+    def level(self, factor: str, node: Node, what: str) -> tuple[Factor] | None:
+        """The level that is meant, as the table holds it."""
+        known = levels_of(self.dimensions, factor)
+        value = as_factor(node, self.kinds[factor]) if isinstance(node, (Scalar, Sequence)) else ""
+        is_number = self.kinds[factor] == "float" and isinstance(value, (int, float)) and not isinstance(value, bool)
+        for each in known:
+            if each == value and isinstance(each, bool) == isinstance(value, bool):
+                return (each,)
+        for each in known:  # 70 % need not be 0.7 in the last digit
+            if is_number and math.isclose(float(each or 0), float(value or 0), rel_tol=1e-9):
+                return (each,)
+        shown = node.text if isinstance(node, Scalar) else "what stands here"
+        texts = [shown_level(each) for each in known]
+        guess = did_you_mean(shown, texts) if self.kinds[factor] == "text" else ""
+        self.problems.add(
+            f"{what}: the study has no level {shown} of {factor}{guess}",
+            node.position,
+            f"its levels: {', '.join(texts[:20])}{', ...' if len(texts) > 20 else ''}",
+        )
+        return None
+
+    def is_factor(self, name: str, position: Position, what: str) -> bool:
+        """Whether the study varies it; a problem otherwise."""
+        if name in self.kinds:
+            return True
+        self.problems.add(
+            f"{what}: {name!r} is nothing that the study varies{did_you_mean(name, self.kinds)}",
+            position,
+            f"what it varies: {', '.join(self.kinds) or 'nothing'}",
+        )
+        return False
+
+    def trend(self, entries: Mapping[str, Entry], key: str, what: str) -> str:
+        """A factor in whose order something happens; for ``per`` it is one of numbers."""
+        if key not in entries:
+            return ""
+        node = entries[key].value
+        name = self.text(node, what)
+        if name is None or not self.is_factor(name, node.position, what):
+            return ""
+        if key == "per" and self.kinds[name] not in ("int", "float"):
+            self.problems.add(f"{what}: the levels of {name} are no numbers: there is no slope over it", node.position)
+        size = next(dimension.size for dimension in self.dimensions if name in dimension.columns)
+        if len(levels_of(self.dimensions, name)) < size:
+            self.problems.add(f"{what}: {name} takes a value more than once, so that it has no order", node.position)
+        return name
+
+    def compares(self, claim: Claim, position: Position) -> None:
+        """A claim is about something: there is more than one level to compare."""
+        what = f"claim {claim.name}"
+        if claim.form in (RISES, FALLS):
+            homes = [
+                next(each for each in self.dimensions if name in each.columns)
+                for name in (claim.over, claim.per)
+                if name
+            ]
+            if len(homes) == 2 and homes[0] is homes[1]:
+                self.problems.add(f"{what}: {claim.over} and {claim.per} do not vary one without the other", position)
+            names = (claim.over, claim.per) if claim.per else (claim.over,)
+            for name in names:
+                if len(set(claim.where.get(name, levels_of(self.dimensions, name)))) < 2:
+                    self.problems.add(f"{what}: there is one level of {name} alone, and nothing to compare", position)
+        elif claim.form in (LESS, GREATER):
+            for key, selection in (("at", claim.at), ("than", claim.than or {})):
+                for name, levels in selection.items():
+                    if not set(levels) <= set(claim.where.get(name, levels)):
+                        self.problems.add(f"{what}: 'where' leaves out a level of {name} that {key!r} names", position)
+            if claim.than is None and all(
+                set(levels) >= set(claim.where.get(name, levels_of(self.dimensions, name)))
+                for name, levels in claim.at.items()
+            ):
+                self.problems.add(f"{what}: there are no other levels to compare with", position)
+            if claim.than is not None and all(set(claim.at[name]) & set(claim.than[name]) for name in claim.at):
+                self.problems.add(f"{what}: compares a level with itself", position)
+
+    # -- the guideline --------------------------------------------------------------------------------------------
+
+    def guideline(self, entry: Entry) -> Guideline | None:
+        """``{choose: servers, least: mean_wait, tolerance: 0.5}``."""
+        before = len(self.problems)
+        entries = GUIDELINE.entries(self, entry.value, "guideline")
+        if entries is None:
+            return None
+        aims = [key for key in ("least", "greatest") if key in entries]
+        if "choose" not in entries or len(aims) != 1:
+            self.problems.add(
+                "guideline does not say which factor to choose, and what is to be least or greatest",
+                entry.key.position,
+                "write {choose: servers, least: mean_wait}",
+            )
+            return None
+        said = GUIDELINE.values(self, entries, "guideline", entry.key.position)
+        name, at = said.get("choose"), entries["choose"].value.position
+        if name and self.is_factor(name, at, "guideline") and len(levels_of(self.dimensions, name)) < 2:
+            self.problems.add(f"guideline: there is one level of {name} alone, and nothing to choose", at)
+        if len(self.problems) > before:
+            return None
+        return Guideline(said["choose"], said[aims[0]], aims[0] == "greatest", said.get("tolerance", 0.0))
+
+
+_METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})
+_LEVELS = node_as(
+    {
+        "type": "object",
+        "minProperties": 1,
+        "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]},
+    }
+)
+_FACTOR = node_as({"type": "string"})
+_TREND = "Metrics whose mean, or slope per unit of another factor, {} over the levels of a factor."
+CLAIM = Construct(
+    "A hypothesis on the results.",
+    {
+        "doc": Key(TEXT, "What is claimed, in words."),
+        LESS: Key(_METRICS, "Metrics whose mean is less at some levels than at others.", "{what}"),
+        GREATER: Key(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
+        RISES: Key(_METRICS, _TREND.format(RISES), "{what}"),
+        FALLS: Key(_METRICS, _TREND.format(FALLS), "{what}"),
+        ALWAYS: Key(node_as({"type": "string"}), "A condition on the metrics that holds in every run."),
+        "at": Key(_LEVELS, "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'."),
+        "than": Key(_LEVELS, "What they are compared with (default: all other levels, so that these are the best)."),
+        "over": Key(_FACTOR, "The factor over which something rises or falls."),
+        "per": Key(_FACTOR, "What rises or falls is the slope over this factor."),
+        "where": Key(_LEVELS, "The levels to which the claim is confined (default: all)."),
+        "share": Key(
+            number(float, 0.5, 1.0),
+            "In how many of the comparisons, or runs, it is to hold (default: 1, in all).",
+            "{what}: share",
+        ),
+    },
+    type="object",
+    oneOf=[{"required": [form, *(key for key in takes if key in ("at", "over"))]} for form, takes in FORMS.items()],
+)
+GUIDELINE = Construct(
+    "",
+    {
+        "choose": Key(
+            TEXT.described({"type": "string"}),
+            "The factor whose best level is wanted, for every combination of the others.",
+        ),
+        "least": Key(AT.described(ref("name")), "The metric that is to be least."),
+        "greatest": Key(AT.described(ref("name")), "The metric that is to be greatest."),
+        "tolerance": Key(
+            number(float, 0.0),
+            "How much worse than the best is good enough (default: 0).",
+            "guideline: tolerance",
+        ),
+    },
+    type="object",
+    required=["choose"],
+    oneOf=[{"required": ["least"]}, {"required": ["greatest"]}],
+)
+CLAIMS = node_as({"anyOf": [names_of(ref("claim")), {"type": "string"}]})

@@ -1,0 +1,207 @@
+"""A JSON Schema of model files, disturbances and studies, made from what is declared: the language's keys and types.
+
+An editor's YAML language server completes, explains and checks with it while somebody types.  It knows one file at a
+time: what it refuses, ``epicycle validate`` refuses too, but not the other way round.  Wherever a value may be
+computed, a text with ``${...}`` in it passes.  Regular expressions keep to what Python and ECMAScript understand alike.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+from epicycle.actors import Configurable, declared_parameters
+from epicycle.aspects import FiringTimeParameter
+
+from ..catalogue import Catalogue, doc_of, first_sentence, parts_of
+from .disturbance import DISTURBANCE
+from .fields import EXPRESSION, LABEL, NAME, Construct, Schema, looks_like, one_or_more, ref
+from .models import (
+    BESIDE,
+    COMPOSITE,
+    DIRECTOR,
+    LIBRARY,
+    METRIC,
+    MODEL,
+    PARAMETER,
+    PORT,
+    RESERVED,
+    RUN,
+    composite_schema,
+)
+from .parameter_schema import about, part_name, schema_of
+from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
+from .questions import CLAIM, GUIDELINE
+from .study import METRIC as METRIC_OF_STUDY
+from .study import STUDY, UNTIL
+from .variation import HYPERCUBE, RANGE, dimension_schema
+
+# What has keys of its own, for a reference.
+CONSTRUCTS = {
+    "A model": MODEL,
+    "A file of composite classes": LIBRARY,
+    "A composite class": COMPOSITE,
+    "A parameter": PARAMETER,
+    "A port of a composite": PORT,
+    "A director": DIRECTOR,
+    "A connection": CONNECTION,
+    "A pointcut": POINTCUT,
+    "Beside the parameters of an actor or aspect": Construct("", BESIDE),
+    "A run": RUN,
+    "A disturbance": DISTURBANCE,
+    "A study": STUDY,
+    "A range": RANGE,
+    "A Latin hypercube": HYPERCUBE,
+    "A metric of a study": METRIC_OF_STUDY,
+    "Until": UNTIL,
+    "A claim": CLAIM,
+    "A guideline": GUIDELINE,
+}
+_OTHER_TYPE = f"^{NAME}(\\.{NAME})?$"  # a composite, or a type of another package
+
+
+def json_schema(
+    catalogue: Catalogue,
+    figures: Mapping[str, type[Configurable]],
+    study_figures: Mapping[str, type[Configurable]],
+) -> Schema:
+    """The schema of model files, of files of composites that are included, of disturbances, and of studies."""
+    types: dict[str, Mapping[str, type[Configurable]]] = {
+        "actor": dict(sorted(catalogue.actors.items())),
+        "aspect": dict(sorted(catalogue.aspects.items())),
+        "figure": figures,
+        "study_figure": study_figures,
+    }
+    parts = parts_of([cls for known in types.values() for cls in known.values()])
+    definitions: Schema = {
+        "name": {"type": "string", **looks_like(f"^{NAME}$", "a name has letters, digits and _, no digit first")},
+        "text": LABEL,
+        "texts": one_or_more({"type": "string"}),
+        "expression": {"type": "string", "pattern": EXPRESSION},
+        "firing_time": schema_of(FiringTimeParameter()),
+        "port": PORT_SCHEMA,
+        "ports": PORTS_SCHEMA,
+        "patterns": one_or_more(PATTERN_SCHEMA),
+        "pointcuts": POINTCUTS_SCHEMA,
+        "parameter": PARAMETER.schema,
+        "connection": connection_schema(),
+        "metric": METRIC.schema,
+        "run": RUN.schema,
+        "claim": CLAIM.schema,
+        "dimension": dimension_schema(),
+        "director": DIRECTOR.schema,
+        "composite": composite_schema(),
+        "port_declaration": PORT.schema,
+        "changed_actor": _changed("actor", RESERVED["actor"]),
+        "changed_aspect": _changed("aspect", RESERVED["aspect"]),
+        "actor": _typed(types["actor"], "actor", RESERVED["actor"], open_to=_OTHER_TYPE),
+        "aspect": _typed(types["aspect"], "aspect", RESERVED["aspect"], ("type", "at"), open_to=_OTHER_TYPE),
+        "added_aspect": _typed(types["aspect"], "aspect", RESERVED["aspect"], open_to=_OTHER_TYPE),
+        "figure": _typed(figures, "figure", RESERVED["figure"]),
+        "study_figure": _typed(study_figures, "study_figure", RESERVED["figure"]),
+    }
+    for kind, known in types.items():
+        for name, cls in known.items():
+            definitions[f"{kind}.{name}"] = _type(name, cls, RESERVED[kind.removeprefix("study_")])
+    for base, variants in parts.items():
+        definitions[part_name(base)] = _part(base, variants)
+        for name, cls in variants.items():
+            definitions[f"{part_name(base)}.{name}"] = _type(name, cls, RESERVED["figure"])
+    model_only = [key for key in MODEL.keys if key not in LIBRARY.keys]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Epicycle model",
+        "description": "A model, a file of composite classes that models include, a disturbance, or a study.",
+        "type": "object",
+        "minProperties": 1,
+        "if": {"required": ["study"]},
+        "then": STUDY.schema,
+        "else": {
+            "if": {"required": ["disturbance"]},
+            "then": DISTURBANCE.schema,
+            "else": {
+                **MODEL.schema,
+                # Without a name it is a file to be included, which has composites only.
+                "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
+            },
+        },
+        "$defs": definitions,
+    }
+
+
+def schema_text(schema: Schema) -> str:
+    """The schema as the text of a file."""
+    return json.dumps(schema, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _changed(kind: str, reserved: frozenset[str]) -> Schema:
+    """What may stand for an actor or aspect in a class that extends another."""
+    beside = {key: BESIDE[key].schema for key in sorted(reserved - {"type"})}
+    return {
+        "type": ["object", "null"],
+        "description": f"A new {kind}, what is to change of an inherited one, or null to do without it.",
+        "properties": {"type": {"type": "string"}, **beside},
+    }
+
+
+def _choice(types: Mapping[str, type]) -> Schema:
+    return {"enum": list(types), "enumDescriptions": [first_sentence(doc_of(cls)) for cls in types.values()]}
+
+
+def _by_type(types: Mapping[str, type], prefix: str) -> list[Schema]:
+    """What else holds, depending on the type."""
+    return [
+        {
+            "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
+            "then": ref(f"{prefix}.{name}"),
+        }
+        for name in types
+    ]
+
+
+def _typed(
+    types: Mapping[str, type],
+    kind: str,
+    reserved: frozenset[str],
+    required: tuple[str, ...] = ("type",),
+    *,
+    open_to: str = "",
+) -> Schema:
+    """A mapping with a type; types other than the known ones (composites) fit the pattern ``open_to``."""
+    choice = _choice(types)
+    if open_to:
+        choice = {"anyOf": [choice, {"type": "string", "pattern": open_to}]}
+    beside = {key: BESIDE[key].schema for key in sorted(reserved - {"type"})}
+    return {
+        "type": "object",
+        "properties": {"type": {**choice, "description": f"The type of the {kind.replace('_', ' ')}."}, **beside},
+        "required": list(required),
+        "allOf": _by_type(types, kind),
+    }
+
+
+def _part(base: type, known: Mapping[str, type]) -> Schema:
+    """A parameter that is a mapping with a type of its own."""
+    return {
+        "type": ["object", "string"],
+        **looks_like(EXPRESSION, f"expected a mapping with a type, one of {', '.join(known)}"),
+        "description": first_sentence(doc_of(base)),
+        "properties": {"type": {"anyOf": [_choice(known), ref("expression")]}},
+        "required": ["type"],
+        "allOf": _by_type(known, part_name(base)),
+    }
+
+
+def _type(name: str, cls: type, reserved: frozenset[str]) -> Schema:
+    """What may and must be given for one type."""
+    declared = declared_parameters(cls)
+    return {
+        "description": doc_of(cls),
+        "properties": {
+            "type": {"const": name},
+            **dict.fromkeys(sorted(reserved - {"type"}), True),  # whose rules stand where the type does
+            **{key: {**schema_of(parameter), "description": about(parameter)} for key, parameter in declared.items()},
+        },
+        "required": [key for key, parameter in declared.items() if parameter.required],
+        "additionalProperties": False,
+    }

@@ -1,0 +1,238 @@
+"""What is said about a model from outside: ``--set path=value``, ``--overrides file``, ``--aspect name=Type,...``,
+``--without name``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..text import (
+    COMMAND_LINE,
+    NAME,
+    NAMES_HAVE,
+    NORMAL,
+    Comparisons,
+    Entry,
+    Limits,
+    Mapping,
+    Node,
+    NodeReader,
+    PatternError,
+    Position,
+    Problems,
+    Scalar,
+    Text,
+    check_pattern,
+    did_you_mean,
+    is_empty,
+    matches,
+    names_asked,
+    names_of,
+    parse,
+    read,
+    split,
+)
+from .declarations import ModelText, PartText, PointcutText
+from .fields import Shape
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value for every parameter whose path matches a pattern."""
+
+    path: str
+    node: Node
+    position: Position
+
+
+class Settings:
+    """All that is set from outside, in the order in which it counts: the last one that fits a parameter wins."""
+
+    def __init__(self, settings: Iterable[Setting] = (), limits: Limits = NORMAL) -> None:
+        self._all = list(settings)
+        self._used: set[int] = set()
+        # An overrides file may name thousands of paths: only patterns are tried one after the other, and of these only
+        # those that ask for a name that the path has, the one that fewest paths will have.
+        self._exact: dict[str, list[int]] = {}
+        self._patterns: dict[str, list[int]] = {}
+        self._comparisons = Comparisons(limits.comparisons)
+        for number, setting in enumerate(self._all):
+            if "*" in setting.path:
+                asked = names_asked(setting.path)
+                rare = next((name for name in asked if "[" in name and "*" not in name), asked[-1] if asked else "")
+                self._patterns.setdefault(rare, []).append(number)
+            else:
+                self._exact.setdefault(setting.path, []).append(number)
+
+    def find(self, full: str) -> Setting | None:
+        """The setting for the parameter at this path; all that fit are marked as used.  Raises ``TooManyError``."""
+        found = self._exact.get(full, [])
+        if self._patterns:
+            likely = [number for name in ("", *names_of(full)) for number in self._patterns.get(name, ())]
+            self._comparisons.spend(len(likely))
+            found = found + [number for number in likely if matches(self._all[number].path, full)]
+        self._used.update(found)
+        return self._all[max(found)] if found else None
+
+    @property
+    def position(self) -> Position | None:
+        """Where the first of the patterns stands."""
+        numbers = [number for each in self._patterns.values() for number in each]
+        return self._all[min(numbers)].position if numbers else None
+
+    def unused(self) -> list[Setting]:
+        """Those that no parameter has taken."""
+        return [setting for number, setting in enumerate(self._all) if number not in self._used]
+
+
+def read_overrides(path: Path, problems: Problems) -> list[Setting]:
+    """The settings of a file: a mapping from paths or patterns to values, as ``--set`` takes them."""
+    node = read(path, problems)
+    if node is None:
+        return []
+    if not isinstance(node, Mapping):
+        problems.add(
+            f"{path} is not a mapping from parameters to values",
+            node.position,
+            "write lines like 'observer[*].sensor.range: 5 m'",
+        )
+        return []
+    return settings_in(node, problems)
+
+
+def settings_like(example: str) -> Shape:
+    """A mapping from paths or patterns to values; an example of a line is for those who write something else."""
+
+    def read_settings(reader: NodeReader, node: Node, what: str) -> tuple[Setting, ...]:
+        if isinstance(node, Mapping):
+            return tuple(settings_in(node, reader.problems))
+        if not is_empty(node):
+            message = f"{what} is not a mapping from parameters to values"
+            reader.problems.add(message, node.position, f"write lines like {example!r}")
+        return ()
+
+    return Shape({"type": ["object", "null"]}, read_settings)
+
+
+def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
+    """The settings that a mapping from paths or patterns to values holds."""
+    return [
+        Setting(key, entry.value, entry.key.position)
+        for key, entry in node.entries.items()
+        if is_pattern(key, entry.key.position, problems)
+    ]
+
+
+def is_pattern(path: str, position: Position, problems: Problems) -> bool:
+    """Whether a text names parameters, alone or by a pattern; if not, that is noted."""
+    try:
+        check_pattern(path)
+    except PatternError as error:
+        problems.add(f"{path!r} is no parameter path: {error}", position)
+        return False
+    return True
+
+
+def parse_setting(text: str, problems: Problems) -> Setting | None:
+    """``path=value``, where value is a YAML value such as ``3``, ``5 m`` or ``[0, 1]``."""
+    option = f"--set {text}"
+    position = _in_option(option, 6)
+    path, equals, value = text.partition("=")
+    path = path.strip()
+    if not equals or not path:
+        problems.add(f"{text!r} is not of the form path=value", position)
+        return None
+    if not is_pattern(path, position, problems):
+        return None
+    node = _value(value, option, len(option) - len(value), problems)
+    return None if node is None else Setting(path, node, position)
+
+
+def _in_option(option: str, start: int, length: int | None = None) -> Position:
+    """A place on the command line: what stands in an option from ``start`` on."""
+    return Position(COMMAND_LINE, 1, start + 1, max(1, len(option) - start if length is None else length), option)
+
+
+def _value(text: str, option: str, offset: int, problems: Problems) -> Node | None:
+    """The YAML value that stands in an option from ``offset`` on."""
+    if not text.strip():
+        return Scalar(None, "", True, _in_option(option, 0))
+    if len(option.splitlines()) > 1:  # lines and columns are those of the value, then
+        return parse(text, COMMAND_LINE, problems)
+    return parse(" " * offset + text, COMMAND_LINE, problems, option)
+
+
+def without(text: ModelText, name: str, problems: Problems) -> ModelText:
+    """The model without one of its aspects."""
+    aspects = text.root.aspects
+    if name not in aspects:
+        problems.add(
+            f"the model has no aspect {name!r}{did_you_mean(name, list(aspects))}",
+            _in_option(f"--without {name}", 10),
+            f"its aspects: {', '.join(aspects) or 'none'}",
+        )
+    left = {key: part for key, part in aspects.items() if key != name}
+    return replace(text, root=replace(text.root, aspects=left))
+
+
+def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText:
+    """``name=Type,key=value,...``: the model with one more aspect, or another in the place of one that is there.
+
+    What an aspect that is replaced leaves to the new one, ``put_aspect`` says.
+    """
+    option = f"--aspect {change}"
+    position = _in_option(option, 9)
+    name, equals, rest = change.partition("=")
+    places = split(rest, ",")
+    parts = [rest[start:end].strip() for start, end in places]
+    if not equals or not name.strip() or not parts or not parts[0]:
+        problems.add(f"{change!r} is not of the form name=Type,key=value", position)
+        return text
+    name = name.strip()
+    values: dict[str, Entry] = {}
+    at: tuple[PointcutText, ...] | None = None
+    for part, (_, end) in zip(parts[1:], places[1:], strict=True):
+        key, equals, value = part.partition("=")
+        key = key.strip()
+        if not equals or not key:
+            problems.add(f"{part!r} is not of the form key=value", position)
+            return text
+        stop = len(option) - len(rest) + end
+        if key == "at":
+            at = _pointcuts(value, option, stop - len(value))
+            continue
+        node = _value(value, option, stop - len(value), problems)
+        if node is None:
+            return text
+        values[key] = Entry(Scalar(key, key, True, position), node)
+    if not NAME.match(name):
+        problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
+        return text
+    enabled = values.pop("enabled").value if "enabled" in values else None
+    return put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or (), enabled))
+
+
+def put_aspect(text: ModelText, part: PartText) -> ModelText:
+    """The model with one more aspect, or with another in the place of the one of its name.
+
+    The one that goes leaves its ports unless the new one has its own, and its parameters if the type stays the same.
+    """
+    old = text.root.aspects.get(part.name)
+    if old is not None:
+        values = {**old.values, **part.values} if old.type.text == part.type.text else part.values
+        part = replace(part, at=part.at or old.at, values=values)
+    return replace(text, root=replace(text.root, aspects={**text.root.aspects, part.name: part}))
+
+
+def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]:
+    """``port`` or ``[port, port]``, read without YAML, to which ``[observer[*].plan]`` would be a broken list."""
+    if value.startswith("[") and value.endswith("]"):
+        value, offset = value[1:-1], offset + 1
+    found = []
+    for start, end in split(value, ","):
+        text = value[start:end].strip(" '\"")
+        at = offset + start + value[start:end].find(text)
+        found.append(PointcutText.of(Text(text, _in_option(option, at, len(text)))))
+    return tuple(found)

@@ -1,0 +1,404 @@
+"""What a study file says: the keys of a study, and what reads them, all that is misshapen told at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from ..catalogue import (
+    find,
+    is_path,
+    packaged_disturbances,
+    packaged_models,
+    packaged_ones,
+    packaged_studies,
+    unreadable,
+)
+from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Problems, Scalar, did_you_mean, parse, read
+from .claims import Questions
+from .declarations import PartText
+from .dimensions import Dimension, Level, Listed
+from .fields import FLAG, LABEL, NAMED, TEXT, Construct, Key, Shape, names_of, node_as, number, one_or_more, ref
+from .files import named_file
+from .models import parts
+from .questions import CLAIMS, GUIDELINE, QuestionReader, without
+from .settings import Setting, parse_setting, settings_like
+from .study_metric import StudyMetric, checked_metric
+from .variation import DIMENSIONS
+
+LARGE = 10_000_000  # bytes of a file
+MAX_REPLICATIONS = 10**9
+MAX_STUDY_SEED = MAX_SEED - MAX_REPLICATIONS
+RESERVED = ("run", "condition", "replication", "seed", "status", "events", "digest", "error", "wall_time", "replay")
+
+
+@dataclass(frozen=True)
+class Until:
+    """Replications go on, ``batch`` by batch, until the 95 % interval of a metric's mean is narrow enough."""
+
+    metric: str
+    position: Position
+    half_width: float = 1.0
+    batch: int = 10
+    at_most: int = 1000
+
+
+@dataclass(frozen=True)
+class Study:
+    """A model, the conditions under which it is run, and what is kept of each run; as its file says, not yet tried."""
+
+    name: str
+    path: Path
+    text: str
+    model: str  # a path, or the name of a packaged model
+    doc: str = ""
+    fixed: tuple[Setting, ...] = ()
+    dimensions: tuple[Dimension, ...] = ()
+    replications: int = 1
+    seed: int = 0
+    paired: bool = True
+    until: Until | None = None
+    metrics: tuple[StudyMetric, ...] | None = None  # None: all of the model
+    figures: dict[str, PartText] | None = None  # None: those that suit the table
+    questions: Questions = field(default_factory=Questions)
+    changes: tuple[str, ...] = ()  # --set, as given
+    types: tuple[Path, ...] = ()
+
+    @property
+    def factors(self) -> dict[str, str]:
+        """The columns of the table that say what was varied, and what they hold."""
+        return {name: kind for dimension in self.dimensions for name, kind in dimension.columns.items()}
+
+
+def find_study(name: str, problems: Problems) -> Path | None:
+    """The file of a study: a path if it looks like one, otherwise a packaged study's name."""
+    return find(name, "study", packaged_studies, problems)
+
+
+def is_study(path: Path) -> bool:
+    """Whether a file says that it is a study."""
+    with suppress(OSError):
+        # A large model need not be read twice; what is no file, or too large, is told when it is read.
+        if path.is_file() and path.stat().st_size <= LARGE and b"study" not in path.read_bytes():
+            return False
+    node = read(path, Problems())
+    return isinstance(node, Mapping) and "study" in node.entries
+
+
+def read_study(
+    name: str | Path,
+    *,
+    set: Iterable[str] = (),
+    types: Iterable[Path] = (),
+    replications: int | None = None,
+    seed: int | None = None,
+) -> Study:
+    """The study of a file; raises ``ModelError`` with all that is wrong with what it says."""
+    problems = Problems()
+    path = find_study(str(name), problems)
+    node = None if path is None else read(path, problems)
+    problems.raise_if_any()
+    assert path is not None
+    assert node is not None
+    reader = _StudyReader(problems, path)
+    return _made(node, reader, path.read_text(encoding="utf-8"), set, types, replications, seed)
+
+
+def study_of_text(
+    text: str,
+    path: Path,
+    set: Iterable[str] = (),
+    types: Iterable[Path] = (),
+    replications: int | None = None,
+    seed: int | None = None,
+    lender: tuple[str, str] | None = None,
+) -> Study:
+    """The study that a text says, which once was read from ``path``; the files that it names may be gone.
+
+    ``lender``: file and text of the study that its claims are from.
+    """
+    problems = Problems()
+    node = parse(text, str(path), problems)
+    problems.raise_if_any()
+    assert node is not None, "a text that cannot be read is a problem"
+    reader = _StudyReader(problems, path, lender, asks_for_files=False)
+    return _made(node, reader, text, set, types, replications, seed)
+
+
+def _made(
+    node: Node,
+    reader: _StudyReader,
+    text: str,
+    set: Iterable[str],
+    types: Iterable[Path],
+    replications: int | None,
+    seed: int | None,
+) -> Study:
+    problems = reader.problems
+    study = reader.study(node, text)
+    problems.raise_if_any()
+    assert study is not None, "what is no study is a problem"
+    changes = tuple(set)
+    settings = [setting for change in changes if (setting := parse_setting(change, problems)) is not None]
+    for setting in settings:
+        if setting.path in study.factors:
+            problems.add(
+                f"{setting.position.source}: {setting.path} is what the study varies", None, "change it in the study"
+            )
+    problems.raise_if_any()
+    return replace(
+        study,
+        replications=study.replications if replications is None else replications,
+        seed=study.seed if seed is None else seed,
+        fixed=(*study.fixed, *settings),
+        changes=changes,
+        types=tuple(types),
+    )
+
+
+class _StudyReader(NodeReader):
+    """Reads one study file; whatever is misshapen is added to ``problems`` and left out."""
+
+    def __init__(
+        self,
+        problems: Problems,
+        path: Path,
+        lender: tuple[str, str] | None = None,
+        *,
+        asks_for_files: bool = True,
+    ) -> None:
+        super().__init__(problems)
+        self.path = path
+        self.asks_for_files = asks_for_files  # whether what is named has to be there
+        self.lender = lender  # file and text of the study whose claims are judged here, if they are known
+
+    def study(self, node: Node, text: str) -> Study | None:
+        """The whole file."""
+        if (
+            isinstance(node, Mapping)
+            and "study" not in node.entries
+            and node.entries.keys() & {"actors", "disturbance"}
+        ):
+            self.problems.add(
+                f"{self.path} is no study", node.position, "a study begins with a line like 'study: my_study'"
+            )
+            return None
+        entries = STUDY.entries(self, node, "the study")
+        if entries is None:
+            return None
+        said = STUDY.values(self, entries, "the study", node.position)
+        said.pop("claims", None), said.pop("guideline", None)  # which are read when all else is known
+        said["dimensions"] = (*said.get("dimensions", ()), *said.pop("disturb", ()))
+        study = Study(said.pop("name", "study"), self.path, text, said.pop("model", ""), **said)
+        before = len(self.problems)
+        self.columns(study)
+        if len(self.problems) > before:
+            return study
+        reader = QuestionReader(self.problems, study, self.factors_of)
+        return replace(study, questions=reader.questions(entries, self.lender))
+
+    def factors_of(self, node: Node, path: Path, problems: Problems) -> dict[str, str]:
+        """What another study varies, whose claims this one judges."""
+        reader = _StudyReader(problems, path, asks_for_files=self.asks_for_files)
+        found = reader.study(without(node, "claims", "guideline"), "")
+        return {} if found is None else found.factors
+
+    # -- values ---------------------------------------------------------------------------------------------------
+
+    def model(self, node: Node, what: str) -> str:
+        """A packaged model's name, or a file's name as seen from the study's folder."""
+        name = self.text(node, what) or ""
+        if is_path(name):
+            file = self.path.parent / name
+            reason = unreadable(file) if self.asks_for_files else ""
+            if reason is None:
+                beside = [each.name for each in file.parent.glob("*.yaml")] if file.parent.is_dir() else []
+                self.problems.add(f"there is no file {name!r}{did_you_mean(file.name, beside)}", node.position)
+            elif reason:
+                self.problems.add(f"the model {name!r} {reason}", node.position)
+            return str(file)
+        if self.asks_for_files and name not in packaged_models():
+            known = list(packaged_models())
+            self.problems.add(
+                f"there is no packaged model {name!r}{did_you_mean(name, known)}",
+                node.position,
+                packaged_ones("model", known),
+            )
+        return name
+
+    def disturb(self, node: Node, what: str) -> list[Dimension]:
+        """Variants by name, ``{none: [], wifi: wifi_burst}``, or a list in which each is a variant of its own."""
+        if isinstance(node, Mapping):
+            variants = {name: self.texts(each.value, "a disturbance") for name, each in node.entries.items()}
+        else:
+            texts = self.texts(node, what)
+            variants = {Path(text.text).stem: [text] for text in texts}
+        levels = []
+        for variant, texts in variants.items():
+            if self.asks_for_files:
+                for text in texts:
+                    named_file(text, self.path.parent, "disturbance", packaged_disturbances, self.problems)
+            names = [str(self.path.parent / each.text) if is_path(each.text) else each.text for each in texts]
+            levels.append(Level((), {"disturb": variant}, tuple(names)))
+        return [Listed(what, node.position, {"disturb": "text"}, levels)] if levels else []
+
+    # -- what is kept ---------------------------------------------------------------------------------------------
+
+    def metrics(self, node: Node, what: str) -> tuple[StudyMetric, ...]:
+        """A list of names, or a mapping from names to expressions."""
+        found: list[StudyMetric | None] = []
+        if isinstance(node, Mapping):
+            found += [self.metric(name, entry) for name, entry in self.named(node, what)]
+        else:
+            for item in self.items(node, what) or ():
+                if (name := self.name(item, "the metric")) is not None and isinstance(item, Scalar):
+                    found.append(checked_metric(name, item, self.problems))
+        return tuple(each for each in found if each is not None)
+
+    def metric(self, name: str, entry: Entry) -> StudyMetric | None:
+        """An expression, or ``{value: expression, unit: s, to: min, doc: ...}``."""
+        if isinstance(entry.value, Scalar):
+            return checked_metric(name, entry.value, self.problems)
+        value: Node | None = entry.value
+        what, said, places = f"metric {name!r}", {}, {}
+        if isinstance(entry.value, Mapping):
+            entries = METRIC.entries(self, entry.value, what) or {}
+            said = METRIC.values(self, entries, what, entry.key.position)
+            places = {key: each.value.position for key, each in entries.items()}
+            value = said.pop("value", None)
+        if isinstance(value, Scalar):
+            return checked_metric(name, value, self.problems, said, places)
+        if value is not None:
+            self.problems.add(f"{what} is not an expression", value.position)
+        return None
+
+    def until(self, node: Node, what: str) -> Until | None:
+        """``{metric: mean_wait, half_width: 0.1, batch: 10, at_most: 1000}``."""
+        entries = UNTIL.entries(self, node, what) or {}
+        said = UNTIL.values(self, entries, what, node.position)
+        if not {"metric", "half_width"} <= entries.keys():
+            return None
+        least = said.get("batch", 10)
+        at_most = None
+        if (given := said.pop("at_most", None)) is not None:  # no less than a batch
+            at_most = number(int, least, MAX_REPLICATIONS).read(self, given, "at_most")
+        metric, at = said.pop("metric", ""), entries["metric"].value.position
+        return Until(metric, at, **said, at_most=at_most or max(1000, least))
+
+    def columns(self, study: Study) -> None:
+        """Every column of the table has a name of its own."""
+        seen: dict[str, Position] = {}
+        for dimension in study.dimensions:
+            for name in dimension.columns:
+                if name in RESERVED or name in seen:
+                    reason = "the table has a column of that name" if name in RESERVED else "it is varied twice"
+                    self.problems.add(f"{name!r} cannot be varied: {reason}", dimension.position)
+                seen[name] = dimension.position
+        for metric in study.metrics or ():
+            assert metric.node is not None
+            if metric.name in RESERVED or metric.name in seen:
+                self.problems.add(
+                    f"a metric cannot be called {metric.name!r}: the table has such a column already",
+                    metric.node.position,
+                    "give it another name: metrics: {name: expression}",
+                )
+            seen[metric.name] = metric.node.position
+
+
+_HAS_NO = (
+    "{what} has no {key!r}",
+    "write {{metric: mean_wait, half_width: 0.1, at_most: 1000}}",
+)
+UNTIL = Construct(
+    "",
+    {
+        "metric": Key(TEXT.described(ref("name")), "The metric whose mean is wanted.", missing=_HAS_NO),
+        "half_width": Key(
+            number(float, 0.0), "Half the width of its 95 % interval that is narrow enough.", missing=_HAS_NO
+        ),
+        "batch": Key(number(int, 2, MAX_REPLICATIONS), "How many replications are made at a time (default: 10)."),
+        "at_most": Key(
+            node_as(number(int, 2, MAX_REPLICATIONS).schema), "The most replications of a condition (default: 1000)."
+        ),
+    },
+    type="object",
+    required=["metric", "half_width"],
+)
+METRIC = Construct(
+    "A number that is kept of each run.",
+    {
+        "value": Key(
+            node_as(LABEL),
+            "The expression, over metrics of the model and what else a run tells.",
+            missing=("{what} has no value", "add 'value: ...', an expression"),
+        ),
+        "unit": Key(TEXT, "What it counts in; a metric of the model has its own."),
+        "to": Key(TEXT, "The unit in which the table holds it (default: the same)."),
+        "doc": Key(TEXT, "What it is."),
+    },
+    type="object",
+    required=["value"],
+)
+_METRICS = {
+    "anyOf": [
+        names_of({"anyOf": [LABEL, METRIC.schema]}),
+        {"type": "array", "items": ref("name")},
+    ]
+}
+_DISTURB = {"anyOf": [{"type": "object", "additionalProperties": one_or_more({"type": "string"})}, ref("texts")]}
+STUDY = Construct(
+    "A model under many conditions.",
+    {
+        "study": Key(
+            NAMED,
+            "The name of the study.",
+            "the study's name",
+            missing=("the study has no name", "add a line like 'study: my_study'"),
+            name="name",
+        ),
+        "doc": Key(TEXT, "What it is to find out."),
+        "model": Key(
+            Shape({"type": "string"}, _StudyReader.model),
+            "A packaged model, or the path of a file as seen from this one.",
+            "the model",
+            missing=("the study does not say which model it runs", "add a line like 'model: mm1'"),
+        ),
+        "set": Key(
+            settings_like("observer[*].sensor.range: 5 m"),
+            "Values for parameters of the model in all runs: 'path: value'.",
+            name="fixed",
+        ),
+        "vary": Key(
+            DIMENSIONS,
+            "What is varied; every value goes together with every one of the others.",
+            name="dimensions",
+        ),
+        "disturb": Key(
+            Shape(_DISTURB, _StudyReader.disturb),
+            "Disturbances as one more dimension: 'name: [disturbance, ...]', or a list of single ones.",
+        ),
+        "replications": Key(number(int, 1, MAX_REPLICATIONS), "How many runs each condition has (default: 1)."),
+        "seed": Key(number(int, 0, MAX_STUDY_SEED), "The seed of the first replication (default: 0)."),
+        "paired": Key(FLAG, "Whether a replication has the same seed in all conditions (default: true)."),
+        "until": Key(
+            Shape(UNTIL.schema, _StudyReader.until),
+            "How many replications each condition gets, in place of a fixed number.",
+        ),
+        "metrics": Key(
+            Shape(_METRICS, _StudyReader.metrics),
+            "What is kept of each run: names of the model's metrics, or 'name: expression', or "
+            "'name: {value, unit, ...}'.",
+        ),
+        "claims": Key(CLAIMS, "Hypotheses on the results, by name; or the study whose claims are judged here, too."),
+        "guideline": Key(
+            node_as(GUIDELINE.schema), "Which level of a factor to choose, for every combination of the others."
+        ),
+        "figures": Key(
+            parts("figure", "study_figure"),
+            "What the report shows: 'name: {type, ...}' (default: means and distributions of all metrics).",
+        ),
+    },
+    required=["model"],
+)

@@ -1,0 +1,90 @@
+"""What a study keeps of each run: metrics of the model, and expressions over them, aspects' figures and signals."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from epicycle.actors.expression import ExpressionError, Formula
+
+from ..text import Position, Problems, Scalar, inside
+
+ASPECTS, SIGNALS = "aspects", "signals"
+NUMBERS = ("end", "events", "firings")  # what else of the results an expression knows
+
+
+@dataclass(frozen=True)
+class StudyMetric:
+    """A column of the table, filled by an expression; the name of a metric of the model is one already.
+
+    In an expression, ``aspects['packet_loss']['dropped']`` is what an aspect reports, and ``signals['server.size']`` a
+    recorded signal as ``{'time': [...], 'value': [...]}``; ``end``, ``events`` and ``firings`` are those of the run.
+    """
+
+    name: str
+    source: str
+    node: Scalar | None = None  # where it stands; none if the study takes all metrics of its model
+    unit: str = ""  # what the expression counts in; a metric of the model has its own
+    to: str = ""  # the unit in which the table holds it, if that is another one
+    doc: str = ""
+    places: dict[str, Position] = field(default_factory=dict, compare=False)  # of the unit and what follows
+    figures: tuple[tuple[str, str], ...] = field(init=False)
+    signals: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Raises ``ExpressionError``."""
+        formula = Formula(self.source)
+        code = " ".join(self.source.split())
+        figures, signals, others = [], [], {ASPECTS: 0, SIGNALS: 0}
+        for node in ast.walk(ast.parse(code, mode="eval")):
+            match node:
+                case ast.Name(id=name) if name in others:
+                    others[name] += 1
+                case ast.Subscript(
+                    value=ast.Subscript(value=ast.Name(id="aspects"), slice=ast.Constant(value=str(aspect))),
+                    slice=ast.Constant(value=str(figure)),
+                ):
+                    figures.append((aspect, figure))
+                case ast.Subscript(value=ast.Name(id="signals"), slice=ast.Constant(value=str(signal))):
+                    signals.append(signal)
+        if others[ASPECTS] != len(figures):
+            raise ExpressionError("write aspects['name']['figure']", *self._place(formula.source, ASPECTS))
+        if others[SIGNALS] != len(signals):
+            raise ExpressionError("write signals['actor.port']", *self._place(formula.source, SIGNALS))
+        object.__setattr__(self, "figures", tuple(dict.fromkeys(figures)))
+        object.__setattr__(self, "signals", tuple(dict.fromkeys(signals)))
+
+    @property
+    def formula(self) -> Formula:
+        """The checked expression."""
+        return Formula(self.source)
+
+    def _place(self, source: str, part: str) -> tuple[int, int]:
+        return max(source.find(part), 0), len(part)
+
+
+def asks_for_none(source: str) -> bool:
+    """Whether an expression deals with missing numbers itself: ``30 if arrival == None else arrival``."""
+    return any(
+        isinstance(node, ast.Constant) and node.value is None
+        for node in ast.walk(ast.parse(" ".join(source.split()), mode="eval"))
+    )
+
+
+def checked_metric(
+    name: str,
+    node: Scalar,
+    problems: Problems,
+    said: Mapping[str, str] = MappingProxyType({}),
+    places: Mapping[str, Position] = MappingProxyType({}),
+) -> StudyMetric | None:
+    """A metric as a study file gives it; ``said`` are its unit and the like."""
+    source = node.text
+    try:
+        return StudyMetric(name, source, node, **said, places=dict(places))
+    except ExpressionError as error:
+        at = inside(node, source, error.offset, source[error.offset : error.offset + max(error.length, 1)])
+        problems.add(f"metric {name}: {error}", at)
+        return None

@@ -1,0 +1,319 @@
+"""Unfolding: from declarations to a draft with all actors, composites and ports, connected.
+
+What is wrong is told and worked around, so that one load tells it all: a wrong value becomes ``missing`` and what is
+computed from it is not judged; a part that cannot be made is a gap in the draft.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from epicycle.actors import Actor, Parameter
+
+from ..catalogue import Catalogue, CatalogueError, PortTypeError, read_type, token_types
+from ..language import CompositeText, PartText, PortText
+from ..text import RAISE_IT, Position, did_you_mean
+from .composite_aspect import as_actor
+from .connect import Child, Inside, Wiring, child_of_actors
+from .draft import Draft
+from .settle import Settler, converted, drift, local_nanoseconds
+
+MAX_DEPTH = 50
+MAX_SHOWN = 12  # types in one message
+OF_YOUR_OWN = "one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]"
+
+Names = dict[str, object]
+
+
+class TooLargeError(Exception):
+    """The model has too many parts to go on; the reason has been noted."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What parts may be of: the composite classes of a model, and the types that are installed."""
+
+    composites: Mapping[str, CompositeText]
+    catalogue: Catalogue
+    broken: Collection[str] = ()  # composites that are there, but lack what they extend
+
+    def valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
+        """Which types there are: their names, or how to see them if they are too many; and how there can be more."""
+        is_actor = kind == "actor"
+        types: Collection[str] = self.catalogue.actors if is_actor else self.catalogue.aspects
+        others: Collection[str] = self.catalogue.aspects if is_actor else self.catalogue.actors
+        if asked in others:
+            other = "aspect" if is_actor else "actor"
+            return (f"{asked} is an {other}: it belongs under '{other}s'",)
+        composites = sorted(self.composites) if is_actor else []
+        if len(composites) + len(types) <= MAX_SHOWN:
+            valid = ", ".join(sorted([*composites, *types]))
+        else:
+            own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
+            valid = f"{f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+        return f"valid types: {valid}", OF_YOUR_OWN
+
+
+@dataclass(frozen=True)
+class AspectToWeave:
+    """An aspect that a model or an instance of a composite declares; ``names`` are what its values may use."""
+
+    name: str
+    scope: str
+    part: PartText
+    names: Names
+
+
+@dataclass
+class Unfolded:
+    """What has been made so far: ``cost`` actors and composites, of which there may be ``most``, and aspects."""
+
+    draft: Draft
+    most: int
+    aspects: list[AspectToWeave] = field(default_factory=list)
+    actors: list[Actor] = field(default_factory=list)
+    classes: set[str] = field(default_factory=set)  # the composites of which there are instances
+    cost: int = 0
+    places: int = 0  # at which aspects stand
+
+
+class Unfolding:
+    """Makes parts of a model; that they are too many is told with ``advice``, or not at all."""
+
+    def __init__(self, known: Known, settler: Settler, made: Unfolded, advice: str = RAISE_IT) -> None:
+        self.known = known
+        self.settler = settler
+        self.values = settler.values
+        self.problems = settler.problems
+        self.made = made
+        self.draft = made.draft
+        self._advice = advice
+        self._port_types: dict[str, Any] = {}
+        self._token_types: dict[str, type] | None = None
+
+    def body(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...] = ()) -> None:
+        """Make the actors of a composite, or of the model, and connect them; its aspects are noted."""
+        children: dict[str, Child] = {}
+        for name, part in composite.actors.items():
+            full = f"{path}.{name}" if path else name
+            child = self.instances(full, path, part, names, within)
+            if child is None:
+                self.draft.unknown.add(full)
+            else:
+                children[name] = child
+        for name, part in composite.aspects.items():
+            if part.type.text in self.known.composites and (
+                model := self._aspect_model(path, composite, part, names, within)
+            ):
+                children[name] = model
+        inside = Inside(
+            path, composite.name, composite.inputs, composite.outputs, composite.actors, children, composite
+        )
+        wiring = Wiring(inside, self.draft.graph, self.values, self.problems)
+        self.draft.is_wired = self.draft.is_wired and composite.is_wired
+        for connection in composite.connections:
+            wiring.resolve(connection, names).make(self.draft)
+        for name, part in composite.aspects.items():
+            self.made.aspects.append(AspectToWeave(f"{path}.{name}" if path else name, path, part, names))
+
+    def instances(
+        self, path: str, composite: str, part: PartText, names: Names, within: tuple[str, ...] = ()
+    ) -> Child | None:
+        """Make the instances of one entry of ``actors``; None if there is no such type."""
+        kind = self._type(path, composite, part, within)
+        if kind is None:
+            return None
+        count, is_array = self._count(path, composite, part, names), part.count is not None
+        if count is None:
+            self.draft.unknown.add(path)
+        elif count == 0:
+            self.draft.empty.add(path)
+            self.draft.kinds |= self._kinds(part)
+        paths = [f"{path}[{index}]" if is_array else path for index in range(count or 0)]
+        before, was_muted = len(self.problems), self.problems.muted
+        for index, instance in enumerate(paths):
+            self._count_one(path, part)
+            scope = {**names, "index": index} if is_array else names
+            self._prioritise(instance, composite, kind, part, scope)
+            if part.tags:
+                self.draft.graph.tags[instance] = tuple(tag.text for tag in part.tags)
+            if isinstance(kind, CompositeText):
+                inside = self.settler.parameters(instance, kind, part.values, scope, part.position)
+                if "index" in scope:
+                    inside.setdefault("index", scope["index"])
+                self.composite(instance, kind, inside, part.position, within)
+            else:
+                self._actor(instance, composite, kind, part, scope)
+            if len(self.problems) > before:
+                self.problems.muted = True  # the other instances would only repeat it
+        self.problems.muted = was_muted
+        if isinstance(kind, CompositeText):
+            return Child(kind.name, paths, is_array, count, list(kind.inputs), list(kind.outputs))
+        return child_of_actors(kind, paths, is_array, count, self.draft.graph)
+
+    # -- one entry of ``actors`` ----------------------------------------------------------------------------------
+
+    def _type(
+        self, path: str, composite: str, part: PartText, within: tuple[str, ...]
+    ) -> CompositeText | type[Actor] | None:
+        """What a part is; None, and told, if it cannot be that."""
+        known, wanted = self.known, part.type.text
+        inner = known.composites.get(wanted)
+        try:
+            found = known.catalogue.actors.get(wanted) if inner is None else inner
+        except CatalogueError as error:
+            self._tell(f"{path}: {error.message}", part.type.position, composite, *error.help)
+            return None
+        if wanted in known.broken:
+            return None
+        if found is None:
+            near = did_you_mean(wanted, [*known.composites, *known.catalogue.actors])
+            hints = known.valid_types("actor", wanted)
+            self._tell(f"{path}: there is no actor type {wanted!r}{near}", part.type.position, composite, *hints)
+        elif wanted in within:
+            way = " -> ".join([*within[within.index(wanted) :], wanted])
+            self._tell(f"{path}: composite {wanted} contains itself: {way}", part.type.position, composite)
+        elif len(within) >= MAX_DEPTH:
+            self._tell(f"{path}: composites are nested deeper than {MAX_DEPTH} levels", part.type.position, "")
+        else:
+            return found
+        return None
+
+    def _tell(self, message: str, position: Position | None, scope: str, *hints: str) -> None:
+        self.problems.add(message, position, *hints, scope=scope)
+
+    def _count(self, path: str, composite: str, part: PartText, names: Names) -> int | None:
+        """How many instances there are; None if that is not known."""
+        if part.count is None:
+            return 1
+        count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
+        found = converted(self.values, part.count, names, f"{path}: count", composite, count.convert)
+        return None if found is self.values.missing else found
+
+    def _count_one(self, path: str, part: PartText) -> None:
+        """Count one more instance; raises ``TooLargeError`` if there are too many."""
+        self.made.cost += 1
+        if self.made.cost > self.made.most:
+            self.problems.muted = False
+            if self._advice:
+                most = f"{self.made.most:,} actors and composites"
+                self._tell(f"{path}: the model has more than {most}", part.position, "", self._advice)
+            raise TooLargeError
+
+    def _kinds(self, part: PartText) -> set[str]:
+        """The types and tags that an instance of this part and what is in it would have."""
+        found: set[str] = set()
+        waiting, seen = [part], set[str]()
+        while waiting:
+            each = waiting.pop()
+            found |= {each.type.text, *(tag.text for tag in each.tags)}
+            if (inner := self.known.composites.get(each.type.text)) is not None and inner.name not in seen:
+                seen.add(inner.name)
+                waiting += inner.actors.values()
+        return found
+
+    def _prioritise(self, path: str, composite: str, kind: object, part: PartText, names: Names) -> None:
+        """Note the priority of an actor, or of a composite that fires as one."""
+        if part.priority is None:
+            return
+        if isinstance(kind, CompositeText) and kind.director is None:
+            self._tell(
+                f"{path}: {kind.name} has no priority, for its actors fire one by one",
+                part.priority.position,
+                composite,
+                f"give the actors inside a priority, or give {kind.name} a director of its own: 'director: {{}}'",
+            )
+            return
+        label = f"{path}: priority"
+        found = converted(self.values, part.priority, names, label, composite, Parameter(int).convert)
+        if found is not self.values.missing:
+            self.draft.graph.priorities[path] = found or 0
+
+    def _actor(self, path: str, composite: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
+        values = self.settler.configuration(path, actor_type, part.values, names, part.position, path, composite)
+        if values is not None:
+            try:
+                actor = actor_type(path, **values)
+                self.draft.graph.add_actor(actor, part.position)
+                self.made.actors.append(actor)
+                return
+            except Exception as error:  # whatever an actor's own __init__ does
+                self.settler.blame(path, error, part.position, composite)
+        self.draft.leave_out(path, actor_type)
+
+    # -- composites -----------------------------------------------------------------------------------------------
+
+    def composite(
+        self,
+        path: str,
+        composite: CompositeText,
+        inside: Names,
+        position: Position | None,
+        within: tuple[str, ...] = (),
+    ) -> None:
+        """One instance of a composite, its ports and all that is in it; ``inside`` are its parameters."""
+        graph = self.draft.graph
+        self.made.classes.add(composite.name)
+        graph.add_composite(path, composite.name)
+        for direction in ("input", "output"):
+            for name, port in composite.ports(direction).items():
+                kind = self._port_type(composite, port)
+                graph.add_composite_port(f"{path}.{name}", direction, position, kind, port.position)
+        if composite.director is not None:
+            local: dict[str, Any] = {"start": None, "drift": 1.0}
+            for key, entry in composite.director.items():
+                convert = local_nanoseconds if key == "start" else drift
+                found = converted(self.values, entry.value, inside, f"{path}: director.{key}", path, convert)
+                local |= {} if found is self.values.missing else {key: found}
+            graph.add_director(path, local["start"], local["drift"])
+        self.body(path, composite, inside, (*within, composite.name))
+
+    def _port_type(self, composite: CompositeText, port: PortText) -> Any:
+        """The type that a composite declares for a port; None if it says none, or none that there is."""
+        if port.type is None:
+            return None
+        text = port.type.text
+        if text not in self._port_types:
+            try:
+                self._port_types[text] = read_type(text, self._tokens)
+            except PortTypeError as error:
+                self._port_types[text] = error
+        found = self._port_types[text]
+        if isinstance(found, PortTypeError):
+            hints = (found.help,) if found.help else ()
+            self._tell(f"port {port.name!r} of {composite.name}: {found.message}", port.type.position, "", *hints)
+            return None
+        return found
+
+    def _tokens(self) -> dict[str, type]:
+        if self._token_types is None:
+            self._token_types = token_types(self.known.catalogue)
+        return self._token_types
+
+    # -- aspects that are models ----------------------------------------------------------------------------------
+
+    def _aspect_model(
+        self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
+    ) -> Child | None:
+        """Make the composite that an aspect is; one that is not enabled is made for trial alone."""
+        full, graph = f"{path}.{part.name}" if path else part.name, self.draft.graph
+        is_port = part.name in composite.inputs or part.name in composite.outputs
+        if is_port or part.name in composite.actors or full in graph.actors or full in graph.composites:
+            clash = "a port" if is_port else "an actor"
+            self._tell(
+                f"{full!r} is the name of {clash} and of an aspect that is a model", part.position, "", "rename one"
+            )
+            return None
+        if self.settler.is_enabled(full, path, part, names):
+            return self.instances(full, path, as_actor(part), names, within)
+        trial = replace(self.made, draft=self.draft.inside(graph.director_of(full)), aspects=[], actors=[])
+        try:
+            Unfolding(self.known, self.settler, trial, self._advice).instances(
+                full, path, as_actor(part), names, within
+            )
+        finally:
+            self.made.cost = trial.cost
+        self.draft.unknown.add(full)
+        return None

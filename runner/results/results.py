@@ -1,0 +1,145 @@
+"""What a run leaves behind: signals, metrics, counts and the log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from epicycle.actors import counted, did_you_mean, to_seconds
+
+from ..shown import short
+from ..tables import Table, as_html, as_text, pandas_module
+from .encoding import cell, leaves
+from .log import EventLog
+from .outcome import Interval, Outcome
+from .signal import Signal, SignalError
+
+if TYPE_CHECKING:
+    import pandas
+
+
+COLUMNS = ("time", "time_ns", "microstep", "signal", "field", "type", "value", "text")  # of recorded signals
+
+
+@dataclass(repr=False)
+class Results:
+    """The outcome of one run: ``metrics``, recorded ``signals``, counts and figures of ``aspects``, the ``log``
+    and its ``digest``.  ``outcomes`` say more of each metric: its interval, or why it has no value.
+
+    >>> results = Simulation(model, seed=7).run()
+    >>> results.metrics["mean_wait"], results["server.output"].values
+    """
+
+    model: str
+    seed: int
+    parameters: dict[str, object]
+    metrics: dict[str, Any]
+    aspects: dict[str, dict[str, float | None]]  # counts of events, and what aspects report
+    signals: dict[str, Signal]
+    log: EventLog
+    end: float  # s, the last tag
+    stopped: str  # why the run ended
+    firings: int
+    wall_time: float  # s
+    units: dict[str, str] = field(default_factory=dict)  # of the metrics
+    outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
+
+    @property
+    def intervals(self) -> dict[str, Interval]:
+        """The confidence intervals of the metrics that have one."""
+        return {name: each.interval for name, each in self.outcomes.items() if each.interval is not None}
+
+    @property
+    def events(self) -> int:
+        """The number of records in the event log."""
+        return self.log.count
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the event log."""
+        return self.log.digest
+
+    def __getitem__(self, name: str) -> Signal:
+        """A recorded signal; raises ``SignalError``."""
+        if name not in self.signals:
+            known = list(self.signals)
+            raise SignalError(
+                f"{name!r} was not recorded{did_you_mean(name, known)}; recorded: {', '.join(known) or 'nothing'}"
+            )
+        return self.signals[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.signals)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
+    def table(self) -> dict[str, list[Any]]:
+        """All that was recorded in long form, the columns of ``signals.parquet``: a row for each leaf of each token.
+
+        ``time`` is in s, ``time_ns`` the same as an integer, ``field`` the place in the token, and ``type`` says what
+        was there.  ``value`` is a number, or 0 or 1 for false or true; ``text`` is anything else, and the digits of an
+        int that no float is.
+        """
+        rows = (
+            (to_seconds(tag.time), *tag, name, place, *(("float", leaf, None) if type(leaf) is float else cell(leaf)))
+            for name, signal in self.signals.items()
+            for tag, token in zip(signal.tags, signal.tokens, strict=True)
+            for place, leaf in leaves(token)
+        )
+        table: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+        while some := list(islice(rows, 10_000)):
+            for column, values in zip(table.values(), zip(*some, strict=True), strict=True):
+                column.extend(values)
+        return table
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """All that was recorded in long form, as ``table`` has it."""
+        frame: pandas.DataFrame = pandas_module().DataFrame(self.table())
+        return frame
+
+    def frame(self, name: str) -> pandas.DataFrame:
+        """One signal as ``Signal.to_pandas`` gives it."""
+        return self[name].to_pandas()
+
+    def __repr__(self) -> str:
+        return (
+            f"<Results of {self.model}, seed {self.seed}: {self.end:g} s, ended by {self.stopped}, "
+            f"{counted(self.events, 'event')}, digest {self.digest[:16]}...>"
+        )
+
+    def __str__(self) -> str:
+        return as_text(self._caption(), self._tables())
+
+    def _repr_html_(self) -> str:
+        return as_html(self._caption(), self._tables())
+
+    def _caption(self) -> str:
+        return f"{self.model}, seed {self.seed}: {self.end:g} s of model time, ended by {self.stopped}"
+
+    def _tables(self) -> list[Table]:
+        figures = [
+            (name, what, "-" if figure is None else f"{figure:,}" if isinstance(figure, int) else short(figure))
+            for name, found in self.aspects.items()
+            for what, figure in found.items()
+        ]
+        run = [
+            ("events", f"{self.events:,}"),
+            ("firings", f"{self.firings:,}"),
+            ("wall time", f"{self.wall_time:.3f} s"),
+            ("digest", f"{self.digest[:16]}..."),
+        ]
+        return [
+            Table(
+                ("metric", "value", "unit", ""),
+                [
+                    (name, found.shown(short), self.units.get(name, ""), "; ".join(found.remarks))
+                    for name, found in self.outcomes.items()
+                ],
+            ),
+            Table(("aspect", "figure", "value"), figures),
+            Table(("signal", "tokens"), [(name, f"{len(signal):,}") for name, signal in self.signals.items()]),
+            Table(("run", ""), run),
+        ]

@@ -1,0 +1,187 @@
+"""Signal: what one port sent, as lists, NumPy arrays or a data frame."""
+
+from __future__ import annotations
+
+import dataclasses
+from array import array
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.actors import EpicycleError, Tag, counted, did_you_mean, to_seconds
+
+from ..shown import short
+from ..tables import Table, as_html, as_text, pandas_module
+from .encoding import field_names, leaves
+
+if TYPE_CHECKING:
+    import pandas
+
+T = TypeVar("T")
+_SHOWN = 8  # tokens at the beginning and at the end
+
+
+class SignalError(EpicycleError):
+    """A signal, or a field of its tokens, that is not there."""
+
+
+class Past(list[T]):
+    """What has happened in a run, and does not change any more: a copy of the run has a list of the same things."""
+
+
+class Signal:
+    """What one port sent: tags and tokens, in order.
+
+    >>> state = results["main.state"]
+    >>> state.times, state["position"]          # arrays of shape (n,) and (n, 2)
+    """
+
+    def __init__(self, name: str, tags: Iterable[Tag] = (), tokens: Iterable[Any] = ()) -> None:
+        self.name = name
+        # Tags, and tokens that are all floats or all ints, are kept as the numbers that they are: about 20 bytes for
+        # both together, where a tag and a float as objects take 130.  Ctrl-C may come between any two of these lines:
+        # a token is there when its microstep is, which is added last.
+        self._times = array("q")
+        self._microsteps = array("i")
+        self._tokens: Any = array("d")
+        self._kind: type | None = float  # of all tokens; None: there are others, and ``_tokens`` is a list
+        for tag, token in zip(tags, tokens, strict=True):
+            self.add(tag, token)
+
+    def add(self, tag: Tag, token: Any) -> None:
+        """Append a token."""
+        time, microstep = tag
+        if type(token) is not self._kind and self._kind is not None:
+            self._make_room(token)
+        try:
+            self._tokens.append(token)
+        except OverflowError:  # an int of more than 64 bits
+            self._tokens = Past([*self._tokens, token])
+            self._kind = None
+        self._times.append(time)
+        self._microsteps.append(microstep)
+
+    def _make_room(self, token: Any) -> None:
+        """See to it that a token of another type than before can be kept."""
+        if type(token) is int and not self._tokens:
+            self._tokens, self._kind = array("q"), int
+        else:
+            self._tokens, self._kind = Past(self._tokens), None
+
+    @property
+    def tags(self) -> list[Tag]:
+        """When each token was sent."""
+        return list(map(Tag, self._times, self._microsteps))
+
+    @property
+    def tokens(self) -> list[Any]:
+        """What was sent."""
+        return list(self._tokens[: len(self)])
+
+    def __iter__(self) -> Iterator[tuple[Tag, Any]]:
+        """Each token with its tag, of which there may be more than fit into memory all at once."""
+        return zip(map(Tag, self._times, self._microsteps), self._tokens, strict=False)
+
+    def __len__(self) -> int:
+        return len(self._microsteps)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The times in seconds."""
+        return np.fromiter(map(to_seconds, self._times), dtype=float, count=len(self))
+
+    @property
+    def microsteps(self) -> NDArray[np.int64]:
+        """The microsteps."""
+        return np.array(self._microsteps, dtype=np.int64)
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """The tokens as an array: numbers as such, arrays of one shape stacked, anything else as objects."""
+        return as_array(self.tokens)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The names of the tokens' fields, if they are dataclasses or mappings."""
+        names: dict[str, None] = {}
+        for token in self.tokens:
+            names.update(dict.fromkeys(_fields(token)))
+        return tuple(names)
+
+    def field(self, name: str) -> NDArray[Any]:
+        """One field of all tokens as an array, also written ``signal[name]``; raises ``SignalError``."""
+        found = []
+        for token in self.tokens:
+            if name not in _fields(token):
+                valid = _fields(token)
+                raise SignalError(
+                    f"{self.name}: a token of type {type(token).__name__} has no field {name!r}"
+                    f"{did_you_mean(name, valid)}; its fields: {', '.join(valid) or 'none'}"
+                )
+            found.append(token[name] if isinstance(token, dict) else getattr(token, name))
+        return as_array(found)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.field(name)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each token, indexed by time in s: ``microstep``, and a column for each number or text in a token.
+
+        The column of a plain number is ``value``; others are called by their place, such as ``position[0]``.  A field
+        ``time`` or ``microstep`` of the token itself is ``token.time`` or ``token.microstep``.
+        """
+        frames = pandas_module()
+        index = frames.Index(self.times, name="time")
+        named = {"": "value", "time": "token.time", "microstep": "token.microstep"}
+        rows = [{named.get(place, place): leaf for place, leaf in leaves(token)} for token in self.tokens]
+        columns = dict.fromkeys(place for row in rows for place in row)
+        frame: pandas.DataFrame = frames.DataFrame(rows, index=index, columns=list(columns))
+        frame.insert(0, "microstep", self.microsteps)
+        return frame
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return f"<Signal {self.name}: no tokens>"
+        kind = type(self._tokens[0]).__name__
+        first, last = to_seconds(self._times[0]), to_seconds(self._times[-1])
+        tokens = counted(len(self), "token")
+        return f"<Signal {self.name}: {tokens} ({kind}) from {first:g} s to {last:g} s>"
+
+    def __str__(self) -> str:
+        return as_text(repr(self).strip("<>"), [self._table()])
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self).strip("<>"), [self._table()])
+
+    def _table(self) -> Table:
+        rows = [
+            (f"{tag.seconds:.9g}", str(tag.microstep), short(token))
+            for tag, token in zip(self.tags, self.tokens, strict=True)
+        ]
+        if len(rows) > 2 * _SHOWN:
+            rows = [*rows[:_SHOWN], ("...", "", ""), *rows[-_SHOWN:]]
+        return Table(("time (s)", "microstep", "token"), rows)
+
+
+def as_array(tokens: list[Any]) -> NDArray[Any]:
+    """Tokens as an array, whose first axis counts them."""
+    kinds = {type(token) for token in tokens}
+    if kinds <= {bool, int, float, str} and (len(kinds) < 2 or str not in kinds):
+        return np.array(tokens, dtype=None if tokens else float)
+    try:
+        found = np.array(tokens)
+    except ValueError:  # of different shapes
+        found = np.empty(0, dtype=object)
+    if found.ndim > 0 and len(found) == len(tokens) and found.dtype.kind in "biuf":
+        return found
+    return np.fromiter(tokens, dtype=object, count=len(tokens))
+
+
+def _fields(token: Any) -> tuple[str, ...]:
+    if isinstance(token, dict):
+        return tuple(str(key) for key in token)
+    if dataclasses.is_dataclass(token) and not isinstance(token, type):
+        return field_names(type(token))
+    return ()

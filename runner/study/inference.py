@@ -1,0 +1,176 @@
+"""Statistics of replications: intervals of means and rates, and comparisons of conditions in pairs.
+
+Runs that failed or have no number are counted apart by the callers, never averaged in.
+Source: A. M. Law, *Simulation Modeling and Analysis*, chapters 4, 9 and 10.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from epicycle.actors import normal_quantile, normal_share, random_stream
+
+from ..student import student_quantile, student_tail
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its standard error and confidence interval, from ``count`` values."""
+
+    value: float
+    error: float
+    low: float
+    high: float
+    count: int
+
+
+def half_width(values: Sequence[float], level: float = LEVEL) -> float:
+    """Half the width of Student's confidence interval of the mean; infinite for fewer than two values."""
+    count = len(values)
+    return student_quantile((1 + level) / 2, count - 1) * _standard_error(values) if count > 1 else math.inf
+
+
+def _standard_error(values: Sequence[float]) -> float:
+    return _deviation(values) / math.sqrt(len(values)) if len(values) > 1 else math.nan
+
+
+def _deviation(values: Sequence[float]) -> float:
+    mean = math.fsum(values) / len(values)
+    gaps = [value - mean for value in values]
+    return math.sqrt(math.fsum(gap * gap for gap in gaps) / (len(values) - 1))
+
+
+def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
+    """The mean with Student's interval; NaN where there are no values, an infinite interval for one."""
+    count = len(values)
+    if count == 0:
+        return Estimate(math.nan, math.nan, -math.inf, math.inf, 0)
+    value, half = math.fsum(values) / count, half_width(values, level)
+    return Estimate(value, _standard_error(values), value - half, value + half, count)
+
+
+def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: int = 9_999) -> Estimate:
+    """The mean with the bias-corrected and accelerated bootstrap interval, which may lie unevenly around it.
+
+    Source: B. Efron, Better Bootstrap Confidence Intervals, J. American Statistical Association 82, 1987.
+    """
+    plain, count = mean(values, level), len(values)
+    if count < 2 or min(values) == max(values):
+        return plain
+    means = sorted((resampled_sums(values, resamples) / count).tolist())
+    gaps = [value - plain.value for value in values]
+    squares = math.fsum(gap * gap for gap in gaps)
+    acceleration = math.fsum(gap * gap * gap for gap in gaps) / (6.0 * squares * math.sqrt(squares))
+    rounding = 1e-12 * max(map(abs, values))  # of few values, many a resample has each of them once: the same mean
+    at_or_below = bisect_left(means, plain.value - rounding) + bisect_right(means, plain.value + rounding)
+    below = at_or_below / (2.0 * resamples)
+    bias = normal_quantile(min(max(below, 0.5 / resamples), 1.0 - 0.5 / resamples))
+    ends = []
+    for share in ((1.0 - level) / 2.0, (1.0 + level) / 2.0):
+        shifted = bias + normal_quantile(share)
+        place = (resamples - 1) * normal_share(bias + shifted / (1.0 - acceleration * shifted))
+        low = min(int(place), resamples - 2)
+        ends.append(means[low] + (place - low) * (means[low + 1] - means[low]))
+    return Estimate(plain.value, _deviation(means), ends[0], ends[1], count)
+
+
+def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:
+    """Sums of bootstrap samples, in order; as many values are drawn alike wherever this is called."""
+    import numpy as np
+
+    known, sums = np.asarray(values, float), np.zeros(number)
+    for start, draws in _draws(len(values), number):
+        part = sums[start : start + draws.shape[1]]
+        for chosen in draws:
+            part += known[chosen]
+    return sums
+
+
+def _draws(count: int, number: int) -> Iterable[tuple[int, NDArray[np.int64]]]:
+    """Which values bootstrap samples take, a million of choices at a time: (choice, sample), from the first one on."""
+    return _few_draws(count, number) if count * number <= 2_000_000 else _all_draws(count, number)
+
+
+@lru_cache(maxsize=2)
+def _few_draws(count: int, number: int) -> list[tuple[int, NDArray[np.int64]]]:
+    return list(_all_draws(count, number))
+
+
+def _all_draws(count: int, number: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    import numpy as np
+
+    stream, rows = random_stream(0, "resampling"), max(1, 1_000_000 // count)
+    for start in range(0, number, rows):
+        size = (min(rows, number - start), count)
+        yield start, np.ascontiguousarray(stream.integers(count, size=size).T)
+
+
+def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
+    """A share with Wilson's interval, which holds for rare events and few runs, too."""
+    if count == 0:
+        return Estimate(math.nan, math.nan, 0.0, 1.0, 0)
+    share, z = successes / count, normal_quantile((1.0 + level) / 2.0)
+    error = share * (1.0 - share) / count
+    scale = 1.0 + z * z / count
+    middle = (share + z * z / (2.0 * count)) / scale
+    half = z * math.sqrt(error + z * z / (4.0 * count * count)) / scale
+    low, high = max(0.0, middle - half) if successes else 0.0, min(1.0, middle + half) if successes < count else 1.0
+    return Estimate(share, math.sqrt(error), low, high, count)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The mean of ``second`` less ``first`` over common replications, and the p-value of its being zero."""
+
+    estimate: Estimate
+    p: float
+
+
+def paired_difference(first: dict[int, float], second: dict[int, float], level: float = LEVEL) -> Difference:
+    """How much greater one condition's numbers are than another's, by replication, with Student's paired test.
+
+    Replications that only one of them has are left out.  If all differences are the same, there is no spread by which
+    Student's test could judge them, and the p-value is that of the sign test.
+    """
+    common = sorted(first.keys() & second.keys())
+    scale = max((max(abs(first[each]), abs(second[each])) for each in common), default=0.0)
+    gaps = without_rounding((second[each] - first[each] for each in common), scale)
+    estimate = mean(gaps, level)
+    if len(gaps) < 2:
+        return Difference(estimate, math.nan)
+    if min(gaps) == max(gaps):
+        return Difference(estimate, 1.0 if gaps[0] == 0 else math.ldexp(1.0, 1 - len(gaps)))
+    return Difference(estimate, 2.0 * student_tail(abs(estimate.value) / estimate.error, len(gaps) - 1))
+
+
+def without_rounding(values: Iterable[float], scale: float) -> list[float]:
+    """Differences of numbers of some size, without what rounding has left: 4.8 - 4.7 and 5.0 - 4.9 are the same."""
+    if not scale:
+        return list(values)
+    quantum = math.ldexp(1.0, math.frexp(scale)[1] - 42)
+    return [round(value / quantum) * quantum for value in values]
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """The p-values of tests that were made together, corrected for their number; those that are NaN do not count.
+
+    Source: S. Holm, *A simple sequentially rejective multiple test procedure*, Scand. J. Statist. 6 (1979).
+    """
+    corrected = list(p_values)
+    order = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
+    greatest = 0.0
+    for rank, (p, place) in enumerate(order):
+        greatest = max(greatest, min(1.0, (len(order) - rank) * p))
+        corrected[place] = greatest
+    return corrected

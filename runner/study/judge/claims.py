@@ -1,0 +1,380 @@
+"""Judging claims: every one is taken apart into comparisons, each with its interval and a corrected test.
+
+A comparison is a contrast of conditions, weighed sum by weighed sum over common replications: the difference of two
+conditions, or the difference of two slopes.  Its mean has Student's interval and test, and the bootstrap's interval
+beside them; the p-values of one claim are corrected together (Holm).
+
+Sources: A. M. Law, *Simulation Modeling and Analysis*, 10.2 (paired comparisons under common random numbers);
+S. Holm, *A simple sequentially rejective multiple test procedure* (1979); E. B. Wilson, *Probable inference* (1927).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise, product
+from typing import Any
+
+from epicycle.actors import EpicycleError
+from epicycle.actors.expression import Formula
+
+from ...language import ALWAYS, FALLS, GREATER, RISES, Claim, Factor, Selection, asks_for_none
+from ...shown import finite
+from ..inference import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
+from .samples import Levels, Place, Samples, has_enough
+
+REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
+CONFIRMED, REVERSED = "confirmed", "reversed"
+ALMOST_ALL = 0.9  # what Wilson's lower bound has to reach for "in every run", if none is against it
+RESAMPLES = 1_999
+
+Choices = Sequence[Sequence[int]]  # levels, by dimension
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one comparison has found: how much more ``metric`` is at ``level`` than ``against`` another, ``where``.
+
+    For a condition that is to hold always, ``metric`` is the condition, and ``value`` the share of the runs in which it
+    does.  ``count`` runs or pairs have a number, ``missing`` have none.  ``outcome`` is ``confirmed``, ``reversed`` or
+    ``undecided``.
+    """
+
+    metric: str
+    where: Levels
+    level: Levels
+    against: Levels
+    value: float
+    error: float
+    low: float
+    high: float
+    count: int
+    missing: int
+    bootstrap_low: float = math.nan
+    bootstrap_high: float = math.nan
+    p: float = math.nan
+    p_holm: float = math.nan
+    outcome: str = UNDECIDED
+
+    @property
+    def has_enough(self) -> bool:
+        """Whether so few numbers are missing that the mean says something."""
+        return has_enough(self.count, self.missing)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What came of a claim, for one level each of the factors that are judged apart (``where``)."""
+
+    claim: Claim
+    where: Levels
+    verdict: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def name(self) -> str:
+        """The name of the claim."""
+        return self.claim.name
+
+    def counts(self, outcome: str) -> int:
+        """How many comparisons have come out like this."""
+        return sum(finding.outcome == outcome for finding in self.findings)
+
+    @property
+    def agreeing(self) -> int:
+        """How many means point where the claim says, by chance or not; of conditions, how many hold in all runs."""
+        if self.claim.form == ALWAYS:
+            return sum(finding.count > 0 and finding.value == 1 for finding in self.findings)
+        return sum(_support(self.claim, finding) > 0 for finding in self.findings)
+
+    @property
+    def holds_in_means(self) -> bool:
+        """Whether so many means agree as the claim asks for, by chance or not."""
+        return bool(self.findings) and self.agreeing >= self.claim.share * len(self.findings) - 1e-9
+
+    @property
+    def missing(self) -> int:
+        """How many runs or pairs have no number, over all comparisons."""
+        return sum(finding.missing for finding in self.findings)
+
+    @property
+    def weakest(self) -> Finding | None:
+        """The weakest comparison, counted in standard errors for the claim; None if there is none."""
+        return min(self.findings, key=lambda each: _support(self.claim, each), default=None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a JSON file; numbers that are not finite are None."""
+        claim, weakest = self.claim, self.weakest
+        return {
+            "name": claim.name,
+            "doc": claim.doc,
+            "statement": claim.statement,
+            "form": claim.form,
+            "where": self.where,
+            "verdict": self.verdict,
+            "confirmed": self.counts(CONFIRMED),
+            "reversed": self.counts(REVERSED),
+            "undecided": self.counts(UNDECIDED),
+            "agreeing": self.agreeing,
+            "missing": self.missing,
+            "weakest": None if weakest is None else finite(asdict(weakest)),
+            "findings": [finite(asdict(finding)) for finding in self.findings],
+        }
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How much speaks for one level each of the factors that claims are judged apart for: what came of all of them."""
+
+    where: Levels
+    judgements: tuple[Judgement, ...]
+
+    @property
+    def in_means(self) -> int:
+        """How many claims hold in the means, by chance or not."""
+        return sum(each.holds_in_means for each in self.judgements)
+
+    def counts(self, verdict: str) -> int:
+        """How many claims have that verdict."""
+        return sum(each.verdict == verdict for each in self.judgements)
+
+    @property
+    def agreeing(self) -> float:
+        """Of the comparisons of a claim, the share that agrees, in the mean over the claims."""
+        shares = [each.agreeing / len(each.findings) if each.findings else 0.0 for each in self.judgements]
+        return math.fsum(shares) / len(shares)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a JSON file."""
+        return {
+            "where": self.where,
+            "in_means": self.in_means,
+            "reproduced": self.counts(REPRODUCED),
+            "undecided": self.counts(UNDECIDED),
+            "not_reproduced": self.counts(NOT_REPRODUCED),
+            "agreeing": self.agreeing,
+        }
+
+
+def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
+    """The levels that claims are judged apart for, the one that most speaks for first.
+
+    First counts how few claims are refuted, then how many hold in the means, how many are reproduced, and what agrees.
+    """
+    apart: dict[tuple[Factor, ...], list[Judgement]] = {}
+    for each in judgements:
+        apart.setdefault(tuple(each.where.values()), []).append(each)
+    standings = [Standing(found[0].where, tuple(found)) for found in apart.values()]
+    return sorted(
+        standings,
+        key=lambda each: (-each.counts(NOT_REPRODUCED), each.in_means, each.counts(REPRODUCED), each.agreeing),
+        reverse=True,
+    )
+
+
+def judge(samples: Samples, level: float = LEVEL) -> list[Judgement]:
+    """Judge all claims of a study, one after the other; those of another study at each level of what that has not."""
+    questions = samples.study.questions
+    return [
+        _judged(claim, apart, samples, level) for apart in samples.levels(questions.apart) for claim in questions.claims
+    ]
+
+
+def _judged(claim: Claim, apart: Levels, samples: Samples, level: float) -> Judgement:
+    where: Selection = {**claim.where, **{factor: (value,) for factor, value in apart.items()}}
+    if claim.form == ALWAYS:
+        findings = list(_occurrences(claim, where, samples, level))
+    else:
+        contrasts = list(_contrasts(claim, where, samples))
+        findings = [_finding(metric.text, each, samples, level) for metric in claim.metrics for each in contrasts]
+        corrected = holm([finding.p for finding in findings])
+        findings = [replace(each, p_holm=p) for each, p in zip(findings, corrected, strict=True)]
+        findings = [replace(each, outcome=_outcome(claim, each, level)) for each in findings]
+    findings = [
+        replace(each, where={name: value for name, value in each.where.items() if name not in apart})
+        for each in findings
+    ]
+    return Judgement(claim, apart, verdict(claim, findings), tuple(findings))
+
+
+def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
+    """What the outcomes of all comparisons mean for their claim."""
+    count = len(findings)
+    confirmed = sum(each.outcome == CONFIRMED for each in findings)
+    turned = sum(each.outcome == REVERSED for each in findings)
+    if claim.form in (RISES, FALLS):
+        if turned:
+            return NOT_REPRODUCED
+        is_monotone = all(each.has_enough and _sign(claim) * each.value >= 0 for each in findings)
+        return REPRODUCED if confirmed and is_monotone else UNDECIDED
+    share = 1.0 if claim.form == ALWAYS else claim.share
+    if turned > (1 - share) * count + 1e-9:
+        return NOT_REPRODUCED
+    return REPRODUCED if count and confirmed >= share * count - 1e-9 else UNDECIDED
+
+
+# -- comparisons ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Contrast:
+    """A weighed sum of conditions."""
+
+    weights: Mapping[Place, float]
+    where: Levels
+    level: Levels
+    against: Levels
+
+
+def _contrasts(claim: Claim, where: Selection, samples: Samples) -> Iterator[_Contrast]:
+    """What a claim compares, at every combination of the dimensions that it says nothing of."""
+    choices = samples.choices(where)
+    ordered = claim.form in (RISES, FALLS)
+    compared = samples.homes([claim.over] if ordered else claim.at)
+    slope = _slope(claim, choices, samples) if claim.per else {(): 1.0}
+    homes = [*compared, *(samples.homes([claim.per]) if claim.per else ())]
+    pairs = list(_steps(claim, choices, samples) if ordered else _pairs(claim, choices, compared, samples))
+    for rest in samples.places(choices, homes):
+        for this, that in pairs:
+            weights = {
+                _with(rest, homes, (*levels, *inner)): sign * weight
+                for sign, levels in ((1.0, this), (-1.0, that))
+                for inner, weight in slope.items()
+                if weight
+            }
+            yield _Contrast(
+                weights,
+                samples.values(rest, [home for home in range(len(choices)) if home not in homes]),
+                samples.values(_with(rest, compared, this), compared),
+                samples.values(_with(rest, compared, that), compared),
+            )
+
+
+def _pairs(claim: Claim, choices: Choices, homes: Sequence[int], samples: Samples) -> Iterator[tuple[Place, Place]]:
+    """Every one of the levels of ``at`` with every one of ``than``."""
+
+    def levels(selection: Selection) -> list[Place]:
+        within = samples.choices(selection)
+        return list(product(*([each for each in choices[home] if each in within[home]] for home in homes)))
+
+    these, those = levels(claim.at), levels(claim.than or {})
+    if claim.than is None:
+        those = [each for each in those if each not in these]
+    yield from product(these, those)
+
+
+def _steps(claim: Claim, choices: Choices, samples: Samples) -> Iterator[tuple[Place, Place]]:
+    """Each level of a factor with the one before it."""
+    (home,) = samples.homes([claim.over])
+    levels = list(choices[home])
+    if samples.dimensions[home].columns[claim.over] in ("int", "float"):
+        levels.sort(key=lambda index: _number(samples.level(home, index, claim.over)))
+    for before, after in pairwise(levels):
+        yield (after,), (before,)
+
+
+def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, float]:
+    """What the values at the levels of a factor are weighed with, so that their sum is the slope over it."""
+    (home,) = samples.homes([claim.per])
+    at = {index: _number(samples.level(home, index, claim.per)) for index in choices[home]}
+    center = math.fsum(at.values()) / len(at)
+    spread = math.fsum((each - center) * (each - center) for each in at.values())
+    return {(index,): (each - center) / spread for index, each in at.items()}
+
+
+def _finding(metric: str, contrast: _Contrast, samples: Samples, level: float) -> Finding:
+    """The mean of a contrast over the replications in which all its conditions have a number."""
+    numbers = {place: samples.numbers(place, metric) for place in contrast.weights}
+    over = set.intersection(*(samples.over(place) for place in numbers))
+    pairs = sorted(set.intersection(*(set(each) for each in numbers.values())))
+    terms = [[weight * numbers[place][each] for place, weight in contrast.weights.items()] for each in pairs]
+    values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
+    found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
+    bootstrap = bootstrap_mean(values, level, resamples=RESAMPLES)
+    return Finding(
+        metric,
+        contrast.where,
+        contrast.level,
+        contrast.against,
+        **asdict(found.estimate),
+        missing=len(over) - len(pairs),
+        bootstrap_low=bootstrap.low,
+        bootstrap_high=bootstrap.high,
+        p=found.p,
+    )
+
+
+def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float) -> Iterator[Finding]:
+    """How often a condition holds, at every combination of levels."""
+    formula = Formula(claim.condition)
+    may_be_none = asks_for_none(claim.condition)
+
+    def is_true(row: Mapping[str, float | None] | None) -> bool | None:
+        if row is None or (None in row.values() and not may_be_none):
+            return None
+        try:
+            return bool(formula(row))
+        except EpicycleError:  # it cannot be calculated for this run
+            return None
+
+    for place in samples.places(samples.choices(where)):
+        answers = [is_true(row) for row in samples.rows(place, formula.names)]
+        holds, missing = answers.count(True), answers.count(None)
+        found = rate(holds, len(answers) - missing, level)
+        finding = Finding(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)
+        yield replace(finding, outcome=_outcome_of_rate(claim, finding, holds))
+
+
+# -- outcomes ---------------------------------------------------------------------------------------------------------
+
+
+def _outcome(claim: Claim, finding: Finding, level: float) -> str:
+    """A comparison counts if so much is hardly chance, and few numbers are missing."""
+    if not finding.has_enough or not finding.p_holm < 1 - level:
+        return UNDECIDED
+    return CONFIRMED if _sign(claim) * finding.value > 0 else REVERSED
+
+
+def _outcome_of_rate(claim: Claim, finding: Finding, holds: int) -> str:
+    """One run against it refutes ``always``, whatever is missing; none against it needs runs enough to say so."""
+    if claim.share == 1:
+        if holds < finding.count:
+            return REVERSED
+        is_confirmed = finding.missing == 0 and finding.low >= ALMOST_ALL
+    else:
+        if finding.high < claim.share:
+            return REVERSED if finding.has_enough else UNDECIDED
+        is_confirmed = finding.has_enough and finding.low >= claim.share
+    return CONFIRMED if is_confirmed else UNDECIDED
+
+
+def _sign(claim: Claim) -> int:
+    return 1 if claim.form in (GREATER, RISES) else -1
+
+
+def _support(claim: Claim, finding: Finding) -> float:
+    """How much a finding speaks for its claim, in standard errors."""
+    if claim.form == ALWAYS:
+        return finding.value if finding.count else -math.inf
+    if finding.count < 2:
+        return -math.inf
+    value = _sign(claim) * finding.value
+    if finding.error == 0:
+        return math.copysign(math.inf, value) if value else 0.0
+    return value / finding.error
+
+
+# -- small things -----------------------------------------------------------------------------------------------------
+
+
+def _with(place: Place, homes: Sequence[int], levels: Sequence[int]) -> Place:
+    found = list(place)
+    for home, level in zip(homes, levels, strict=True):
+        found[home] = level
+    return tuple(found)
+
+
+def _number(value: Factor) -> float:
+    assert isinstance(value, (int, float))
+    return float(value)

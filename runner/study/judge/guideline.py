@@ -1,0 +1,153 @@
+"""The guideline: which level to choose at every combination of the other factors, and how sure that is.
+
+The levels that are *not worse* hold the true best with the stated confidence: a level is left out if it is worse than
+any of the others by a one-sided paired test at (1 - confidence) / (levels - 1).  This is Bonferroni's form of multiple
+comparisons with the best under common random numbers.
+
+Sources: J. C. Hsu, *Multiple Comparisons: Theory and Methods* (1996), chapter 4; B. L. Nelson and F. J. Matejcik,
+*Using common random numbers for indifference-zone selection and multiple comparisons in simulation* (1995);
+A. M. Law, *Simulation Modeling and Analysis*, 10.4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ...language import Factor, Guideline
+from ...shown import finite
+from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
+from .samples import Levels, Place, Samples, has_enough
+
+RESAMPLES = 9_999
+
+
+@dataclass(frozen=True)
+class Option:
+    """A level that could be chosen: its mean, how much worse it is than the best, and what speaks against it."""
+
+    level: Factor
+    estimate: Estimate
+    behind: Estimate  # how much worse than the best, over common replications
+    missing: int  # runs without a number
+    is_fit: bool  # so few are missing that its mean says something
+    is_not_worse: bool  # than any other, as far as can be told
+    confidence: float  # the share of resamples in which it is the best
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """What to choose ``where`` the other factors are as given; None if no level has numbers enough.
+
+    ``best`` has the best mean, ``sufficient`` is the first level in the order of the study that is not worse, or within
+    the tolerance.
+    """
+
+    where: Levels
+    choose: str
+    metric: str
+    best: Factor
+    sufficient: Factor
+    confidence: float
+    options: tuple[Option, ...]
+
+    @property
+    def not_worse(self) -> list[Factor]:
+        """The levels among which the true best is, with the stated confidence."""
+        return [option.level for option in self.options if option.is_not_worse]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a JSON file; numbers that are not finite are None."""
+        found: dict[str, Any] = finite(asdict(self))
+        return {**found, "not_worse": self.not_worse}
+
+
+def recommend(samples: Samples, level: float = LEVEL) -> list[Recommendation]:
+    """The recommended level of the factor to choose, for every combination of the others."""
+    guideline = samples.study.questions.guideline
+    if guideline is None:
+        return []
+    (home,) = samples.homes([guideline.choose])
+    choices = samples.choices({})
+    found = []
+    for rest in samples.places(choices, [home]):
+        places = [(*rest[:home], index, *rest[home + 1 :]) for index in choices[home]]
+        where = samples.values(rest, [each for each in range(len(rest)) if each != home])
+        levels = [samples.level(home, index, guideline.choose) for index in choices[home]]
+        found.append(_recommended(guideline, where, levels, places, samples, level))
+    return found
+
+
+def _recommended(
+    guideline: Guideline,
+    where: Levels,
+    levels: list[Factor],
+    places: list[Place],
+    samples: Samples,
+    level: float,
+) -> Recommendation:
+    sign = -1.0 if guideline.greatest else 1.0
+    metric = guideline.metric.text
+    numbers = [samples.numbers(place, metric) for place in places]
+    missing = [len(samples.over(place)) - len(each) for place, each in zip(places, numbers, strict=True)]
+    fit = [index for index, each in enumerate(numbers) if has_enough(len(each), missing[index])]
+    means = [mean(list(each.values()), level) for each in numbers]
+    best = min(fit, key=lambda index: sign * means[index].value, default=None)
+    confidence = _confidence([numbers[index] for index in fit], sign)
+    options = []
+    for index, factor in enumerate(levels):
+        behind = mean([], level)
+        if best is not None:
+            gaps = paired_difference(numbers[best], numbers[index], level).estimate
+            behind = gaps if sign > 0 else Estimate(-gaps.value, gaps.error, -gaps.high, -gaps.low, gaps.count)
+        options.append(
+            Option(
+                factor,
+                means[index],
+                behind,
+                missing[index],
+                index in fit,
+                index in fit and _is_not_worse(index, fit, numbers, sign, level),
+                confidence[fit.index(index)] if index in fit else 0.0,
+            )
+        )
+    enough = [
+        option
+        for option in options
+        if option.is_not_worse or (option.is_fit and option.behind.value <= guideline.tolerance)
+    ]
+    return Recommendation(
+        where,
+        guideline.choose,
+        metric,
+        None if best is None else levels[best],
+        enough[0].level if enough else None,
+        0.0 if best is None else options[best].confidence,
+        tuple(options),
+    )
+
+
+def _is_not_worse(index: int, fit: list[int], numbers: list[dict[int, float]], sign: float, level: float) -> bool:
+    """Whether no other level is better by a one-sided test, at a level that is shared by all of them."""
+    for other in fit:
+        if other != index:
+            found = paired_difference(numbers[other], numbers[index], level)
+            if sign * found.estimate.value > 0 and found.p / 2 * (len(fit) - 1) < 1 - level:
+                return False
+    return True
+
+
+def _confidence(numbers: list[dict[int, float]], sign: float) -> list[float]:
+    """How often each is the best if the replications that all of them have are drawn anew; ties are shared."""
+    common = sorted(set.intersection(*(set(each) for each in numbers))) if numbers else []
+    if not common:
+        return [0.0] * len(numbers)
+    import numpy as np
+
+    values = ([sign * each[replication] for replication in common] for each in numbers)
+    sums = np.array([resampled_sums(each, RESAMPLES) for each in values])
+    means = np.round(sums / len(common), 12)
+    is_best = means == means.min(axis=0)
+    ties = np.count_nonzero(is_best, axis=0)
+    return [math.fsum((1.0 / ties[best]).tolist()) / RESAMPLES for best in is_best]

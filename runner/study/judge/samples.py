@@ -1,0 +1,117 @@
+"""The numbers of a study by condition and replication, and its conditions by the levels that they have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, cached_property
+from itertools import product
+from typing import TYPE_CHECKING, TypeAlias
+
+from ...language import Factor, Selection, Study
+from ..plan import index_of
+from ..run import OK
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Levels: TypeAlias = dict[str, Factor]  # by factor
+Place: TypeAlias = tuple[int, ...]  # a level of each dimension
+MISSING = 0.05  # of the replications may be without a number, or else a mean says nothing
+
+
+class Samples:
+    """What a table holds, run by run; those that failed or have no number are known as such."""
+
+    def __init__(self, study: Study, table: pa.Table) -> None:
+        self.study = study
+        self.dimensions = study.dimensions
+        self._column = cache(lambda name: table[name].to_pylist())
+        self._rows: dict[int, dict[int, int | None]] = {}
+        statuses = zip(*(table[name].to_pylist() for name in ("condition", "replication", "status")), strict=True)
+        for row, (condition, replication, status) in enumerate(statuses):
+            self._rows.setdefault(condition, {})[replication] = row if status == OK else None
+
+    @cached_property
+    def _levels(self) -> list[list[Levels]]:
+        return [[each.level(index).values for index in range(each.size)] for each in self.dimensions]
+
+    # -- conditions -----------------------------------------------------------------------------------------------
+
+    def choices(self, where: Selection) -> list[list[int]]:
+        """The levels of each dimension that a selection allows."""
+        return [[index for index, values in enumerate(levels) if _fits(values, where)] for levels in self._levels]
+
+    def homes(self, factors: Iterable[str]) -> list[int]:
+        """The dimensions by which factors are varied, in the order of the study."""
+        wanted = set(factors)
+        return [home for home, each in enumerate(self.dimensions) if wanted & each.columns.keys()]
+
+    def places(self, choices: Sequence[Sequence[int]], fixed: Iterable[int] = ()) -> list[Place]:
+        """All combinations of levels, with the first one of ``fixed`` dimensions."""
+        held = set(fixed)
+        return list(product(*((0,) if home in held else levels for home, levels in enumerate(choices))))
+
+    def values(self, place: Place, homes: Iterable[int] | None = None) -> Levels:
+        """What a combination of levels is, or as much of it as these dimensions say."""
+        wanted = range(len(place)) if homes is None else homes
+        return {name: value for home in wanted for name, value in self._levels[home][place[home]].items()}
+
+    def levels(self, factors: Iterable[str]) -> list[Levels]:
+        """All combinations of the values of some factors that there are; one without any, if there are no factors."""
+        wanted = list(factors)
+        lists = []
+        for home in self.homes(wanted):
+            names = [name for name in wanted if name in self.dimensions[home].columns]
+            distinct = dict.fromkeys(tuple(values[name] for name in names) for values in self._levels[home])
+            lists.append([dict(zip(names, each, strict=True)) for each in distinct])
+        return [{name: value for part in parts for name, value in part.items()} for parts in product(*lists)]
+
+    def level(self, home: int, index: int, factor: str) -> Factor:
+        """The value of a factor at a level of its dimension."""
+        return self._levels[home][index][factor]
+
+    # -- numbers --------------------------------------------------------------------------------------------------
+
+    def runs(self) -> dict[int, int]:
+        """How many runs are over, by the number of their condition."""
+        return {condition: len(rows) for condition, rows in self._rows.items()}
+
+    def over(self, place: Place) -> set[int]:
+        """The replications that are over, whatever came of them."""
+        return set(self._at(place))
+
+    def numbers(self, place: Place, metric: str) -> dict[int, float]:
+        """The finite numbers of a metric by replication."""
+        return self.numbers_of(index_of(place, self.dimensions), metric)
+
+    def numbers_of(self, condition: int, metric: str) -> dict[int, float]:
+        """The same of a condition by its number."""
+        column = self._column(metric)
+        rows = self._rows.get(condition, {}).items()
+        values = {replication: None if row is None else column[row] for replication, row in rows}
+        return {one: value for one, value in values.items() if value is not None and math.isfinite(value)}
+
+    def rows(self, place: Place, metrics: Iterable[str]) -> list[dict[str, float | None] | None]:
+        """The metrics of each run that is over, None for what is no number; None for a run that failed."""
+        columns = {name: self._column(name) for name in metrics}
+        rows = self._at(place).values()
+        return [
+            None if row is None else {name: _number(column[row]) for name, column in columns.items()} for row in rows
+        ]
+
+    def _at(self, place: Place) -> dict[int, int | None]:
+        return self._rows.get(index_of(place, self.dimensions), {})
+
+
+def has_enough(count: int, missing: int) -> bool:
+    """Whether so few numbers are missing that their mean says something."""
+    return count > 1 and missing <= MISSING * (count + missing)
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or math.isnan(value) else value
+
+
+def _fits(values: Mapping[str, Factor], where: Selection) -> bool:
+    return all(values[factor] in levels for factor, levels in where.items() if factor in values)

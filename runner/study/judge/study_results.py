@@ -1,0 +1,289 @@
+"""What a study has found: its table, as Arrow, pandas or xarray."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections import Counter
+from dataclasses import asdict
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from epicycle.actors import EpicycleError, counted, read_regular
+
+from ...language import Factor
+from ...tables import pandas_module
+from ...text import did_you_mean
+from ..inference import LEVEL, holm, mean, paired_difference
+from ..plan import Plan
+from ..run import BEST_FIRST, OK, Store, StoreError, replace_file
+from .claims import Judgement, Standing, judge, ranked
+from .guideline import Recommendation, recommend
+from .samples import Samples
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow as pa
+    import xarray
+
+TIMES = ("wall_time",)  # what is not the same each time
+
+
+class StudyResults:
+    """The results folder of a study, finished or not.
+
+    >>> results = open_study("results/mm1_load")
+    >>> results.to_pandas().groupby("load")["mean_wait"].mean()
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._store = Store(folder)
+        self.manifest = self._store.manifest
+        self.plan = Plan.of_manifest(self.manifest)
+        self._frozen: pa.Table | None = None
+        self._left_out = 0
+
+    def freeze(self) -> StudyResults:
+        """Keep to the rows that are there now, however many may come; reading is quicker then.  Returns itself."""
+        self._frozen = self.table(times=True)
+        return self
+
+    @property
+    def factors(self) -> list[str]:
+        """The columns that say what was varied."""
+        return list(self.manifest["factors"])
+
+    @property
+    def metrics(self) -> list[str]:
+        """The columns that say what came out."""
+        return list(self.manifest["metrics"])
+
+    def table(self, *, times: bool = False) -> pa.Table:
+        """A row for each run that is over, by condition and replication; ``times``: with the wall time of each.
+
+        Without times the table of a study is the same bit for bit, whatever happened while it was made.  Replications
+        beyond those that the study asks for now are in it, too.  Runs of another seed, model or study than the folder
+        is of now are left out; ``left_out`` counts them.
+        """
+        table = self._frozen if self._frozen is not None else self._read()
+        return table if times else table.drop_columns(list(TIMES))
+
+    def _read(self) -> pa.Table:
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        batches = list(self._store.rows())
+        table = pa.Table.from_batches(batches, self._store.schema)
+        order = self._order(table)
+        at = pc.index_in(table["condition"], value_set=pa.array(order, pa.string()))
+        places = pc.take(pa.array(order.values(), pa.int64()), at)
+        ranks = pc.index_in(table["status"], value_set=pa.array(BEST_FIRST))
+        table = table.set_column(table.schema.get_field_index("condition"), "condition", places)
+        table = table.append_column("_rank", ranks)
+        runs = pc.count_distinct(table["run"]).as_py()
+        table = self._replicated(table.filter(pc.is_valid(places))).sort_by(
+            [(name, "ascending") for name in ("condition", "replication", "_rank", "run")]
+        )
+        if table.num_rows:  # of a run that was written more than once, the best row is the first
+            changes = (
+                pc.not_equal(table[name].slice(1), table[name].slice(0, table.num_rows - 1))
+                for name in ("condition", "replication")
+            )
+            table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
+        self._left_out = runs - table.num_rows
+        return self._described(table.drop_columns(["_rank"]).combine_chunks())
+
+    def _described(self, table: pa.Table) -> pa.Table:
+        """The table with the unit and the doc of each column as metadata of its field."""
+        import pyarrow as pa
+
+        about = self.plan.columns
+        fields = []
+        for each in table.schema:
+            said = {} if (column := about.get(each.name)) is None else {"unit": column.unit, "doc": column.doc}
+            fields.append(each.with_metadata({key: text for key, text in said.items() if text}))
+        return table.cast(pa.schema(fields))
+
+    def _replicated(self, table: pa.Table) -> pa.Table:
+        """The rows whose seeds are the plan's, by the replications that these seeds have there."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        study, before = self.plan.study, table["replication"]
+        if not study.paired:
+            found = zip(table["condition"].to_pylist(), before.to_pylist(), strict=True)
+            conditions = {index: self.plan.condition(index) for index in set(table["condition"].to_pylist())}
+            seeds = [self.plan.seed(conditions[index], replication) for index, replication in found]
+            return table.filter(pc.equal(table["seed"], pa.array(seeds, pa.int64())))
+        # Another seed in the study's file moves the replications; those beyond what is asked for are of this seed.
+        now = pc.subtract(table["seed"], study.seed)
+        is_meant = pc.or_(pc.less(now, self.plan.replications), pc.equal(now, before))
+        table = table.set_column(table.schema.get_field_index("replication"), "replication", now)
+        return table.filter(pc.and_(pc.greater_equal(now, 0), is_meant))
+
+    def _order(self, table: pa.Table) -> dict[str, int]:
+        """The numbers of the plan's conditions by their keys; a plan may be too large to be gone through."""
+        found: dict[str, int] = {}
+        for row in table.group_by(["condition", *self.factors], use_threads=False).aggregate([]).to_pylist():
+            if (index := self.plan.find(row["condition"], row)) is not None:
+                found[row["condition"]] = index
+        return found
+
+    def digest(self) -> str:
+        """SHA-256 of all rows, by which tables are told apart: the same wherever and however often they are made."""
+        digest = hashlib.sha256()
+        for batch in self.table().to_batches():
+            for row in batch.to_pylist():
+                digest.update(json.dumps(row).encode())
+        return digest.hexdigest()
+
+    @property
+    def left_out(self) -> int:
+        """How many runs of the folder are not of the study as it is now, and so not in the table."""
+        if self._frozen is None:
+            self._read()
+        return self._left_out
+
+    def beyond(self) -> int:
+        """How many runs of the table are replications beyond those that the study asks for now."""
+        return sum(each >= self.plan.replications for each in self.table()["replication"].to_pylist())
+
+    def counts(self) -> Counter[str]:
+        """How many runs are over, by status."""
+        return Counter(self.table()["status"].to_pylist())
+
+    def failures(self) -> list[dict[str, Any]]:
+        """The rows that are not ``ok``, each with the command that repeats its run."""
+        return [
+            {**row, "replay": f"epicycle replay {self.folder} {row['run'][:12]}"}
+            for row in self.table().to_pylist()
+            if row["status"] != OK
+        ]
+
+    def values(self, metric: str) -> dict[int, dict[int, float]]:
+        """The numbers of a metric by condition and replication; runs that are not ``ok`` or have none are left out."""
+        self._check("metric", metric, self.metrics)
+        samples = self._samples()
+        return {condition: samples.numbers_of(condition, metric) for condition in samples.runs()}
+
+    def means(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
+        """A row for each condition: what was varied, the mean with its standard error and interval, how many runs.
+
+        ``runs`` are those that are over, ``count`` those of them that have a number.
+        """
+        self._check("metric", metric, self.metrics)
+        samples = self._samples()
+        return [
+            {
+                **self.plan.condition(condition).values,
+                **asdict(mean(list(samples.numbers_of(condition, metric).values()), level)),
+                "runs": runs,
+            }
+            for condition, runs in samples.runs().items()
+        ]
+
+    def differences(self, metric: str, over: str, level: float = LEVEL) -> list[dict[str, Any]]:
+        """How the levels of one factor differ, two by two, at every combination of the others.
+
+        Each row has the other factors, the two levels as ``first`` and ``second``, the mean of second less first over
+        common replications with its interval, ``p`` of a paired test, and ``p_holm`` corrected for all rows.
+        """
+        self._check("factor", over, self.factors)
+        groups: dict[tuple[Factor, ...], list[tuple[Factor, dict[int, float]]]] = {}
+        others = [name for name in self.factors if name != over]
+        for condition, numbers in self.values(metric).items():
+            levels = self.plan.condition(condition).values
+            groups.setdefault(tuple(levels[name] for name in others), []).append((levels[over], numbers))
+        rows = []
+        for place, members in groups.items():
+            for (first, before), (second, after) in combinations(members, 2):
+                found = paired_difference(before, after, level)
+                pair = {"first": first, "second": second}
+                rows.append({**dict(zip(others, place, strict=True)), **pair, **asdict(found.estimate), "p": found.p})
+        corrected = holm([row["p"] for row in rows])
+        return [{**row, "p_holm": p} for row, p in zip(rows, corrected, strict=True)]
+
+    def _samples(self) -> Samples:
+        return Samples(self.plan.study, self.table())
+
+    def _check(self, what: str, name: str, known: list[str]) -> None:
+        if name not in known:
+            told = f"{self.folder} has no {what} {name!r}{did_you_mean(name, known)}"
+            raise StoreError(f"{told}; it has {', '.join(known) or 'none'}")
+
+    def claims(self, level: float = LEVEL) -> list[Judgement]:
+        """What came of the claims of the study's file; those of another study, at each level of what that has not."""
+        return judge(self._samples(), level)
+
+    def standings(self, level: float = LEVEL) -> list[Standing]:
+        """How much speaks for each level that claims are judged apart for, the best first."""
+        return ranked(self.claims(level))
+
+    def guideline(self, level: float = LEVEL) -> list[Recommendation]:
+        """What the study's guideline recommends, at every combination of the factors that are not to be chosen."""
+        return recommend(self._samples(), level)
+
+    def find(self, run: str) -> dict[str, Any]:
+        """The row of a run, by the beginning of its key; raises ``StoreError``."""
+        found = [row for row in self.table().to_pylist() if row["run"].startswith(run)]
+        if len(found) == 1:
+            row: dict[str, Any] = found[0]
+            return row
+        if found:
+            raise StoreError(f"{counted(len(found), 'run')} of {self.folder} begin with {run!r}: give more of it")
+        raise StoreError(
+            f"{self.folder} has no run {run!r}\n"
+            f"   help: the column 'run' of {self.folder}/table.parquet has their names"
+        )
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table as a data frame."""
+        frame: pandas.DataFrame = pandas_module().DataFrame(self.table(times=True).to_pydict())
+        return frame
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The metrics over the factors and the replication; needs the package xarray."""
+        try:
+            import xarray  # type: ignore[import-not-found, unused-ignore]
+        except ImportError as error:
+            raise EpicycleError("this needs xarray: pip install 'epicycle[xarray]'") from error
+        frame = self.to_pandas().set_index([*self.factors, "replication"])[self.metrics]
+        found: xarray.Dataset = xarray.Dataset.from_dataframe(frame)
+        return found
+
+    @property
+    def path(self) -> Path:
+        """Where the table is."""
+        return self.folder / "table.parquet"
+
+    def write_table(self) -> Path:
+        """Write ``table.parquet``."""
+        import pyarrow.parquet as pq
+
+        table = self.table()
+        replace_file(self.path, lambda aside: pq.write_table(table, aside))
+        return self.path
+
+    def is_written(self) -> bool:
+        """Whether ``table.parquet`` has the bytes that ``write_table`` would write now, or another pyarrow might."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        buffer = io.BytesIO()
+        pq.write_table(self.table(), buffer)
+        try:
+            if (data := read_regular(self.path)) == buffer.getvalue():
+                return True
+            file = pq.ParquetFile(pa.BufferReader(data))
+            is_of_another = file.metadata.created_by != pq.read_metadata(buffer).created_by
+            return is_of_another and bool(file.read().equals(self.table()))
+        except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it that is no UTF-8
+            return False
+
+
+def open_study(folder: str | Path) -> StudyResults:
+    """The results of a study, which may still be running; raises ``StoreError``."""
+    return StudyResults(Path(folder))

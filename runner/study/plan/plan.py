@@ -1,0 +1,351 @@
+"""Plan: the conditions of a study and the identity of every run, worked out one at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import EpicycleError
+from epicycle.actors.expression import ExpressionError
+
+from ...catalogue import types_of_file
+from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
+from ...model import Model, load_model
+from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
+from .described import Column, columns_of
+from .metrics import check_metric
+
+_LOGGER = logging.getLogger("epicycle")
+
+MAX_TRIED = 20  # levels of a dimension with which the model is loaded before anything runs
+
+Sources = dict[str, str]  # SHA-256 by the name of a file, and versions by 'package NAME'
+
+
+def epicycle_version() -> str:
+    """The version of which results are: another one may give other ones."""
+    try:
+        return version("epicycle")
+    except PackageNotFoundError:  # run from its folder, without an install
+        return "unknown"
+
+
+class PlanError(EpicycleError):
+    """A manifest of which no plan can be made."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One combination of levels; ``key`` tells it from all others, whatever study it is in."""
+
+    index: int
+    level: Level  # of all dimensions together
+    key: str
+
+    @property
+    def values(self) -> dict[str, Factor]:
+        """What the columns of the table say of it."""
+        return self.level.values
+
+
+class Plan:
+    """A study that has been tried: every level of every dimension loads.
+
+    ``made`` does so; ``of_manifest`` takes over from a results folder what was found then.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        metrics: list[StudyMetric],
+        sources: Sources,
+        extra: list[dict[int, Sources]],
+        texts: dict[str, str],
+        columns: dict[str, Column],
+        made_with: str,
+        files: Iterable[str] = (),
+    ) -> None:
+        self.study = study
+        self.metrics = metrics
+        self.sources = sources
+        self.texts = texts  # the YAML of the model and of all that belongs to it
+        self.files = tuple(files)  # all that were read, by the names by which they were
+        self.columns = columns
+        self.made_with = made_with  # the version of Epicycle
+        self._extra = extra  # by dimension, the files that single levels read beside the others
+        self.conditions = prod(dimension.size for dimension in study.dimensions)
+        self._condition = lru_cache(16)(self._worked_out)  # runs of one follow each other
+
+    # -- making one -----------------------------------------------------------------------------------------------
+
+    @classmethod
+    def made(cls, study: Study) -> Plan:
+        """Load the model with the first levels of all dimensions, and with each other level in the place of its first.
+
+        Raises ``ModelError`` with all that is wrong in any of them.
+        """
+        problems = Problems()
+        read = _Read()
+        firsts = [0] * len(study.dimensions)
+        sources = _tried(study, firsts, read, problems)
+        extra: list[dict[int, Sources]] = [{} for _ in study.dimensions]
+        for number, dimension in enumerate(study.dimensions):
+            for index in _spread(dimension.size):
+                indices = [*firsts[:number], index, *firsts[number + 1 :]]
+                found = _tried(study, indices, read, problems)
+                if more := {name: digest for name, digest in found.items() if sources.get(name) != digest}:
+                    extra[number][index] = more
+        problems.raise_if_any()
+        metrics = list(study.metrics or ())
+        if study.metrics is None:
+            metrics = [StudyMetric(metric.name, metric.name) for metric in read.models[0].metrics]
+        for metric in metrics:
+            check_metric(metric, read.models, problems)
+            if study.metrics is None and (metric.name in RESERVED or metric.name in study.factors):
+                problems.add(
+                    f"metric {metric.name!r} of the model has the name of another column of the table",
+                    None,
+                    f"rename it in the study: metrics: {{my_name: {metric.name}}}",
+                )
+        names = [metric.name for metric in metrics]
+        if study.until is not None and (wanted := study.until.metric) not in names:
+            problems.add(
+                f"until: the study has no metric {wanted!r}{did_you_mean(wanted, names)}",
+                study.until.position,
+                f"its metrics: {', '.join(names) or 'none'}",
+            )
+        study.questions.check(names, problems)
+        problems.raise_if_any()
+        columns = columns_of(study.dimensions, metrics, read.models[0])
+        if endless := read.models[0].endless:
+            _LOGGER.warning(
+                "warning: %s\n   help: set 'stop' in its section 'run'; --run-timeout gives up runs", endless
+            )
+        return cls(study, metrics, sources, extra, read.texts, columns, epicycle_version(), read.files)
+
+    @classmethod
+    def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
+        """The plan of a results folder; no file but the manifest is needed.
+
+        Raises ``ModelError``, and ``PlanError`` if what the manifest says does not fit together.
+        """
+        study = study_of_text(
+            manifest["text"],
+            Path(manifest["file"]),
+            manifest["set"],
+            map(Path, manifest["types"]),
+            manifest["replications"],
+            manifest["seed"],
+            None if (lender := manifest.get("lender")) is None else (lender[0], lender[1]),
+        )
+        try:
+            said = {(metric.name, metric.source): metric for metric in study.metrics or ()}
+            metrics = [said.get(each) or StudyMetric(*each) for each in manifest["metrics"].items()]
+            extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
+        except (ValueError, ExpressionError) as error:
+            raise PlanError(f"the manifest of {study.name} is damaged: {error}") from error
+        unlike = {
+            "study": study.name != manifest["study"],
+            "factors": study.factors != manifest["factors"],
+            "metrics": not _are_metrics(manifest["metrics"], study),
+            "level_sources": len(extra) != len(study.dimensions),
+        }
+        if wrong := [name for name, is_wrong in unlike.items() if is_wrong]:
+            found = ", ".join(map(repr, wrong))
+            raise PlanError(f"the manifest of {study.name} is damaged: {found} is not as its study's text says")
+        problems = Problems()
+        study.questions.check([metric.name for metric in metrics], problems)
+        problems.raise_if_any()
+        columns = {name: Column(**said) for name, said in manifest["columns"].items()}
+        return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
+
+    def manifest(self) -> dict[str, Any]:
+        """What ``of_manifest`` needs."""
+        study = self.study
+        return {
+            "epicycle": self.made_with,
+            "study": study.name,
+            "file": str(study.path.resolve()),
+            "text": study.text,
+            "set": list(study.changes),
+            "types": [str(path.resolve()) for path in study.types],
+            "replications": study.replications,
+            "seed": study.seed,
+            "lender": study.questions.lender,
+            "factors": study.factors,
+            "metrics": {metric.name: metric.source for metric in self.metrics},
+            "columns": {name: asdict(column) for name, column in self.columns.items()},
+            "model": self.texts,
+            "sources": self.sources,
+            "level_sources": [{str(index): found for index, found in each.items()} for each in self._extra],
+        }
+
+    # -- what it holds --------------------------------------------------------------------------------------------
+
+    @property
+    def replications(self) -> int:
+        """How many runs a condition has, at most."""
+        return self.study.replications if self.study.until is None else self.study.until.at_most
+
+    @property
+    def size(self) -> int:
+        """How many runs there are, at most."""
+        return self.conditions * self.replications
+
+    @property
+    def decides(self) -> str | None:
+        """The metric that decides how many replications a condition gets, if one does."""
+        return None if self.study.until is None else self.study.until.metric
+
+    def __iter__(self) -> Iterator[Condition]:
+        index = 0
+        while index < self.conditions:
+            yield self.condition(index)
+            index += 1
+
+    def condition(self, index: int) -> Condition:
+        """A condition by its number; the last dimension changes fastest."""
+        return self._condition(index)
+
+    def _worked_out(self, index: int) -> Condition:
+        place = place_of(index, self.study.dimensions)
+        level = _together(self.study, place)
+        sources = dict(self.sources)
+        for extra, at in zip(self._extra, place, strict=True):
+            sources.update(extra.get(at, {}))
+        identity = {
+            "epicycle": self.made_with,
+            "model": Path(self.study.model).name,
+            "sources": sorted(sources.items()),
+            "set": [[setting.path, plain(setting.node)] for setting in level.settings],
+            "disturb": [Path(name).name for name in level.disturb],
+            "metrics": [
+                [metric.name, metric.source, *([metric.unit, metric.to] if metric.to else [])]
+                for metric in self.metrics
+            ],
+        }
+        return Condition(index, level, _hash(identity))
+
+    def find(self, key: str, values: Mapping[str, Factor]) -> int | None:
+        """The number of the condition with this key, which has these values; None if the plan has none."""
+        place = [at for each in self.study.dimensions if (at := each.find(values)) is not None]
+        if len(place) < len(self.study.dimensions):
+            return None
+        index = index_of(place, self.study.dimensions)
+        return index if self.condition(index).key == key else None
+
+    def seed(self, condition: Condition, replication: int) -> int:
+        """The same for all conditions if they are paired, otherwise one that hangs on the condition, too."""
+        if self.study.paired:
+            return self.study.seed + replication
+        return int(_hash([self.study.seed, condition.key, replication])[:15], 16)
+
+    def key(self, condition: Condition, replication: int) -> str:
+        """The identity of a run."""
+        return _hash([condition.key, self.seed(condition, replication)])
+
+    def unlike(self, noted: Noted) -> list[str]:
+        """What of this was not read when the plan was tried, or was not the same then."""
+        known = [self.sources, *(found for each in self._extra for found in each.values())]
+        digests = {digest for found in known for digest in found.values()}
+        files = [name for name, digest in noted.files.items() if digest not in digests]
+        packages = [(f"package {name}", version) for name, version in noted.packages.items()]
+        return files + [name for name, version in packages if all(found.get(name) != version for found in known)]
+
+    def load(self, condition: Condition) -> Model:
+        """The model as it is in a condition; raises ``ModelError``."""
+        return _load(self.study, condition.level)
+
+
+def _are_metrics(found: Mapping[str, str], study: Study) -> bool:
+    """Whether these can be the metrics of a study, which declares some or takes those of its model."""
+    declared = (
+        {name: name for name in found} if not study.metrics else {each.name: each.source for each in study.metrics}
+    )
+    decides = study.until is None or study.until.metric in found
+    return decides and list(found.items()) == list(declared.items()) and not found.keys() & {*RESERVED, *study.factors}
+
+
+def _hash(value: object) -> str:
+    text = json.dumps(value, ensure_ascii=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def place_of(index: int, dimensions: Sequence[Dimension]) -> list[int]:
+    """The levels of a condition, by dimension."""
+    found = []
+    for dimension in reversed(dimensions):
+        index, level = divmod(index, dimension.size)
+        found.append(level)
+    return found[::-1]
+
+
+def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
+    """The number of the condition with these levels."""
+    found = 0
+    for dimension, level in zip(dimensions, place, strict=True):
+        found = found * dimension.size + level
+    return found
+
+
+def _spread(size: int) -> list[int]:
+    """All indices but the first, or some of them from end to end."""
+    if size <= MAX_TRIED:
+        return list(range(1, size))
+    return sorted({index * (size - 1) // (MAX_TRIED - 1) for index in range(1, MAX_TRIED)})
+
+
+def _together(study: Study, place: Iterable[int]) -> Level:
+    """What the study sets in all runs, and the levels of a condition."""
+    levels = [dimension.level(at) for dimension, at in zip(study.dimensions, place, strict=True)]
+    return Level(
+        (*study.fixed, *(setting for level in levels for setting in level.settings)),
+        {name: value for level in levels for name, value in level.values.items()},
+        tuple(name for level in levels for name in level.disturb),
+    )
+
+
+def _load(study: Study, level: Level) -> Model:
+    types = [each for file in study.types for each in types_of_file(file)]
+    return load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
+
+
+@dataclass
+class _Read:
+    """What trying a study has read."""
+
+    models: list[Model] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
+    files: dict[str, None] = field(default_factory=dict)
+
+
+def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> Sources:
+    """Load the model with these levels; the files that this reads."""
+    with noting() as noted:
+        try:
+            read.models.append(_load(study, _together(study, place)))
+        except ModelError as error:
+            for problem in error.problems:
+                problems.add(problem.message, problem.position, *problem.help)
+    home = Path(next(iter(noted.files), "")).resolve().parent
+    found = {f"package {name}": version for name, version in noted.packages.items()}
+    for name, digest in [
+        *noted.files.items(),
+        *((str(file), hashlib.sha256(file.read_bytes()).hexdigest()) for file in study.types),
+    ]:
+        read.files[name] = None
+        path = Path(name).resolve()
+        # By names that stay when a study and its model are moved, or Epicycle is.
+        shown = path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name
+        found[shown] = digest
+        if path.suffix in (".yaml", ".yml"):
+            read.texts[shown] = path.read_text(encoding="utf-8")
+    return found

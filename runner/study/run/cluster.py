@@ -1,0 +1,245 @@
+"""Runs on the machines of a Dask cluster, whose rows come back and are written here."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import time
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import CancelledError
+from contextlib import asynccontextmanager
+from dataclasses import astuple
+from operator import call
+from pkgutil import resolve_name
+from typing import Any
+from uuid import uuid4
+
+from epicycle.actors import EpicycleError
+
+from . import host
+from .backlog import Task
+from .making import Keeper
+from .parcel import SENT, differences, fitness, pack, unfit
+from .processes import DONE, Outcome, WorkerError
+
+CONNECT = 10.0  # s in which a scheduler has to answer
+PATIENCE = 60.0  # s without any worker
+_ANSWER = 30.0  # s in which one that is busy has to answer
+_LOOK = 0.5  # s between two looks around
+_BATCH = 0.5  # s that a batch of runs is to take: time enough to bring the next
+_LARGEST = 100  # runs of a batch
+
+
+def distributed_module() -> Any:
+    """Dask's scheduler and workers; raises ``EpicycleError`` if they are not installed."""
+    try:
+        import dask
+
+        # Its log is set up when it is imported.  What a user has to know comes as an exception.
+        with dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}}):
+            import distributed
+    except ImportError as error:
+        raise EpicycleError("this needs dask: pip install 'epicycle[dask]'") from error
+    return distributed
+
+
+class Cluster:
+    """The workers of a scheduler.
+
+    Without the address of one there is a scheduler of its own, with ``jobs`` processes at a time on this machine.
+    """
+
+    def __init__(self, keeper: Keeper, jobs: int, scheduler: str | None) -> None:
+        self._distributed = distributed_module()
+        self._keeper = keeper
+        self._backlog = keeper.backlog
+        self._jobs = jobs
+        self._scheduler = scheduler
+        self._study = f"epicycle-{uuid4().hex}"
+        self._parcel = b""
+        self._sent: dict[str, Any] = {}  # parcels, by worker
+        self._batches = 0
+        self._running: dict[asyncio.Future[list[Outcome]], list[Task]] = {}
+        self._wanted = 1  # batches at a time
+        self._seconds = _BATCH  # that a run takes, as far as known
+        self._looked = 0.0
+        self._seen = time.monotonic()  # when there were workers
+
+    def run(self, tell: Callable[[], None]) -> None:
+        """Make all runs; ``tell`` is called now and then.  Raises ``WriteError`` and ``WorkerError``."""
+        if (first := self._batch()) is not None:
+            asyncio.run(self._run(first, tell))
+
+    async def _run(self, first: list[Task], tell: Callable[[], None]) -> None:
+        async with self._client() as client:
+            try:
+                self._parcel = pack(self._keeper.plan)
+                await self._look(client)
+                self._begin(client, first)
+                self._fill(client)
+                while self._running:
+                    over, _ = await asyncio.wait(self._running, timeout=_LOOK, return_when=asyncio.FIRST_COMPLETED)
+                    for each in over:
+                        self._end(each, self._running.pop(each))
+                    self._fill(client)
+                    await self._look(client)
+                    tell()
+            finally:
+                for each in self._running:
+                    each.cancel()
+
+    # -- the cluster ----------------------------------------------------------------------------------------------
+
+    @asynccontextmanager
+    async def _client(self) -> AsyncIterator[Any]:
+        module = self._distributed
+        if self._scheduler is None:
+            # In this process: each run has a process of its own, whatever Dask's worker is.
+            cluster = module.LocalCluster(
+                processes=False,
+                n_workers=1,
+                threads_per_worker=self._jobs,
+                memory_limit=0,
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                silence_logs=logging.CRITICAL,
+                asynchronous=True,
+            )
+            async with cluster, module.Client(cluster, asynchronous=True, set_as_default=False) as client:
+                yield client
+            return
+        client = module.Client(self._scheduler, timeout=CONNECT, asynchronous=True, set_as_default=False)
+        try:
+            try:
+                await asyncio.wait_for(client, CONNECT + 1.0)
+            except (OSError, ValueError) as error:
+                raise WorkerError(
+                    f"no scheduler answers at {self._scheduler}\n"
+                    "   help: 'dask scheduler' starts one, and says its address"
+                ) from error
+            yield client
+        finally:
+            await client.close()
+
+    async def _look(self, client: Any) -> None:
+        """Look at the workers, now and then; raises ``WorkerError`` if one cannot work, or none is there for long."""
+        now = time.monotonic()
+        if now - self._looked < _LOOK:
+            return
+        self._looked = now
+        threads: dict[str, int] = await self._asked(client.nthreads())
+        for address in self._sent.keys() - threads.keys():
+            del self._sent[address]
+        if new := sorted(threads.keys() - self._sent.keys()):
+            await self._welcome(client, new)
+        # More than the workers take: what is left waits at the scheduler for whoever is free first.
+        self._wanted = 2 * sum(threads.values()) + 4
+        if threads:
+            self._seen = time.monotonic()
+        elif now - self._seen > PATIENCE:
+            raise WorkerError(
+                f"the scheduler {self._scheduler} has had no workers for {PATIENCE:g} s\n"
+                f"   help: 'dask worker {self._scheduler}' starts some"
+            )
+
+    async def _welcome(self, client: Any, workers: list[str]) -> None:
+        """Send new workers the parcel; raises ``WorkerError`` if one is not like this machine."""
+        options = {"workers": workers, "on_error": "return"}
+        for address, there in (await self._asked(client.run(resolve_name, _name(fitness), **options))).items():
+            if isinstance(there, ImportError | AttributeError):
+                raise WorkerError(f"the Dask worker {address} {_without(there)}")
+        for address, there in (await self._asked(client.run(fitness, **options))).items():
+            if isinstance(there, dict) and (unlike := differences(there, fitness())):
+                raise WorkerError(f"the Dask worker {address} {unfit(unlike)}")
+        # To each its own, that they have before they have any work: nobody is preferred as he has it, or waited for.
+        for address in workers:
+            parcel = {host.parcel_key(self._study, address): self._parcel}
+            self._sent[address] = await self._asked(client.scatter(parcel, workers=[address]))
+
+    async def _asked(self, question: Any) -> Any:
+        """What the scheduler answers; raises ``WorkerError`` if it does not."""
+        try:
+            return await asyncio.wait_for(question, _ANSWER)
+        except Exception as error:  # of many kinds, whose only reason can be this
+            raise self._lost() from error
+
+    def _lost(self) -> WorkerError:
+        return WorkerError(
+            f"the scheduler{'' if self._scheduler is None else f' {self._scheduler}'} is gone\n"
+            f"   help: what was finished is kept; 'epicycle resume {self._keeper.store.folder}' goes on"
+        )
+
+    # -- runs -----------------------------------------------------------------------------------------------------
+
+    def _batch(self) -> list[Task] | None:
+        """The next runs; one that may have ended its process comes alone."""
+        share = (self._backlog.total - self._backlog.over) // (2 * self._wanted)
+        most = max(1, min(_LARGEST, int(_BATCH / self._seconds), share))
+        batch: list[Task] = []
+        while len(batch) < most and (task := self._backlog.next()) is not None:
+            batch.append(task)
+            if task.attempt > 1:
+                break
+        return batch or None
+
+    def _fill(self, client: Any) -> None:
+        """Give as much as is wanted."""
+        while len(self._running) < self._wanted and (batch := self._batch()):
+            self._begin(client, batch)
+
+    def _begin(self, client: Any, batch: list[Task]) -> None:
+        """Send a batch.  All that the scheduler sees of it is Python's own: it need not know Epicycle."""
+        self._batches += 1
+        key = f"{self._study}-{self._batches}"
+        make = (resolve_name, _name(host.make))
+        tasks = [astuple(each) for each in batch]
+        given = {"study": self._study, "timeout": self._keeper.timeout, "tasks": tasks}
+        (future,) = client.get({key: (call, make, json.dumps(given))}, [key], sync=False)
+        self._running[asyncio.ensure_future(future.result())] = batch
+
+    def _end(self, over: asyncio.Future[list[Outcome]], batch: list[Task]) -> None:
+        """A batch is over, or has ended its workers."""
+        try:
+            outcomes = over.result()
+        except self._distributed.KilledWorker:
+            for task in batch:
+                if len(batch) > 1:  # it may have been another one of them
+                    self._backlog.again(task)
+                else:
+                    self._keeper.again(task, "the Dask workers that made it ended, one after the other")
+            return
+        except (CancelledError, asyncio.CancelledError) as error:
+            raise self._lost() from error
+        except WorkerError:
+            raise
+        except (ImportError, AttributeError) as error:  # of a worker that has just come
+            raise WorkerError(f"a Dask worker {_without(error)}") from error
+        except Exception as error:
+            raise WorkerError(f"the Dask workers cannot make runs: {type(error).__name__}: {error}") from error
+        for task, (what, told) in zip(batch, outcomes, strict=True):
+            if what == DONE:
+                told, why_not = told
+                self._check(task, why_not)
+                self._seconds += 0.2 * (told["wall_time"] - self._seconds)
+            self._keeper.settle(task, (what, told))
+
+    def _check(self, task: Task, why_not: str | None) -> None:
+        """A model that cannot be loaded there must not be loaded here, either."""
+        if why_not is None:
+            return
+        plan = self._keeper.plan
+        try:
+            plan.load(plan.condition(task.condition))
+        except EpicycleError:
+            return
+        raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
+
+
+def _name(function: Callable[..., object]) -> str:
+    """What ``resolve_name`` finds a function by."""
+    return f"{function.__module__}:{function.__name__}"
+
+
+def _without(error: Exception) -> str:
+    return f"has no Epicycle like this one: {error}\n   help: install it there, in the version that is here"

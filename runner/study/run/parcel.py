@@ -1,0 +1,167 @@
+"""A parcel: a plan with all files that it reads, for machines that share no file system with this one."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import platform
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from modulefinder import ModuleFinder
+from pathlib import Path
+from typing import Any
+
+from ...provenance import versions
+from ...text import ModelError, noting
+from ..plan import Plan
+from .backlog import Task
+from .processes import WorkerError
+from .runner import Runner
+from .store import Row
+
+SENT = (
+    "   help: files are sent along if they are named by a path from the study or the model; packages have to be "
+    "installed there"
+)
+_CODE = ("epicycle.actors", "epicycle.aspects", "epicycle.runner")
+_NO_MATTER = ("pyarrow",)  # workers write no files
+_OPTIONAL = ("casadi",)  # which takes part in runs, where it is installed
+
+
+def pack(plan: Plan) -> bytes:
+    """A plan that has been tried, with its files.
+
+    Each file goes under the names by which it may be asked for: as it was read, and with links resolved.
+    """
+    files: dict[str, bytes] = {}
+    for name in (*plan.files, *_modules(plan.study.types)):
+        path = Path(os.path.abspath(name))
+        content = path.read_bytes()
+        for each in (path, path.parent.resolve() / path.name, path.resolve()):
+            files[str(each)] = content
+    manifest = {**plan.manifest(), "model": {}}
+    found = {"manifest": manifest, "files": files, "folder": os.getcwd(), "fitness": fitness()}
+    return zlib.compress(pickle.dumps(found), 1)
+
+
+def unpack(parcel: bytes, root: Path) -> Plan:
+    """Lay the files of a parcel below a folder as they were below the root of their machine; the plan that is there.
+
+    The working directory becomes what the study's was, so that names of files in ``--set`` mean the same.  Raises
+    ``WorkerError`` on a machine where a seed may give another run.
+    """
+    found: dict[str, Any] = pickle.loads(zlib.decompress(parcel))
+    if unlike := differences(fitness(), found["fitness"]):
+        raise WorkerError(unfit(unlike))
+    manifest = found["manifest"]
+    for name, content in found["files"].items():
+        path = below(root, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    study, folder = below(root, manifest["file"]), below(root, found["folder"])
+    for each in (study.parent, folder):  # a name may lead through them
+        each.mkdir(parents=True, exist_ok=True)
+    os.chdir(folder)
+    types = [str(below(root, name)) for name in manifest["types"]]
+    return Plan.of_manifest(manifest | {"file": str(study), "types": types})
+
+
+class Guest:
+    """Makes runs of a plan among files that lie elsewhere than in the study's place."""
+
+    def __init__(self, parcel: bytes, folder: str) -> None:
+        self._root = str(Path(folder).resolve())
+        try:
+            plan = unpack(parcel, Path(self._root))
+        except ModelError as error:
+            raise WorkerError(
+                f"cannot read the study, which is right here:\n{self._named(str(error))}\n{SENT}"
+            ) from error
+        self._runner = Runner(plan)
+
+    def prepare(self, task: Task) -> None:
+        """Load the model; raises ``WorkerError`` if this reads anything else than it does at the study's place."""
+        with noting() as noted:
+            self._runner.prepare(task)
+        if noted.files and (unlike := self._runner.plan.unlike(noted)):
+            raise WorkerError(f"has another {self._named(unlike[0])} than this machine\n{SENT}")
+
+    def make(self, task: Task) -> tuple[Row, str | None]:
+        """The row of a run; and why its model could not be loaded, if that was so."""
+        why_not = self._runner.why_not(task)
+        row = self._runner.make(task)
+        if row["error"] is not None:
+            row["error"] = self._named(row["error"])
+        return row, None if why_not is None else self._named(why_not)
+
+    def _named(self, text: str) -> str:
+        """The names of files as they are at the study's place."""
+        return text.replace(self._root, "")
+
+
+def below(root: Path, name: str) -> Path:
+    """Where a file lies whose place was below the root of a file system, or of a drive."""
+    path = Path(name)
+    return root.joinpath(path.drive.rstrip(":"), *path.parts[1:]) if path.anchor else root / path
+
+
+def _modules(types: Iterable[Path]) -> Iterator[str]:
+    """The Python files that own types import from beside their file."""
+    for file in types:
+        folder = file.resolve().parent
+        finder = ModuleFinder(path=[str(folder)])
+        finder.run_script(str(file.resolve()))
+        for module in finder.modules.values():
+            if (name := getattr(module, "__file__", None)) is not None:
+                yield name
+
+
+# -- who may take part ------------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=1)
+def fitness() -> dict[str, str | None]:
+    """What has to be the same wherever a seed is to give the same run."""
+    found = {name: each for name, each in versions().items() if name not in _NO_MATTER}
+    for name in _OPTIONAL:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = None
+    found["python"] = ".".join(platform.python_version_tuple()[:2])
+    found["code"] = _code()
+    return found
+
+
+def differences(worker: Mapping[str, str | None], client: Mapping[str, str | None]) -> str:
+    """How the fitness of a worker differs from that of the machine that wants it to work; empty if it does not."""
+    told = [
+        f"{name} {worker.get(name) or 'is missing'} there, {wanted or 'none'} here"
+        for name, wanted in client.items()
+        if name != "code" and wanted != worker.get(name)
+    ]
+    if not told and worker.get("code") != client["code"]:
+        told = ["the code of Epicycle is not the same"]
+    return "; ".join(told)
+
+
+def unfit(unlike: str) -> str:
+    """What is said of a worker that differs, after its name."""
+    return (
+        f"is not like this machine: {unlike}\n   help: the same seed is to give the same run, so install the same there"
+    )
+
+
+def _code() -> str:
+    """A hash of Epicycle's code: while it is worked on, the version says little."""
+    digest = hashlib.sha256()
+    for package in _CODE:
+        for folder in map(Path, import_module(package).__path__):
+            for path in sorted(folder.rglob("*.py"), key=lambda path: path.relative_to(folder).parts):
+                digest.update(f"{package}/{path.relative_to(folder).as_posix()}\n".encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,183 @@
+"""Processes that make runs for this one, some of which may hang, run out of memory or be killed."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from epicycle.actors import EpicycleError
+
+MAX_STILLBORN = 5  # processes in a row that end before they can do anything
+_LOOK = 0.5  # s between two looks whether a run is still wanted
+# One thread a process: N processes of N threads each would only be in each other's way.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
+
+# What a process tells, with an exception for ``RAISED`` and what it has made for ``DONE``.
+READY, BEGUN, DONE, RAISED = "ready", "begun", "done", "raised"
+# What else may become of a request: it took too long, or the process has ended with that exit code.
+LATE, DEAD = "late", "dead"
+Outcome = tuple[str, Any]
+
+
+class WorkerError(EpicycleError):
+    """Workers that cannot work."""
+
+
+class UnwantedError(EpicycleError):
+    """Whoever wanted something made has gone."""
+
+
+class Bench(Protocol):
+    """What makes things in a process, one after the other."""
+
+    def prepare(self, request: Any) -> None:
+        """Load what is needed; has as much time as ``make``."""
+
+    def make(self, request: Any) -> Any:
+        """What is wanted, as plain data."""
+
+
+class _Process:
+    def __init__(self, begin: Callable[..., Bench], arguments: tuple[object, ...], folder: str) -> None:
+        self._folder = folder
+        environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
+        # No multiprocessing: the processes of Dask are daemons, which may have no children by it.
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", f"{__package__}.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+            process_group=0,  # an interrupt from the terminal is not meant for it; it ends with its input
+        )
+        self._told: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        threading.Thread(target=self._listen, daemon=True).start()
+        self._first: object = begin, arguments
+        self.is_ready = False
+
+    def make(self, request: object, timeout: float | None, is_wanted: Callable[[], bool]) -> Outcome:
+        """What becomes of a request; raises what the bench has raised, and ``UnwantedError``."""
+        if self._first is not None:
+            self._give(self._first)
+            self._first = None
+        self._give(request)
+        since = time.monotonic()
+        while True:
+            try:
+                what, told = self._told.get(timeout=_LOOK if timeout is None else min(_LOOK, timeout))
+            except queue.Empty:
+                if not is_wanted():
+                    raise UnwantedError from None
+                if timeout is not None and self.is_ready and time.monotonic() - since > timeout:
+                    return LATE, None
+                continue
+            since = time.monotonic()
+            if what == READY:
+                self.is_ready = True
+            elif what == RAISED:
+                raise told
+            elif what in (DONE, DEAD):
+                return what, told
+
+    def end(self) -> None:
+        """Kill it, if it is still there, and leave nothing behind."""
+        self._process.kill()
+        self._process.wait()
+        if self._folder:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _give(self, what: object) -> None:
+        assert self._process.stdin is not None
+        try:
+            pickle.dump(what, self._process.stdin)
+            self._process.stdin.flush()
+        except OSError:  # it has died, which the listener tells
+            return
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        try:
+            while True:
+                self._told.put(pickle.load(self._process.stdout))
+        except (EOFError, OSError, pickle.UnpicklingError):
+            self._told.put((DEAD, self._process.wait()))
+
+
+class Processes:
+    """As many processes as are wanted at once, each of which makes one thing after the other.
+
+    In each, ``begin(*arguments)`` makes the bench.  ``place``: where each is to have a folder of its own, until it
+    ends; it is the last argument then.
+    """
+
+    def __init__(self, begin: Callable[..., Bench], *arguments: object, place: str = "") -> None:
+        self._begin = begin
+        self._arguments = arguments
+        self._place = place
+        self._guard = threading.Lock()
+        self._idle: list[_Process] = []
+        self._busy: set[_Process] = set()
+        self._is_over = False
+
+    def make(
+        self, request: object, timeout: float | None = None, is_wanted: Callable[[], bool] = lambda: True
+    ) -> Outcome:
+        """What becomes of a request in one of the processes, in at most ``timeout`` seconds once it has begun.
+
+        Raises ``WorkerError``, what the bench has raised, and ``UnwantedError`` if it is not wanted any more.
+        """
+        code = None
+        for _ in range(MAX_STILLBORN):
+            process = self._taken()
+            is_good = False
+            try:
+                what, told = process.make(request, timeout, is_wanted)
+                is_good = what == DONE
+            finally:
+                self._give_back(process, is_good)
+            if process.is_ready:
+                return what, told
+            code = told
+        raise WorkerError(f"{MAX_STILLBORN} processes in a row ended before they could begin (exit code {code})")
+
+    def end(self) -> None:
+        """End all, in the middle of what they are at."""
+        with self._guard:
+            self._is_over = True
+            there = [*self._idle, *self._busy]
+        for each in there:
+            each.end()
+
+    def __enter__(self) -> Processes:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def _taken(self) -> _Process:
+        with self._guard:
+            if self._is_over:
+                raise UnwantedError
+            if self._idle:
+                found = self._idle.pop()
+            else:
+                folder = tempfile.mkdtemp(prefix="epicycle-", dir=self._place) if self._place else ""
+                found = _Process(self._begin, (*self._arguments, folder) if folder else self._arguments, folder)
+            self._busy.add(found)
+        return found
+
+    def _give_back(self, process: _Process, is_good: bool) -> None:
+        with self._guard:
+            self._busy.remove(process)
+            if is_good and not self._is_over:
+                self._idle.append(process)
+                return
+        process.end()

@@ -1,0 +1,70 @@
+"""How far a study is: a bar on a terminal, a line a minute elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ...printing import complain, console
+from .backlog import Backlog
+
+EVERY = 60.0  # s between two lines where there is no terminal
+
+
+class Pulse:
+    """The rate of a session, and what is left to do."""
+
+    def __init__(self) -> None:
+        self.started = time.monotonic()
+
+    def line(self, backlog: Backlog) -> str:
+        """``120 of 6,000 runs, 2 failed, 3.1 runs/s, 32 min left``."""
+        made = backlog.made.total()
+        parts = [f"{backlog.over:,} of {backlog.total:,} runs"]
+        if backlog.failed:
+            parts.append(f"{backlog.failed:,} failed")
+        seconds = time.monotonic() - self.started
+        if made and seconds > 0:
+            rate = made / seconds
+            parts += [f"{rate:.3g} runs/s", f"{duration(backlog.left / rate)} left"]
+        return ", ".join(parts)
+
+
+@contextmanager
+def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
+    """What a session calls now and then."""
+    pulse = Pulse()
+    terminal = console(stderr=True)
+    if terminal.is_terminal:
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        with Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TextColumn("{task.fields[line]}", markup=False),
+            console=terminal,
+            transient=True,
+        ) as bar:
+            task = bar.add_task(name, total=None, line="")
+            yield lambda backlog: bar.update(
+                task, total=backlog.total, completed=backlog.over, line=pulse.line(backlog)
+            )
+        return
+    last = pulse.started
+
+    def tell(backlog: Backlog) -> None:
+        nonlocal last
+        if time.monotonic() - last >= EVERY:
+            last = time.monotonic()
+            complain(f"{time.strftime('%H:%M:%S')} {name}: {pulse.line(backlog)}")
+
+    yield tell
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it."""
+    for limit, size, unit in ((100, 1, "s"), (6_000, 60, "min"), (172_800, 3600, "h"), (63_072_000, 86_400, "days")):
+        if seconds < limit:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds / 31_536_000:,.0f} years"

@@ -1,0 +1,471 @@
+"""YAML text -> nodes that know where they stand: the first step from a model file to a graph.
+
+The language is YAML 1.2 with the core schema and nothing that surprises: no tags that build objects, no merge
+keys, no duplicate keys, only text as keys. Everything that is wrong is noted, not raised, so that one run
+shows it all.
+"""
+
+import dataclasses
+import itertools
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, NoReturn, TypeAlias
+
+import yaml
+from yaml.events import (
+    AliasEvent,
+    CollectionEndEvent,
+    CollectionStartEvent,
+    DocumentStartEvent,
+    Event,
+    MappingStartEvent,
+    ScalarEvent,
+)
+
+from epicycle.actors import MAX_DEPTH, irregular, open_regular
+
+from .files import note_file
+from .problems import Position, Problems, did_you_mean
+
+MAX_BYTES = 10_000_000
+MAX_NODES = 200_000  # with each alias counted as often as it is used
+_MAX_DIGITS = 1_000
+
+_LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+Value: TypeAlias = str | int | float | bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A single value; `text` is as written, without quotes, and `plain` says that there were none."""
+
+    value: Value
+    text: str
+    plain: bool
+    position: Position
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A list of nodes."""
+
+    items: tuple["Node", ...]
+    position: Position
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A key and its value; the key is always text."""
+
+    key: Scalar
+    value: "Node"
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """Entries by key, in the order of the file."""
+
+    entries: dict[str, Entry]
+    position: Position
+
+
+Node: TypeAlias = Scalar | Sequence | Mapping
+
+
+def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | None:
+    """Read a YAML file; None if nothing can be made of it. `shown_as` is its name in messages."""
+    name = str(path) if shown_as is None else shown_as
+    try:
+        if not path.exists():
+            _add_missing(path, name, problems)
+            return None
+        if kind := irregular(path):
+            problems.add(f"{name} is {kind}")
+            return None
+        with open_regular(path) as file:
+            data = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        problems.add(f"cannot read {name}: {getattr(error, 'strerror', None) or error}")
+        return None
+    if len(data) > MAX_BYTES:
+        problems.add(_too_large(name))
+        return None
+    note_file(path, data)
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        _add_undecodable(data, error.start, name, problems)
+        return None
+    return parse(text, name, problems)
+
+
+def parse(text: str, name: str, problems: Problems, shown_as: str | None = None) -> Node | None:
+    """Turn YAML text into nodes; None if nothing can be made of it.
+
+    `name` is the file in messages, `shown_as` the line in which a text of one line stands.
+    """
+    if len(text) > MAX_BYTES:
+        problems.add(_too_large(name))
+        return None
+    return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as).build()
+
+
+def plain(node: Node) -> object:
+    """Return the node as ordinary dicts, lists and scalars."""
+    if isinstance(node, Mapping):
+        return {key: plain(entry.value) for key, entry in node.entries.items()}
+    if isinstance(node, Sequence):
+        return [plain(item) for item in node.items]
+    return node.value
+
+
+def _too_large(name: str) -> str:
+    return f"{name} is larger than {MAX_BYTES // 1_000_000} MB"
+
+
+def _add_missing(path: Path, name: str, problems: Problems) -> None:
+    folder = path.parent
+    if not folder.is_dir():
+        problems.add(f"there is no file {name}: there is no folder {folder}")
+        return
+    names = [entry.name for entry in itertools.islice(folder.iterdir(), 10_000)]
+    problems.add(f"there is no file {name}" + did_you_mean(path.name, names))
+
+
+def _add_undecodable(data: bytes, offset: int, name: str, problems: Problems) -> None:
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        problems.add(f"{name} is UTF-16, not UTF-8 text: save it as UTF-8")
+        return
+    before = data[:offset].decode("utf-8")  # valid, as the first bad byte is at the offset
+    rest = data[offset:].split(b"\n", 1)[0].decode("utf-8", "backslashreplace")
+    lines = _LINE_BREAK.split(before)
+    position = Position(name, len(lines), len(lines[-1]) + 1, 4, lines[-1] + rest.rstrip("\r"))
+    message = f"this is not UTF-8 text: it has the byte 0x{data[offset]:02x}"
+    problems.add(message, position, "save the file as UTF-8")
+
+
+# --- scalars: the core schema of YAML 1.2 -------------------------------------------------------------
+
+_NULLS = frozenset(("", "~", "null", "Null", "NULL"))
+_BOOLS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_SPECIAL_START = frozenset("+-.0123456789")  # most texts start otherwise and need no regular expression
+_INT = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+_BASES = {"0o": 8, "0x": 16}
+
+
+def _resolve(text: str) -> Value:
+    """Return what a plain scalar means; raise ValueError for a number that no computer number can hold."""
+    if text in _NULLS:
+        return None
+    if text[0] not in _SPECIAL_START:
+        return _BOOLS.get(text, text)
+    if _INT.fullmatch(text):
+        if len(text) > _MAX_DIGITS:
+            raise ValueError(f"a number of {len(text)} characters is too long")
+        return int(text[2:], _BASES[text[:2]]) if text[:2] in _BASES else int(text)
+    if _FLOAT.fullmatch(text):
+        value = float(text)
+        if value in (float("inf"), float("-inf")):
+            raise ValueError(f"the number {_short(text)} is too large for a float")
+        return value
+    if _NOT_FINITE.fullmatch(text):
+        return float(text.replace(".", ""))
+    return text
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+_TAG_PREFIX = "tag:yaml.org,2002:"
+_SCALAR_TAGS: dict[str, tuple[type, ...]] = {
+    "int": (int,),
+    "float": (float, int),
+    "bool": (bool,),
+    "null": (type(None),),
+}
+
+
+# --- the builder --------------------------------------------------------------------------------------
+
+# libyaml counts lines this way; ours must agree with its marks.
+_LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+_UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
+_ARROW = re.compile(r"\s*[-=]>")
+_PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
+
+_HELP_FOR_SYNTAX: Final = (
+    ("mapping values are not allowed", "check the indentation, and quote a text that contains ': '"),
+    ("did not find expected ',' or", "a bracket is not closed, or a comma is missing"),
+    ("found unexpected end of stream", "a quote is not closed"),
+    ("did not find expected key", "check the indentation, and that brackets and quotes are closed"),
+    ("did not find expected alphabetic", "quote a text that has [*] or * in it"),
+    ("did not find expected '-' indicator", "check the indentation: all '-' of a list stand in one column"),
+    ("could not find expected ':'", "each key needs a ':' and a space after it"),
+    ("did not find expected node content", "a bracket is not closed, or a value is missing"),
+)
+
+
+class _StopError(Exception):
+    """The file cannot be read any further; the reason has been noted."""
+
+
+@dataclass(slots=True)
+class _Frame:
+    """A list or mapping that is still open."""
+
+    event: CollectionStartEvent
+    position: Position
+    is_mapping: bool
+    items: list[Node] = field(default_factory=list)
+    entries: dict[str, Entry] = field(default_factory=dict)
+    has_key: bool = False
+    key: Scalar | None = None  # None with has_key: a key that was refused, its value is dropped
+    weight: int = 1  # nodes within, this one included
+    height: int = 1  # levels within, this one included
+
+
+class _Builder:
+    """Builds nodes from parser events with a stack of its own, so that no depth can overflow Python's."""
+
+    def __init__(self, text: str, name: str, problems: Problems, shown_as: str | None) -> None:
+        self._text = text
+        self._name = name
+        self._problems = problems
+        self._lines = _LINE_BREAK.split(text) if shown_as is None else [shown_as]
+        self._stack: list[_Frame] = []
+        self._root: Node | None = None
+        self._anchors: dict[str, tuple[Node, int, int] | None] = {}  # None: still open
+        self._nodes = 0
+
+    def build(self) -> Node | None:
+        if found := _UNPRINTABLE.search(self._text):
+            before = _LINE_BREAK.split(self._text[: found.start()])
+            at = self._at(len(before) - 1, len(before[-1]))
+            message = f"YAML does not allow the character U+{ord(found[0]):04X}"
+            self._problems.add(message, at, 'write it as an escape in "..."')
+            return None
+        try:
+            for event in yaml.parse(self._text, Loader=_LOADER):
+                self._take(event)
+        except yaml.MarkedYAMLError as error:
+            self._add_syntax(error)
+            return None
+        except yaml.YAMLError as error:
+            self._problems.add(f"{self._name}: broken YAML: {error}")
+            return None
+        except _StopError:
+            return None
+        root = self._root
+        if root is None or (isinstance(root, Scalar) and root.plain and not root.text):
+            self._problems.add(f"{self._name} is empty")
+            return None
+        return root
+
+    def _take(self, event: Event) -> None:
+        if isinstance(event, ScalarEvent):
+            node = self._scalar(event)
+            self._count(1, node.position)
+            self._name_anchor(event.anchor, node, 1, 0)
+            self._add(node, 1, 0)
+        elif isinstance(event, CollectionStartEvent):
+            self._open(event)
+        elif isinstance(event, CollectionEndEvent):
+            self._close(event)
+        elif isinstance(event, AliasEvent):
+            self._alias(event)
+        elif isinstance(event, DocumentStartEvent) and self._root is not None:
+            self._stop("a second YAML document starts here: one file holds one model", self._span(event))
+
+    # --- nodes
+
+    def _add(self, node: Node, weight: int, height: int) -> None:
+        """Hang a finished node into the list or mapping that is open."""
+        if not self._stack:
+            self._root = node
+            return
+        frame = self._stack[-1]
+        frame.weight += weight
+        if height >= frame.height:
+            frame.height = height + 1
+        if not frame.is_mapping:
+            frame.items.append(node)
+        elif not frame.has_key:
+            frame.has_key = True
+            frame.key = self._checked_key(frame, node)
+        else:
+            frame.has_key = False
+            if frame.key is not None:
+                frame.entries[frame.key.text] = Entry(frame.key, node)
+
+    def _open(self, event: CollectionStartEvent) -> None:
+        position = self._span(event)
+        is_mapping = isinstance(event, MappingStartEvent)
+        self._count(1, position)
+        if len(self._stack) >= MAX_DEPTH:
+            self._stop(f"nested deeper than {MAX_DEPTH} levels", position)
+        expected, kind = ("map", "mapping") if is_mapping else ("seq", "list")
+        if event.tag is not None and event.tag != _TAG_PREFIX + expected:
+            self._add_tag(event.tag, f"a {kind}", self._span(event, with_properties=True))
+        if event.anchor is not None:
+            self._anchors[event.anchor] = None
+        self._stack.append(_Frame(event, position, is_mapping))
+
+    def _close(self, event: CollectionEndEvent) -> None:
+        frame = self._stack.pop()
+        position = self._collection_position(frame, event)
+        node: Node
+        if frame.is_mapping:
+            node = Mapping(frame.entries, position)
+        else:
+            node = Sequence(tuple(frame.items), position)
+        self._name_anchor(frame.event.anchor, node, frame.weight, frame.height)
+        self._add(node, frame.weight, frame.height)
+
+    def _alias(self, event: AliasEvent) -> None:
+        position = self._span(event)
+        name = event.anchor or ""
+        if name not in self._anchors:
+            guess = did_you_mean(name, self._anchors)
+            self._stop(f"there is no anchor &{name} before this alias{guess}", position)
+        known = self._anchors[name]
+        if known is None:
+            self._stop(f"the alias *{name} stands within &{name} itself", position)
+        node, weight, height = known
+        self._count(weight, position)
+        if len(self._stack) + height > MAX_DEPTH:
+            self._stop(f"nested deeper than {MAX_DEPTH} levels by the alias *{name}", position)
+        # The node itself is reported where it is used, what is inside it where it is written.
+        self._add(dataclasses.replace(node, position=position), weight, height)
+
+    def _scalar(self, event: ScalarEvent) -> Scalar:
+        position = self._span(event)
+        text = event.value
+        is_plain = not event.style
+        value: Value = text
+        try:
+            if event.tag is not None:
+                value = self._tagged(event.tag, text, self._span(event, with_properties=True))
+            elif is_plain:
+                value = _resolve(text)
+        except ValueError as error:
+            self._problems.add(str(error), position)
+            position = dataclasses.replace(position, told=True)
+        return Scalar(value, text, is_plain, position)
+
+    def _tagged(self, tag: str, text: str, position: Position) -> Value:
+        kind = tag.removeprefix(_TAG_PREFIX)
+        if tag == _TAG_PREFIX + "str":
+            return text
+        if kind == tag or kind not in _SCALAR_TAGS:
+            self._add_tag(tag, "a single value", position)
+            return text
+        value = _resolve(text)
+        if type(value) not in _SCALAR_TAGS[kind]:
+            raise ValueError(f"!!{kind} does not fit {_short(text)!r}")
+        return float(value) if kind == "float" and isinstance(value, int) else value
+
+    def _checked_key(self, frame: _Frame, key: Node) -> Scalar | None:
+        """Return the key if it is one we take; else note why not."""
+        at = key.position
+        if not isinstance(key, Scalar):
+            kind = "mapping" if isinstance(key, Mapping) else "list"
+            hint = "quote a text that starts with '{' or '['"
+            self._problems.add(f"a key must be text, this one is a {kind}", at, hint)
+        elif not isinstance(key.value, str):
+            shown = _short(key.text)
+            kind = f"{shown}, which is not text" if key.text else "empty"
+            self._problems.add(f"a key must be text, this one is {kind}", at, f"quote it: '{shown}'")
+        elif key.value == "<<" and key.plain:
+            hint = "write the entries out, or use a composite class"
+            self._problems.add("YAML 1.2 has no merge keys (<<)", at, hint)
+        elif key.value in frame.entries:
+            first = frame.entries[key.value].key.position.line
+            message = f"duplicate key {_short(key.value)!r}: first on line {first}, again on line {at.line}"
+            self._problems.add(message, at)
+        else:
+            return key
+        return None
+
+    def _name_anchor(self, anchor: str | None, node: Node, weight: int, height: int) -> None:
+        if anchor is not None:
+            self._anchors[anchor] = (node, weight, height)
+
+    # --- positions
+
+    def _at(self, line: int, column: int, length: int = 1) -> Position:
+        source = self._lines[line] if line < len(self._lines) else ""
+        return Position(self._name, line + 1, column + 1, max(length, 1), source)
+
+    def _span(self, event: Event, *, with_properties: bool = False) -> Position:
+        """Return where an event stands: its first line only, and without anchor and tag unless asked."""
+        start, end = event.start_mark, event.end_mark
+        assert start is not None
+        assert end is not None
+        line, column = start.line, start.column
+        source = self._lines[line] if line < len(self._lines) else ""
+        stop = end.column if end.line == line else len(source)
+        if isinstance(event, (ScalarEvent, CollectionStartEvent)) and (event.anchor or event.tag):
+            found = _PROPERTIES.match(source, column)
+            if found is not None and with_properties:
+                stop = column + len(found[0].rstrip())
+            elif found is not None and found.end() < stop:
+                column = found.end()
+        return Position(self._name, line + 1, column + 1, max(stop - column, 1), source)
+
+    def _collection_position(self, frame: _Frame, end: CollectionEndEvent) -> Position:
+        """Return where a whole list or mapping stands: its brackets, or else its first key or dash."""
+        at = frame.position
+        if not frame.event.flow_style:
+            first = next(iter(frame.entries.values())).key.position if frame.entries else None
+            if first is not None and first.line >= at.line:
+                return first
+            return dataclasses.replace(at, length=1)
+        mark = end.end_mark
+        assert mark is not None
+        stop = mark.column if mark.line + 1 == at.line else len(at.source)
+        return dataclasses.replace(at, length=max(stop - at.column + 1, 1))
+
+    # --- problems
+
+    def _count(self, nodes: int, position: Position) -> None:
+        self._nodes += nodes
+        if self._nodes > MAX_NODES:
+            self._stop(f"more than {MAX_NODES:,} values, aliases counted at each use", position)
+
+    def _stop(self, message: str, position: Position) -> NoReturn:
+        self._problems.add(message, position)
+        raise _StopError
+
+    def _add_tag(self, tag: str, kind: str, position: Position) -> None:
+        shown = _short("!!" + tag.removeprefix(_TAG_PREFIX) if tag.startswith(_TAG_PREFIX) else tag)
+        known = shown.removeprefix("!!") in {"str", "map", "seq", *_SCALAR_TAGS} and shown.startswith("!!")
+        reason = f"does not fit {kind}" if known else "is not allowed"
+        self._problems.add(f"the tag {shown} {reason}", position, "leave it out, or quote a text that starts with '!'")
+
+    def _add_syntax(self, error: yaml.MarkedYAMLError) -> None:
+        message = error.problem or str(error)
+        hints = [hint for start, hint in _HELP_FOR_SYNTAX if message.startswith(start)]
+        context = error.context_mark
+        mark = error.problem_mark or context
+        if context is not None and mark is not None and not "".join(self._lines[mark.line :]).strip():
+            mark = context  # what is missing at the end of the file is found where it was begun
+        position = None if mark is None else self._at(mark.line, mark.column)
+        if position is not None and message.startswith("did not find expected ','") and "${" in position.source:
+            hints = ['within { } and [ ], quote an expression: "${...}"']
+        elif position is not None and hints and _ARROW.match(position.source, position.column - 1):
+            hints = ["write the ports on the left without brackets, or quote the whole connection"]
+        elif position is not None and hints and _INDEXED.search(position.source):
+            hints.append('within { } and [ ], quote a text that has an index: "a[0].port"')
+        if position is not None and message.startswith("found character"):
+            character = position.source[position.column - 1 : position.column]
+            quote = f"quote a text that starts with {character!r}"
+            hints = ["indent with spaces, not tabs" if character == "\t" else quote]
+        if error.context and context is not None and mark is not None and context.line != mark.line:
+            hints.insert(0, f"{error.context} that starts on line {context.line + 1}")
+        self._problems.add(f"broken YAML: {message}", position, *hints)

@@ -1,0 +1,286 @@
+"""Dotted patterns over paths: ``observer[*].sensor.range``, ``*.peer_plan``, ``**.measurement``.
+
+``*`` stands for one whole segment of a path, ``name[*]`` for every instance of an array, ``**`` for any number of
+segments.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, KeysView, Sequence
+from functools import cached_property, lru_cache
+
+from epicycle.actors import did_you_mean
+
+from .limits import NORMAL, Limits
+
+_SEGMENT = re.compile(r"(\*\*(?!\[)|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?\Z")
+
+_INDEX = re.compile(r"\[\d+\]")
+MAX_PATTERN = 1_000
+_FEW = 30  # paths for which to compile a pattern does not pay
+_MANY = 5  # how often all paths are gone through before they are sorted by their names
+MAX_SHOWN = 12  # names in a message
+
+
+class PatternError(ValueError):
+    """Text that is no pattern; the message says why."""
+
+
+class TooManyError(Exception):
+    """There are more patterns and paths than can be compared soon."""
+
+
+class Comparisons:
+    """How many paths patterns may still be compared with; raises ``TooManyError``."""
+
+    def __init__(self, most: int) -> None:
+        self._most = self._left = most
+
+    def spend(self, number: int) -> None:
+        """Take some off."""
+        self._left -= number
+        if self._left < 0:
+            raise TooManyError(f"patterns are compared with more than {self._most:,} paths")
+
+
+def in_general(path: str) -> str:
+    """``a[*].b`` for ``a[2].b``: what holds of one instance is said of all."""
+    return _INDEX.sub("[*]", path)
+
+
+def names_asked(pattern: str) -> list[str]:
+    """The segments of a pattern that a path must have, one for one: ``s[3]``, ``s[*]`` or ``s``."""
+    return [segment for segment in pattern.split(".") if not segment.startswith("*")]
+
+
+def names_of(path: str) -> set[str]:
+    """What patterns may ask for by ``names_asked``, of one path."""
+    names = set(path.split("."))
+    return names | {f"{name[: name.index('[')]}[*]" for name in names if name[-1:] == "]"}
+
+
+@lru_cache(maxsize=4096)
+def compile_pattern(text: str) -> re.Pattern[str]:
+    """The regular expression of a pattern; raises ``PatternError``."""
+    # What stands between two `**` is taken where it fits first, and that is final (?>...): to look for it further on
+    # could find nothing more, but might take for ever.
+    head, *tails = _split_at_doubles(_segments(text))
+    expression = "".join(f"{segment}\\." for segment in head)
+    for tail in tails[:-1]:
+        expression += r"(?>(?:[^.]+\.)+?" + "".join(f"{segment}\\." for segment in tail) + ")"
+    if tails:
+        expression += r"(?:[^.]+\.)+" + "".join(f"{segment}\\." for segment in tails[-1])
+    # Every segment has got its dot; the path gets one more to match.
+    return re.compile(expression)
+
+
+def _split_at_doubles(segments: Iterable[tuple[str, str | None]]) -> list[list[str]]:
+    """The regular expressions of the segments before, between and behind the ``**`` of a pattern."""
+    parts: list[list[str]] = [[]]
+    for name, index in segments:
+        if name == "**":
+            parts.append([])
+        elif name == "*":
+            parts[-1].append(r"[^.]+")
+        elif index is None:
+            parts[-1].append(re.escape(name))
+        else:
+            parts[-1].append(re.escape(name) + (r"\[\d+\]" if index == "*" else re.escape(f"[{index}]")))
+    return parts
+
+
+def _segments(text: str) -> list[tuple[str, str | None]]:
+    """The names and indices of a pattern; raises ``PatternError``."""
+    if len(text) > MAX_PATTERN:
+        raise PatternError(f"a pattern has at most {MAX_PATTERN:,} characters")
+    found = []
+    for segment in text.split("."):
+        match = _SEGMENT.match(segment)
+        if match is None:
+            raise PatternError(f"{segment!r} is not a name, a name with an index, '*' or '**'")
+        found.append((match.group(1), match.group(3)))
+    return found
+
+
+def check_pattern(text: str) -> None:
+    """Raise ``PatternError`` if a text is no pattern."""
+    _segments(text)
+
+
+def matches(pattern: str, path: str) -> bool:
+    """Whether the pattern, which is one, selects the path; for a few paths sooner told than by ``compile_pattern``."""
+    head, *tails = _split(pattern.split("."), "**")
+    names = path.split(".")
+    if not tails:
+        return len(head) == len(names) and _fit(head, names)
+    *middle, last = tails
+    end = len(names) - len(last)
+    if not _fit(head, names[: len(head)]) or not _fit(last, names[max(0, end) :]):
+        return False
+    at = len(head)
+    for tail in middle:
+        at = next((place for place in range(at + 1, end) if _fit(tail, names[place : place + len(tail)])), end) + len(
+            tail
+        )
+    return at < end  # the last `**` stands for one at least
+
+
+def _split(segments: list[str], sign: str) -> list[list[str]]:
+    parts: list[list[str]] = [[]]
+    for segment in segments:
+        if segment == sign:
+            parts.append([])
+        else:
+            parts[-1].append(segment)
+    return parts
+
+
+def _fit(segments: list[str], names: list[str]) -> bool:
+    """Whether so many segments without ``**`` stand for these names."""
+    return len(segments) == len(names) and all(map(_fits, segments, names))
+
+
+def _fits(segment: str, name: str) -> bool:
+    if segment[:1] == "*" or segment == name:
+        return True
+    return segment[-3:] == "[*]" and name[-1:] == "]" and name.startswith(segment[:-2])
+
+
+def could_be_within(pattern: str, path: str, *, array: bool) -> bool:
+    """Whether a pattern may speak of something behind a path without an index, were there anything.
+
+    With ``array``, the pattern must give an index there.
+    """
+    asked, parts = pattern.split("."), path.split(".")
+    for position, segment in enumerate(asked[: len(parts)]):
+        if segment == "**":
+            return True
+        name, bracket, _ = segment.partition("[")
+        is_last = position == len(parts) - 1
+        if segment != "*" and (name != parts[position].partition("[")[0] or (array and is_last and not bracket)):
+            return False
+    return len(asked) > len(parts)
+
+
+def select(pattern: str, paths: Iterable[str]) -> list[str]:
+    """The paths that the pattern selects, in their order."""
+    return PathIndex(paths).select(pattern)
+
+
+def _always(_: str) -> bool:
+    return True
+
+
+class PathIndex:
+    """Paths, for patterns to choose from without a look at each of them: a model may have many of both.
+
+    ``limits`` are those of the model: patterns that are to be compared with too many paths raise ``TooManyError``.
+    """
+
+    def __init__(self, paths: Iterable[str], limits: Limits = NORMAL) -> None:
+        self._place = {path: place for place, path in enumerate(paths)}
+        self._comparisons = Comparisons(limits.comparisons)
+        self._compared = 0
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._place)
+
+    def __contains__(self, path: object) -> bool:
+        return path in self._place
+
+    def select(self, pattern: str) -> list[str]:
+        """The paths that the pattern selects, in their order; raises ``PatternError``."""
+        if "*" not in pattern:
+            _segments(pattern)
+            return [pattern] if pattern in self._place else []
+        check_pattern(pattern)
+        # Where the first wildcard stands, `name[*]` still says the name.
+        fixed = pattern.partition("*")[0].rstrip("[.")
+        candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else self._order
+        # To choose by the names in a pattern pays when there are many patterns.
+        if self._compared > _MANY * len(self._place):
+            others = [self._having.get(name, ()) for name in names_asked(pattern)]
+            candidates = min(candidates, *others, key=len) if others else candidates
+        self._compared += len(candidates)
+        self.spend(len(candidates))
+        if len(candidates) < _FEW:
+            return [path for path in candidates if matches(pattern, path)]
+        expression = compile_pattern(pattern)
+        return [path for path in candidates if expression.fullmatch(f"{path}.")]
+
+    def in_order(self, paths: Iterable[str]) -> list[str]:
+        """The given paths in their order here."""
+        return sorted(paths, key=self._place.__getitem__)
+
+    def did_you_mean(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> str:
+        """Of the paths that fit, the one that was probably meant by a pattern that selects none, to end a message."""
+        near: Iterable[str] = (path for path in self.inside(scope) if fits(path))
+        start = f"{scope}." if scope else ""
+        near = (path.removeprefix(start) for path in near)
+        if "[*]" in pattern:
+            near = dict.fromkeys(map(in_general, near))
+        return did_you_mean(pattern, near)
+
+    def advice(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, ...]:
+        """What could be written in place of a pattern that selects none: which ports there are where it points to."""
+        start = f"{scope}." if scope else ""
+        owner = pattern.rpartition(".")[0]
+        if len(start) + len(pattern) + 2 > MAX_PATTERN:
+            return ()
+        for holder in (pattern, owner):
+            ports = [path for path in self.select(f"{start}{holder}.*") if fits(path)] if holder else []
+            names = list(dict.fromkeys(path.rpartition(".")[2] for path in ports))
+            if names and holder == pattern:
+                written = ", ".join(f"{pattern}.{name}" for name in names)
+                return (f"that is an actor, not a port: write {written}",)
+            if names:
+                return (f"valid ports of {holder}: {', '.join(names)}",)
+        if self.did_you_mean(pattern, scope, fits):
+            return ()
+        firsts = (path.removeprefix(start).partition(".")[0] for path in self.inside(scope) if fits(path))
+        holders = list(dict.fromkeys(map(in_general, firsts)))
+        if not holders:
+            return ("there is no port that would do",)
+        more = ", ..." if len(holders) > MAX_SHOWN else ""
+        return (f"there are such ports at {', '.join(holders[:MAX_SHOWN])}{more}",)
+
+    @property
+    def paths(self) -> KeysView[str]:
+        """All of them, in their order."""
+        return self._place.keys()
+
+    def spend(self, number: int) -> None:
+        """Count paths that are gone through for another reason; raises ``TooManyError`` if there are too many."""
+        self._comparisons.spend(number)
+
+    def inside(self, scope: str) -> Collection[str]:
+        """The paths within a composite; all of them if it is the model."""
+        return self._within.get(scope, ()) if scope else self._place.keys()
+
+    @cached_property
+    def _order(self) -> list[str]:
+        return list(self._place)
+
+    @cached_property
+    def _having(self) -> dict[str, list[str]]:
+        """The paths by the names in them."""
+        found: dict[str, list[str]] = {}
+        for path in self._place:
+            for name in names_of(path):
+                found.setdefault(name, []).append(path)
+        return found
+
+    @cached_property
+    def _within(self) -> dict[str, list[str]]:
+        """The paths by what they begin with: whole segments, the last one also without its index."""
+        found: dict[str, list[str]] = {}
+        for path in self._place:
+            end = len(path)
+            while (end := path.rfind(".", 0, end)) > 0:
+                found.setdefault(path[:end], []).append(path)
+                if path[end - 1] == "]":
+                    found.setdefault(path[: path.rindex("[", 0, end)], []).append(path)
+            if path[-1] == "]":
+                found.setdefault(path[: path.rindex("[")], []).append(path)
+        return found

@@ -1,0 +1,220 @@
+"""What is wrong with a model, said so that it can be mended: where, what, and what would be right."""
+
+import unicodedata
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from epicycle.actors import EpicycleError, did_you_mean, nearest, shortened, visible, visible_character
+
+# The runner takes the functions from here, as it does all that makes a message.
+__all__ = ["ModelError", "Position", "Problem", "Problems", "did_you_mean", "nearest", "visible"]
+
+MAX_PROBLEMS = 100
+MAX_SOURCE_WIDTH = 120
+_CUT = "..."
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A stretch of one line of a file; line and column count from 1, `source` is the whole line."""
+
+    file: str
+    line: int
+    column: int
+    length: int
+    source: str
+    told: bool = False  # what is wrong there has been told: what else might be said would be a consequence
+
+    def __str__(self) -> str:
+        """``file:line:column``, to say in a message where something else stands."""
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong, where it stands, and what may help."""
+
+    message: str
+    position: Position | None = None
+    help: tuple[str, ...] = ()
+    severity: str = "error"  # or "warning"
+    raised: Position | None = None  # the line of a user's program that raised an exception
+
+    def __str__(self) -> str:
+        head = f"{self.severity}: {visible(shortened(self.message))}"
+        lines = [head]
+        if (at := self.position) is not None:
+            lines = [f"{visible(at.file)}:{at.line}:{at.column}: {head}"]
+            lines += marked(at)
+        if self.raised is not None:
+            lines += told_raised(self.raised)
+        lines += [f"   help: {visible(shortened(line))}" for line in self.help]
+        return "\n".join(lines)
+
+
+class ModelError(EpicycleError):
+    """A model that cannot be used, with the problems found in it; `more` says that there are others."""
+
+    def __init__(self, problems: Iterable[Problem], more: bool = False) -> None:
+        self.problems = tuple(problems)
+        self.more = more
+        super().__init__(self.problems, more)  # args are what pickle and copy rebuild the error from
+
+    def __str__(self) -> str:
+        parts = [str(problem) for problem in self.problems]
+        text = "\n\n".join(parts)
+        if len(parts) > 1:
+            files = dict.fromkeys(visible(p.position.file) for p in self.problems if p.position is not None)
+            count = f"more than {len(parts)}" if self.more else f"{len(parts)}"
+            text += f"\n{count} errors" + (f" in {', '.join(files)}" if files else "")
+        return text
+
+
+class Problems:
+    """Collects problems, so that one run shows them all; identical ones count once, and after 100 it is enough.
+
+    What is wrong in an array is told for the first instance: ``about`` is what a problem is about in all of them, where
+    the message names one.  A fault of a composite class is told for its first use: ``scope`` is the path of the
+    instance that has it, and what stands at one place is told for the first of them.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
+        self._warnings: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
+        self._unsaid = 0
+        self._scopes: dict[Position, str] = {}
+        self._cause: BaseException | None = None  # the first exception that was not ours
+        self.muted = False  # while true, problems count for len() alone: they repeat what has been said
+
+    def __len__(self) -> int:
+        return len(self._kept) + self._unsaid
+
+    def __bool__(self) -> bool:
+        """True for any collector, as `problems or Problems()` must not lose an empty one; ask len()."""
+        return True
+
+    @property
+    def found(self) -> tuple[Problem, ...]:
+        """The problems kept so far, in the order they were found."""
+        return tuple(self._kept.values())
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """What is odd but not wrong, as far as noted."""
+        return tuple(self._warnings.values())
+
+    def warn(self, message: str, position: Position | None = None, *hints: str, about: tuple[str, ...] = ()) -> None:
+        """Note what may be meant, but most likely is not; it does not count as a problem."""
+        if len(self._warnings) < MAX_PROBLEMS:
+            self._warnings.setdefault((about or message, position), Problem(message, position, hints, "warning"))
+
+    def add(
+        self,
+        message: str,
+        position: Position | None = None,
+        *hints: str,
+        scope: str = "",
+        about: tuple[str, ...] = (),
+        raised: Position | None = None,
+        cause: BaseException | None = None,
+    ) -> None:
+        """Note a problem; each hint becomes a line of help.  One too many raises all that there are as a ModelError.
+
+        ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
+        """
+        if self.muted or (position is not None and position.told):
+            self._unsaid += 1
+            return
+        key = about or message, position
+        if key in self._kept or (position is not None and self._scopes.setdefault(position, scope) != scope):
+            return
+        if len(self._kept) == MAX_PROBLEMS:
+            # To find them all, and what each was meant to be, may take very long.
+            raise self._error(more=True) from self._cause
+        self._kept[key] = Problem(message, position, hints, raised=raised)
+        self._cause = self._cause or cause
+
+    def raise_if_any(self) -> None:
+        """Raise all problems as one ModelError, if there are any."""
+        if self._kept:
+            raise self._error() from self._cause
+
+    def _error(self, *, more: bool = False) -> ModelError:
+        return ModelError(sorted(self.found, key=self._place), more)
+
+    def _place(self, problem: Problem) -> tuple[int, int, int]:
+        """Where a problem is shown: file by file as they were met, and from top to bottom."""
+        if (at := problem.position) is None:
+            return -1, 0, 0
+        files = list(dict.fromkeys(each.position.file for each in self.found if each.position is not None))
+        return files.index(at.file), at.line, at.column
+
+
+def told_raised(at: Position) -> list[str]:
+    """The lines of a message that say where an exception comes from."""
+    return [f"   raised at {visible(at.file)}:{at.line}:{at.column}", *marked(at)]
+
+
+def marked(at: Position) -> list[str]:
+    """The line of a place and the carets below it; nothing if it cannot be had, as those of a Python prompt."""
+    if not at.length:
+        return []
+    source, carets = _excerpt(at)
+    gutter = max(5, len(str(at.line)))
+    return [f"{at.line:>{gutter}} | {source}".rstrip(), f"{'':>{gutter}} | {carets}"]
+
+
+def _cell(character: str) -> tuple[str, int]:
+    """Return how one character of a source line is shown, and how many columns that takes."""
+    if character == "\t":
+        return "    ", 4
+    shown = visible_character(character)
+    if len(shown) > 1 or shown.isascii():
+        return shown, len(shown)
+    if unicodedata.category(shown) in ("Mn", "Me"):
+        return shown, 0
+    return shown, 2 if unicodedata.east_asian_width(shown) in "WF" else 1
+
+
+def _excerpt(at: Position) -> tuple[str, str]:
+    """Return the source line, cut to a bearable width around the place, and the carets that go below it."""
+    start = min(max(at.column - 1, 0), len(at.source))
+    # A file may be one line of megabytes: only what can be shown is looked at.
+    first = max(0, start - MAX_SOURCE_WIDTH)
+    cells = [_cell(character) for character in at.source[first : start + 2 * MAX_SOURCE_WIDTH]]
+    start -= first
+    whole = first == 0 and len(cells) == len(at.source)
+    low, high = 0, len(cells)
+    if not whole or _width(cells) > MAX_SOURCE_WIDTH:
+        room = MAX_SOURCE_WIDTH - 2 * len(_CUT)
+        low = _reach_left(cells, start, room // 3)
+        high = _reach_right(cells, low, room)
+        low = _reach_left(cells, high, room)  # near the end of the line, the left side takes what is over
+    cut_left = _CUT if first or low else ""
+    cut_right = _CUT if first + high < len(at.source) else ""
+    source = cut_left + "".join(shown for shown, _ in cells[low:high]) + cut_right
+    before = len(cut_left) + _width(cells[low:start])
+    end = min(start + max(at.length, 1), high)
+    return source, " " * before + "^" * max(_width(cells[start:end]), 1)
+
+
+def _width(cells: list[tuple[str, int]]) -> int:
+    return sum(width for _, width in cells)
+
+
+def _reach_left(cells: list[tuple[str, int]], end: int, room: int) -> int:
+    """Return the least index from which the cells up to `end` fit into the room."""
+    index = end
+    while index > 0 and cells[index - 1][1] <= room:
+        index -= 1
+        room -= cells[index][1]
+    return index
+
+
+def _reach_right(cells: list[tuple[str, int]], start: int, room: int) -> int:
+    """Return the greatest index up to which the cells from `start` fit into the room."""
+    index = start
+    while index < len(cells) and cells[index][1] <= room:
+        room -= cells[index][1]
+        index += 1
+    return index

@@ -1,0 +1,140 @@
+"""Reading nodes as what they should be: mappings with known keys, lists, texts, names."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from .document import Entry, Mapping, Node, Scalar, Sequence
+from .problems import Position, Problems, did_you_mean, nearest
+
+SURE = 0.75  # how like a key must be to the one that it is taken for
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+NAMES_HAVE = "use letters, digits and _, no digit first"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A piece of text and where it stands."""
+
+    text: str
+    position: Position
+
+
+class NodeReader:
+    """Whatever is misshapen is added to ``problems`` and left out."""
+
+    def __init__(self, problems: Problems) -> None:
+        self.problems = problems
+
+    def entries(self, node: Node, what: str, valid: tuple[str, ...]) -> dict[str, Entry] | None:
+        """The entries of a mapping, unknown keys reported and left out; None if it is no mapping."""
+        if not isinstance(node, Mapping):
+            if is_empty(node):
+                return {}
+            self.problems.add(f"{what} is not a mapping", node.position, f"valid keys: {', '.join(valid)}")
+            return None
+        known = {}
+        for key, entry in node.entries.items():
+            if key in valid:
+                known[key] = entry
+            else:
+                self.problems.add(
+                    f"{what} has no key {key!r}{did_you_mean(key, valid)}",
+                    entry.key.position,
+                    f"valid keys: {', '.join(valid)}",
+                )
+                # Read on as if it had been written right, or else it would seem to be missing as well; but only if
+                # there is no doubt, or else what follows would be judged by what it is not.
+                if (meant := nearest(key, valid, SURE)) is not None and meant not in node.entries:
+                    known.setdefault(meant, entry)
+        return known
+
+    def named(self, node: Node, what: str) -> list[tuple[str, Entry]]:
+        """The entries of a mapping from names to things."""
+        if is_empty(node):
+            return []
+        if not isinstance(node, Mapping):
+            self.problems.add(f"{what} is not a mapping from names", node.position)
+            return []
+        found = []
+        for name, entry in node.entries.items():
+            if NAME.match(name):
+                found.append((name, entry))
+            else:
+                self.problems.add(f"{name!r} is not a name", entry.key.position, NAMES_HAVE)
+        return found
+
+    def items(self, node: Node, what: str) -> tuple[Node, ...] | None:
+        if isinstance(node, Sequence):
+            return node.items
+        if is_empty(node):
+            return ()
+        self.problems.add(f"{what} is not a list", node.position, "begin each entry with '- '")
+        return None
+
+    def texts(self, node: Node, what: str) -> list[Text]:
+        """A text, or a list of texts."""
+        nodes = node.items if isinstance(node, Sequence) else (node,)
+        found = []
+        for item in nodes:
+            if is_empty(item):
+                continue
+            if (text := self.text(item, what)) is not None:
+                found.append(Text(text, item.position))
+        return found
+
+    def text(self, node: Node, what: str) -> str | None:
+        if isinstance(node, Scalar):
+            return node.value if isinstance(node.value, str) else node.text
+        self.problems.add(f"{what} is not a text", node.position)
+        return None
+
+    def name(self, node: Node, what: str) -> str | None:
+        text = self.text(node, what)
+        if text is not None and not NAME.match(text):
+            self.problems.add(f"{what} {text!r} is not a name", node.position, NAMES_HAVE)
+            return None
+        return text
+
+
+def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
+    """Where a part of a scalar's text stands that begins at ``offset``; all of it if it is folded or has escapes."""
+    at = node.position
+    start = at.column - 1 + (0 if node.plain else 1)
+    if not at.source.startswith(text, start):
+        return at
+    return replace(at, column=start + offset + 1, length=len(part))
+
+
+def is_empty(node: Node) -> bool:
+    """Whether nothing is written there."""
+    return isinstance(node, Scalar) and node.value is None
+
+
+def within(text: Text, part: str) -> Position:
+    """Where a part of a text stands; all of it if that cannot be seen in the file."""
+    at = text.position
+    start = at.source.find(part, at.column - 1)
+    return at if start < 0 else replace(at, column=start + 1, length=len(part))
+
+
+def split(text: str, sign: str) -> list[tuple[int, int]]:
+    """Where the parts begin and end that ``sign`` divides, inside of brackets left aside."""
+    parts, depth, start = [], 0, 0
+    for found in _divider(sign).finditer(text):
+        if found[0] in ("[", "{", "("):
+            depth += 1
+        elif found[0] in ("]", "}", ")"):
+            depth -= 1
+        elif depth == 0:
+            parts.append((start, found.start()))
+            start = found.start() + len(sign)
+    parts.append((start, len(text)))
+    return parts
+
+
+@lru_cache(maxsize=16)
+def _divider(sign: str) -> re.Pattern[str]:
+    return re.compile(rf"[\[{{(\]}})]|(?={re.escape(sign)})")

@@ -1,0 +1,474 @@
+"""Actors that compute, against NumPy, the statistics module and plain arithmetic."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import operator
+import re
+import statistics
+import sys
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from epicycle.actors import Function, ParameterError
+from epicycle.actors.expression import Formula
+from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.text import ModelError
+from tests.actors.feeding import feed, load, model_of, tokens
+
+
+def seconds(*values: Any) -> list[tuple[float, Any]]:
+    """One token a second, the first at 1 s."""
+    return [(float(time), value) for time, value in enumerate(values, 1)]
+
+
+# -- Expression -----------------------------------------------------------------------------------------------------
+
+
+def test_names_of_an_expression_are_its_ports_and_hold_their_tokens() -> None:
+    it, sent, _ = feed(
+        {"type": "Expression", "expression": "b - 10 * a + time"},
+        {"a": [(1.0, 1), (3.0, 2)], "b": [(2.0, 5), (3.0, 6)]},
+    )
+    assert list(it.inputs) == ["b", "a"]
+    # At 1 s b is not there yet, at 2 s a holds, at 3 s both come at the same tag.
+    assert sent["output"] == [(2.0, 5 - 10 + 2.0), (3.0, 6 - 20 + 3.0)]
+
+
+def test_without_hold_all_inputs_are_needed_at_the_same_tag() -> None:
+    _, sent, _ = feed(
+        {"type": "Expression", "expression": "a + b", "hold": False},
+        {"a": [(1.0, 1), (3.0, 2)], "b": [(2.0, 5), (3.0, 6)]},
+    )
+    assert sent["output"] == [(3.0, 8)]
+
+
+def test_tokens_of_one_tag_are_taken_in_rounds() -> None:
+    _, sent, _ = feed(
+        {"type": "Expression", "expression": "10 * a + b"}, {"a": [(1.0, 1), (1.0, 2), (1.0, 3)], "b": [(1.0, 4)]}
+    )
+    assert sent["output"] == [(1.0, 14), (1.0, 24), (1.0, 34)]
+
+
+@pytest.mark.parametrize(
+    ("expression", "gives", "token", "value"),
+    [
+        ("x > 10", None, 11, True),
+        ("not (x > 10)", None, 11, False),
+        ("x > 1 and x < 5", None, 3, True),
+        ("x if x > 0 else -x", None, -3, 3),
+        ("x['position'][1]", None, {"position": [1.0, 2.0]}, 2.0),
+        ("sum(x) / len(x)", None, [1, 2, 6], 3.0),
+        ("'n' + str(x)", "text", 3, "n3"),
+        ("[x, 2 * x]", "any value", 3, [3, 6]),
+        ("hypot(x, 4) * pi / e", None, 3, 5 * math.pi / math.e),
+    ],
+)
+def test_expressions(expression: str, gives: str | None, token: Any, value: Any) -> None:
+    _, sent, _ = feed({"type": "Expression", "expression": expression, "gives": gives}, {"x": [(1.0, token)]})
+    assert tokens(sent) == [value]
+    assert type(tokens(sent)[0]) is type(value)
+
+
+def test_an_expression_without_names_has_nothing_to_wait_for() -> None:
+    model = model_of({"type": "Expression", "expression": 7}, {})
+    assert Formula("7").names == ()
+    assert model.graph.actors["it"].inputs == {}
+    assert [each.message for each in model.warnings] == ["it can never fire: it is no source, and nothing feeds it"]
+
+
+@pytest.mark.parametrize(
+    ("expression", "token", "message"),
+    [
+        ("1 / x", 0, "it failed in fire() at (1 s, 1): '1 / x': 1 / x divides by zero, with x = 0"),
+        (
+            "[x]",
+            1,
+            "it failed in fire() at (1 s, 1): '[x]' gives [1], which is not a number: say so with 'gives'",
+        ),
+        (
+            "x",
+            True,
+            "it failed in fire() at (1 s, 1): 'x' gives True, which is not a number: say so with 'gives'",
+        ),
+        (
+            "sqrt(x)",
+            -1,
+            "it failed in fire() at (1 s, 1): 'sqrt(x)': sqrt(x): sqrt is not defined for -1, with x = -1",
+        ),
+    ],
+)
+def test_an_expression_that_fails_tells_its_values(expression: str, token: Any, message: str) -> None:
+    with pytest.raises(ActorError) as caught:
+        feed({"type": "Expression", "expression": expression}, {"x": [(1.0, token)]})
+    assert str(caught.value).partition("\n")[0] == message
+
+
+@pytest.mark.parametrize(
+    ("expression", "message"),
+    [
+        ("x +", "it.expression: 'x +' is not an expression: this is not an expression: invalid syntax"),
+        ("open('x')", None),
+        ("x.real", None),
+        ("max + x", "it.expression: 'max + x' is not an expression: 'max' is a function: write max(...)"),
+        ([1], "it.expression: [1] is not an expression"),
+        ("output + 1", "it: there would be two ports called 'output'"),
+    ],
+)
+def test_a_bad_expression_is_refused_at_load(expression: Any, message: str | None) -> None:
+    with pytest.raises(ModelError) as caught:
+        model_of({"type": "Expression", "expression": expression}, {})
+    assert len(caught.value.problems) == 1
+    if message is not None:
+        assert caught.value.problems[0].message == message
+
+
+def test_a_wrong_port_of_an_expression_is_told_with_the_right_ones() -> None:
+    with pytest.raises(ModelError) as caught:
+        load(
+            "model: m\n"
+            "actors:\n"
+            "  clock: {type: Clock, period: 1 s}\n"
+            "  area: {type: Expression, expression: width * height}\n"
+            "connections:\n"
+            "  - clock.output -> area.widht\n"
+        )
+    first = caught.value.problems[0]
+    assert first.message == "area: Expression has no input port 'widht', did you mean 'width'?"
+    assert first.help == ("valid input ports: width, height",)
+
+
+def test_instances_may_differ_in_their_ports() -> None:
+    text = (
+        "model: m\n"
+        "actors:\n"
+        "  clock: {type: Clock, period: 1 s}\n"
+        "  each: {type: Expression, count: 2, expression: \"${['x', 'y'][index]} + 1\"}\n"
+        "connections:\n"
+    )
+    load(text + "  - clock.output -> each[0].x, each[1].y\n")
+    with pytest.raises(ModelError) as caught:
+        load(text + "  - clock.output -> each[*].x\n")
+    assert [problem.message for problem in caught.value.problems] == [
+        "Expression has no input port each[1].x, but others of its array have"
+    ]
+
+
+def test_an_expression_that_cannot_be_made_makes_no_problems_downstream() -> None:
+    with pytest.raises(ModelError) as caught:
+        load(
+            "model: m\n"
+            "actors:\n"
+            "  clock: {type: Clock, period: 1 s}\n"
+            "  bad: {type: Expression, expression: x +}\n"
+            "  sink: {type: Recorder}\n"
+            "connections:\n"
+            "  - clock.output -> bad.x\n"
+            "  - bad.output -> sink.input\n"
+            "run: {record: bad.output}\n"
+        )
+    assert [problem.message for problem in caught.value.problems] == [
+        "bad.expression: 'x +' is not an expression: this is not an expression: invalid syntax"
+    ]
+
+
+# -- Function -------------------------------------------------------------------------------------------------------
+
+
+def magnitude(x: float, y: float, scale: float = 1.0) -> float:
+    return scale * math.hypot(x, y)
+
+
+def only_even(n, /):  # type: ignore[no-untyped-def]
+    return n if n % 2 == 0 else None
+
+
+def any_number(*values: float) -> float:
+    return sum(values)
+
+
+def test_parameters_of_a_function_are_its_ports() -> None:
+    knowing = Function.knowing(magnitude, only_even)
+    it, sent, _ = feed(
+        {"type": "Function", "function": "magnitude"}, {"x": [(1.0, 3.0)], "y": [(2.0, 4.0)]}, types=[knowing]
+    )
+    assert sent["output"] == [(2.0, 5.0)]
+    assert {name: (port.type, port.required) for name, port in it.inputs.items()} == {
+        "x": (float, True),
+        "y": (float, True),
+        "scale": (float, False),
+    }
+    assert it.outputs["output"].type is float
+    _, sent, _ = feed({"type": "Function", "function": "only_even"}, {"n": seconds(1, 2, 3, 4)}, types=[knowing])
+    assert sent["output"] == [(2.0, 2), (4.0, 4)]
+
+
+def test_a_model_calls_only_functions_that_are_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    point = metadata.EntryPoint("hypotenuse", "math:dist", "epicycle.functions")
+    monkeypatch.setattr(
+        "epicycle.actors.functions.entry_points",
+        lambda group: metadata.EntryPoints([point] if group == "epicycle.functions" else []),
+    )
+    for name in ("hypotenuse", "math:dist"):
+        _, sent, _ = feed({"type": "Function", "function": name}, {"p": [(1.0, [0, 0])], "q": [(1.0, [3, 4])]})
+        assert tokens(sent) == [5.0]
+    with pytest.raises(ModelError) as caught:
+        model_of({"type": "Function", "function": "os:system"}, {}, [Function.knowing(magnitude)])
+    (problem,) = caught.value.problems
+    known = ", ".join(sorted(["hypotenuse", "magnitude", f"{__name__}:magnitude"]))
+    assert problem.message == (
+        "it.function: 'os:system' is not a function that models may call; they may call "
+        f"{known}; a package offers its functions as entry points of the group "
+        "'epicycle.functions', Python gives them with load_model(types=[Function.knowing(f)])"
+    )
+    with pytest.raises(ModelError) as caught:
+        model_of({"type": "Function", "function": "any_number"}, {}, [Function.knowing(any_number)])
+    assert caught.value.problems[0].message == (
+        "it: function: any_number takes any number of arguments (values), which gives no ports"
+    )
+
+
+# -- arithmetic and logic -------------------------------------------------------------------------------------------
+
+NUMBERS = st.lists(st.integers(-50, 50), min_size=1, max_size=6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(plus=st.lists(NUMBERS, min_size=1, max_size=3), minus=st.lists(NUMBERS, min_size=1, max_size=3))
+def test_add_subtract_works_in_rounds(plus: list[list[int]], minus: list[list[int]]) -> None:
+    _, sent, _ = feed(
+        {"type": "AddSubtract"},
+        {
+            "plus": [[(1.0, value) for value in each] for each in plus],
+            "minus": [[(1.0, value) for value in each] for each in minus],
+        },
+    )
+    sums = [
+        sum(value or 0 for value in added) - sum(value or 0 for value in taken)
+        for added, taken in itertools.zip_longest(
+            itertools.zip_longest(*plus), itertools.zip_longest(*minus), fillvalue=()
+        )
+    ]
+    assert tokens(sent) == sums
+
+
+def test_multiply_divide_and_scale() -> None:
+    inputs = {"multiply": [seconds(3, 5), seconds(2, 1)], "divide": seconds(4)}
+    _, sent, _ = feed({"type": "MultiplyDivide"}, inputs)
+    assert tokens(sent) == [1.5, 5]
+    with pytest.raises(ActorError, match=r"it failed in fire\(\) at \(1 s, 1\): 3 is to be divided by 0"):
+        feed({"type": "MultiplyDivide"}, {"multiply": seconds(3), "divide": seconds(0)})
+    _, sent, _ = feed({"type": "Scale", "factor": 2, "offset": 1}, {"input": seconds(1, 2, 3), "factor": [(3.0, -1.5)]})
+    assert tokens(sent) == [3, 5, -3.5]
+
+
+@pytest.mark.parametrize(
+    ("function", "oracle"),
+    [
+        ("abs", np.abs), ("negate", np.negative), ("sign", np.sign), ("square", np.square), ("sqrt", np.sqrt),
+        ("exp", np.exp), ("log", np.log), ("log10", np.log10), ("sin", np.sin), ("cos", np.cos), ("tan", np.tan),
+        ("asin", np.arcsin), ("acos", np.arccos), ("atan", np.arctan), ("floor", np.floor), ("ceil", np.ceil),
+        ("round", np.round),
+    ],
+)  # fmt: skip
+def test_math_functions(function: str, oracle: Any) -> None:
+    arguments = [-2.5, -1.0, -0.5, 0.0, 0.25, 0.5, 1.0, 2.5, 1e300]
+    with np.errstate(all="ignore"):
+        expected = [float(oracle(each)) for each in arguments]
+    for argument, value in zip(arguments, expected, strict=True):
+        actor = {"type": "MathFunction", "function": function}
+        if math.isfinite(value):
+            _, sent, _ = feed(actor, {"input": [(1.0, argument)]})
+            assert tokens(sent) == [pytest.approx(value, rel=1e-14)]
+        else:
+            with pytest.raises(ActorError, match=re.escape(f"{function} of {argument!r} is not a real number")):
+                feed(actor, {"input": [(1.0, argument)]})
+
+
+GATES = {
+    "and": all,
+    "or": any,
+    "xor": lambda bits: bool(np.logical_xor.reduce(bits)),
+    "nand": lambda bits: not all(bits),
+    "nor": lambda bits: not any(bits),
+    "xnor": lambda bits: not np.logical_xor.reduce(bits),
+}
+
+
+@pytest.mark.parametrize("function", GATES)
+def test_truth_tables(function: str) -> None:
+    table = list(itertools.product([False, True], repeat=3))
+    channels = [seconds(*(row[channel] for row in table)) for channel in range(3)]
+    _, sent, _ = feed({"type": "LogicGate", "function": function}, {"input": channels})
+    assert tokens(sent) == [GATES[function](row) for row in table]
+
+
+def test_gates_count_what_is_there_or_hold() -> None:
+    channels = [[(1.0, True), (2.0, False)], [(1.0, True), (3.0, True)]]
+    _, sent, _ = feed({"type": "LogicGate", "function": "and"}, {"input": channels})
+    assert tokens(sent) == [True, False, True]
+    _, sent, _ = feed({"type": "LogicGate", "function": "and", "hold": True}, {"input": channels})
+    assert tokens(sent) == [True, False, False]
+    _, sent, _ = feed({"type": "LogicGate", "function": "not"}, {"input": seconds(True, False)})
+    assert tokens(sent) == [False, True]
+
+
+SIGNS = {"==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
+
+
+@pytest.mark.parametrize("comparison", SIGNS)
+def test_comparisons(comparison: str) -> None:
+    pairs = list(itertools.product([1, 2.0, 3], repeat=2))
+    inputs = {"left": seconds(*(left for left, _ in pairs)), "right": seconds(*(right for _, right in pairs))}
+    _, sent, _ = feed({"type": "Comparator", "comparison": comparison}, inputs)
+    assert tokens(sent) == [SIGNS[comparison](*pair) for pair in pairs]
+    _, sent, _ = feed({"type": "Comparator", "comparison": comparison, "value": 2}, {"left": inputs["left"]})
+    assert tokens(sent) == [SIGNS[comparison](left, 2) for left, _ in pairs]
+    about_2 = {"type": "Comparator", "comparison": comparison, "value": 2, "tolerance": 0.5}
+    _, sent, _ = feed(about_2, {"left": seconds(1.5, 2.4, 2.6)})
+    near = {"==": [True, True, False], "!=": [False, False, True], "<": [True, True, False],
+            "<=": [True, True, False], ">": [False, True, True], ">=": [True, True, True]}  # fmt: skip
+    assert tokens(sent) == near[comparison]
+
+
+# -- tables and statistics ------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.tuples(st.integers(-30, 30), st.floats(-5, 5)), min_size=1, max_size=6, unique_by=lambda pair: pair[0]),
+    st.lists(st.floats(-40, 40), min_size=1, max_size=8),
+)
+def test_lookup_interpolates_like_numpy(table: list[tuple[int, float]], arguments: list[float]) -> None:
+    table.sort()
+    at, values = [float(x) for x, _ in table], [y for _, y in table]
+    actor = {"type": "LookupTable", "values": values, "at": at, "outside": "nearest"}
+    _, sent, _ = feed(actor, {"input": seconds(*arguments)})
+    assert tokens(sent) == pytest.approx(list(np.interp(arguments, at, values)), abs=1e-12)
+
+
+def test_lookup_by_index_and_beyond_the_ends() -> None:
+    table = {"type": "LookupTable", "values": ["a", "b", "c"]}
+    _, sent, _ = feed({**table, "outside": "nothing"}, {"input": seconds(2, 0, 3, -1, 1)})
+    assert tokens(sent) == ["c", "a", "b"]
+    with pytest.raises(ActorError, match=r"3 lies outside of the table, which goes from 0 to 2"):
+        feed(table, {"input": seconds(3)})
+    with pytest.raises(ActorError, match=r"0.5 is not an index"):
+        feed(table, {"input": seconds(0.5)})
+    for wrong, message in [
+        ({"values": []}, "it: values: the table is empty"),
+        ({"values": [1, 2], "at": [1]}, "it: at: 1 argument for 2 values"),
+        ({"values": [1, 2], "at": [1, 1]}, "it: at: [1.0, 1.0] does not ascend"),
+        ({"values": ["a"], "at": [1]}, "it: values: only numbers can be interpolated"),
+    ]:
+        with pytest.raises(ModelError) as caught:
+            model_of({"type": "LookupTable", **wrong}, {"input": seconds(0)})
+        assert [problem.message for problem in caught.value.problems] == [message]
+
+
+FLOATS = st.floats(allow_nan=False, allow_infinity=False, width=64)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(FLOATS, min_size=1, max_size=30), st.integers(1, 8))
+@example([1.7976931348623155e308, -7.44628877444977e307], 2)
+@example([1.7976931348623151e308, -7.44628877444977e307], 2)
+def test_moving_statistics_are_those_of_the_statistics_module(values: list[float], size: int) -> None:
+    """The sums are exact, whatever has passed through the window; the module's are, too."""
+    _, sent, _ = feed({"type": "MovingStatistics", "size": size}, {"input": seconds(*values)})
+    windows = [values[max(0, k + 1 - size) : k + 1] for k in range(len(values))]
+    assert tokens(sent, "mean") == [statistics.mean(window) for window in windows]
+    assert tokens(sent, "min") == [min(window) for window in windows]
+    assert tokens(sent, "max") == [max(window) for window in windows]
+    assert tokens(sent, "number") == [len(window) for window in windows]
+    deviations = [math.sqrt(2) * abs(w[0] / 2 - w[1] / 2) if len(w) == 2 else None for w in windows if len(w) > 1]
+    for found, two in zip(tokens(sent, "std"), deviations, strict=True):
+        if two is not None:  # where it is next to the largest float, one of them may be infinite and the other not
+            largest = sys.float_info.max
+            assert min(found, largest) == pytest.approx(min(two, largest), rel=1e-12, abs=1e-320)
+    _, sent, _ = feed({"type": "MovingAverage", "size": size}, {"input": seconds(*values)})
+    assert tokens(sent) == [statistics.mean(window) for window in windows]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=20), st.integers(2, 8))
+def test_moving_deviation(values: list[float], size: int) -> None:
+    # An offset that is large beside the spread ruins a running sum of squares in floats.
+    values = [1e9 + value for value in values]
+    _, sent, _ = feed({"type": "MovingStatistics", "size": size}, {"input": seconds(*values)})
+    windows = [values[max(0, k + 1 - size) : k + 1] for k in range(1, len(values))]
+    assert tokens(sent, "std") == [pytest.approx(statistics.stdev(window), rel=1e-14) for window in windows]
+
+
+def load_and_run_nan() -> None:
+    """A nan cannot be written in JSON, in YAML it can."""
+    model = load(
+        "model: m\n"
+        "actors:\n"
+        "  source: {type: SingleEvent, value: .nan}\n"
+        "  it: {type: MovingAverage, size: 2}\n"
+        "connections: [source.output -> it.input]\n"
+    )
+    Simulation(model).run()
+
+
+def test_statistics_over_a_time_window() -> None:
+    events = [(0.0, 1.0), (1.0, 2.0), (2.5, 4.0), (2.6, 8.0), (10.0, 16.0)]
+    _, sent, _ = feed({"type": "MovingAverage", "span": "1.5 s"}, {"input": events})
+    assert tokens(sent) == [1.0, 1.5, 3.0, 6.0, 16.0]
+    _, sent, _ = feed({"type": "MovingAverage", "span": "1.5 s", "size": 1}, {"input": events})
+    assert tokens(sent) == [1.0, 2.0, 4.0, 8.0, 16.0]
+    with pytest.raises(ModelError, match="give the window: 'size', a number of tokens, or 'span', a time, or both"):
+        model_of({"type": "MovingAverage"}, {"input": events})
+    with pytest.raises(ActorError, match="nan has no place in a statistic"):
+        load_and_run_nan()
+
+
+# -- accumulation ---------------------------------------------------------------------------------------------------
+
+SIGNAL = st.lists(st.tuples(st.integers(0, 3000), st.floats(-9, 9)), min_size=1, max_size=12, unique_by=lambda e: e[0])
+
+
+@settings(max_examples=30, deadline=None)
+@given(SIGNAL)
+def test_integrals_are_those_of_numpy(signal: list[tuple[int, float]]) -> None:
+    signal.sort()
+    times, values = np.array([t / 1000 for t, _ in signal]), np.array([x for _, x in signal])
+    events = list(zip(times.tolist(), values.tolist(), strict=True))
+    for method, areas in (
+        ("hold", np.diff(times) * values[:-1]),
+        ("trapezoid", np.diff(times) * (values[:-1] + values[1:]) / 2),
+    ):
+        actor = {"type": "Integrator", "method": method, "initial": 1.0}
+        _, sent, _ = feed(actor, {"input": events, "trigger": [(5.0, 0)]})
+        expected = [1.0, *(1.0 + np.cumsum(areas))]
+        assert tokens(sent) == pytest.approx([*expected, expected[-1] + (5.0 - times[-1]) * values[-1]], abs=1e-9)
+
+
+def test_sums_counts_and_differences() -> None:
+    _, sent, _ = feed(
+        {"type": "Accumulator", "initial": 10},
+        {"input": [seconds(1, 2, 3, 4), seconds(1, 1)], "reset": [(3.0, 0), (9.0, 0)]},
+    )
+    assert sent["output"] == [(1.0, 12), (2.0, 15), (3.0, 13), (4.0, 17), (9.0, 10)]
+    _, sent, _ = feed(
+        {"type": "Counter", "initial": 5},
+        {"increment": [seconds("a", "b"), [(1.0, "c")]], "decrement": [(2.0, 0), (2.0, 0)], "reset": [(3.0, 0)]},
+    )
+    assert sent["output"] == [(1.0, 7), (2.0, 6), (3.0, 5)]
+    _, sent, _ = feed({"type": "Difference"}, {"input": seconds(3, 5, 4)})
+    assert sent["output"] == [(2.0, 2), (3.0, -1)]
+    _, sent, _ = feed({"type": "Difference", "initial": 1}, {"input": seconds(3, 5, 4)})
+    assert tokens(sent) == [2, 2, -1]
+
+
+def test_a_function_from_python_needs_no_name() -> None:
+    assert Function("f", function=math.sqrt).function is math.sqrt
+    with pytest.raises(ParameterError, match="'math:sqrt' is not a function that models may call"):
+        Function("f", function="math:sqrt")

@@ -1,0 +1,415 @@
+"""The ODE actor against closed forms and SciPy's solve_ivp."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.integrate
+
+from epicycle.actors.expression import Formula, evaluate
+from epicycle.actors.integration import STEPPERS
+from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.text import ModelError
+from tests.actors.feeding import feed, load, model_of, tokens
+
+GRAVITY = 9.81
+BALL: dict[str, Any] = {
+    "type": "ODE",
+    "initial": {"height": 10, "speed": 0},
+    "derivatives": {"height": "speed", "speed": -GRAVITY},
+    "crossings": {"bounce": "height"},
+    "directions": {"bounce": "falling"},
+    "resets": {"bounce": {"height": 0, "speed": "-0.8 * speed"}},
+}
+
+
+def bounce_times(count: int, height: float = 10.0, keep: float = 0.8) -> list[float]:
+    """When a ball bounces that falls from a height: after the first, each flight lasts 2 v e^k / g."""
+    speed = math.sqrt(2 * GRAVITY * height)
+    flights = [2 * speed * keep**k / GRAVITY for k in range(1, count)]
+    return (speed / GRAVITY + np.concatenate([[0.0], np.cumsum(flights)])).tolist()  # type: ignore[no-any-return]
+
+
+def ticks(period: float, until: float) -> list[tuple[float, int]]:
+    return [(round(k * period, 9), k) for k in range(round(until / period) + 1)]
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau", "BDF"])
+def test_a_ball_bounces_when_it_should(method: str) -> None:
+    # The implicit solvers are made for stiff systems, not for nine digits.
+    tolerance = {"DOP853": 1e-9, "RK45": 2e-9, "Radau": 2e-6, "BDF": 2e-5}[method]
+    _, sent, _ = feed({**BALL, "method": method}, {}, until=12.5)
+    times = [time for time, _ in sent["bounce"]]
+    expected = bounce_times(len(times))
+    assert len(times) >= 16
+    assert times == pytest.approx(expected, abs=tolerance)
+    assert tokens(sent, "bounce") == list(range(len(times)))
+    speeds = [math.sqrt(2 * GRAVITY * 10) * 0.8**k for k in range(1, len(times) + 1)]
+    assert tokens(sent, "speed") == pytest.approx(speeds, abs=100 * tolerance)
+    assert tokens(sent, "height") == [0.0] * len(times)
+
+
+def test_a_ball_that_is_not_set_on_the_ground_bounces_as_well() -> None:
+    """Without the reset of the height, rounding leaves it a hair above or below the ground."""
+    _, sent, _ = feed({**BALL, "resets": {"bounce": {"speed": "-0.8 * speed"}}}, {}, until=12.5)
+    times = [time for time, _ in sent["bounce"]]
+    assert times == pytest.approx(bounce_times(len(times)), abs=2e-9)
+
+
+def test_a_ball_that_comes_to_rest_is_told_of() -> None:
+    with pytest.raises(ActorError) as caught:
+        feed(BALL, {}, until=20.0)
+    message = str(caught.value).partition("\n")[0]
+    assert message.startswith("it failed in fire() at (12.8")
+    assert message.endswith(
+        "which is less than min_interval, 1e-06 s: it may go on so without end (Zeno); "
+        "stop before, for example when 'bounce' has come often enough"
+    )
+
+
+def test_looking_does_not_change_what_is_seen() -> None:
+    _, alone, _ = feed(BALL, {}, until=9.0)
+    _, watched, _ = feed(BALL, {"trigger": ticks(0.05, 9.0)}, until=9.0)
+    assert watched["bounce"] == alone["bounce"]
+    seen = dict(watched["speed"])
+    assert [seen[time] for time, _ in alone["bounce"]] == tokens(alone, "speed")
+
+
+def test_states_are_those_of_solve_ivp() -> None:
+    mu = 3.0
+    actor = {
+        "type": "ODE",
+        "initial": {"x": 1, "v": 0},
+        "derivatives": {"x": "v", "v": f"{mu} * (1 - x ** 2) * v - x + 0.1 * sin(time)"},
+    }
+    _, sent, _ = feed(actor, {"trigger": ticks(0.5, 10.0)})
+    times = np.arange(21) * 0.5
+    solution = scipy.integrate.solve_ivp(
+        lambda t, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0] + 0.1 * math.sin(t)],
+        (0, 10), [1.0, 0.0], "Radau", times, rtol=1e-10, atol=1e-12,
+    )  # fmt: skip
+    assert [time for time, _ in sent["x"]] == times.tolist()
+    assert tokens(sent, "x") == pytest.approx(solution.y[0].tolist(), abs=2e-7)
+    assert tokens(sent, "v") == pytest.approx(solution.y[1].tolist(), abs=2e-6)
+
+
+def test_inputs_are_held_and_bend_the_solution_from_then_on() -> None:
+    """x' = u - x between steps of u: an exponential towards each u."""
+    actor = {"type": "ODE", "initial": {"x": 1}, "derivatives": {"x": "u - x"}, "held": {"u": 2}}
+    steps = [(1.0, 5), (2.5, -1), (2.5, 0.5)]
+    looks = ticks(0.25, 4.0)
+    _, sent, _ = feed(actor, {"u": steps, "trigger": looks})
+    expected, x, u, before = [], 1.0, 2.0, 0.0
+    for now in [time for time, _ in looks]:
+        x, before = u + (x - u) * math.exp(before - now), now
+        expected.append(x)
+        u = {1.0: 5.0, 2.5: 0.5}.get(now, u)
+    assert tokens(sent, "x") == pytest.approx(expected, abs=1e-9)
+
+
+def test_an_input_overtakes_a_crossing_that_was_in_sight() -> None:
+    actor = {
+        "type": "ODE",
+        "initial": {"x": 0},
+        "derivatives": {"x": "u"},
+        "crossings": {"full": "x - 1"},
+        "held": {"u": 1},
+        "max_step": 10,
+    }
+    assert [time for time, _ in feed(actor, {"u": []})[1]["full"]] == [1.0]
+    _, sent, _ = feed(actor, {"u": [(0.5, 0.1), (2.5, -1.0), (3.0, 1.0)]})
+    # 0.5 at 0.5 s, 0.7 at 2.5 s, 0.2 at 3 s, 1 at 3.8 s.
+    assert [time for time, _ in sent["full"]] == [pytest.approx(3.8, abs=1e-9)]
+
+
+def test_crossings_by_direction() -> None:
+    circle = {"type": "ODE", "initial": {"x": 1, "y": 0}, "derivatives": {"x": "-y", "y": "x"}}
+    names = {"up": "rising", "down": "falling", "any": "both"}
+    _, sent, _ = feed({**circle, "crossings": dict.fromkeys(names, "y"), "directions": names}, {}, until=20.0)
+    # y = sin(t) starts at zero, which is no crossing.
+    zeros = [k * math.pi for k in range(1, 7)]
+    assert [time for time, _ in sent["any"]] == pytest.approx(zeros, abs=1e-8)
+    assert [time for time, _ in sent["down"]] == pytest.approx(zeros[::2], abs=1e-8)
+    assert [time for time, _ in sent["up"]] == pytest.approx(zeros[1::2], abs=1e-8)
+
+
+def test_a_thermostat_switches_by_resetting_a_state() -> None:
+    """x' = -x + 2 * on: up to 1.2, down to 0.8; each way takes ln(1.2 / 0.8)."""
+    actor = {
+        "type": "ODE",
+        "initial": {"x": 1, "on": 1},
+        "derivatives": {"x": "2 * on - x", "on": 0},
+        "crossings": {"hot": "x - 1.2", "cold": "x - 0.8"},
+        "directions": {"hot": "rising", "cold": "falling"},
+        "resets": {"hot": {"on": 0}, "cold": {"on": 1}},
+    }
+    _, sent, _ = feed(actor, {}, until=10.0)
+    times = sorted(time for name in ("hot", "cold") for time, _ in sent[name])
+    assert times[0] == pytest.approx(math.log(1 / 0.8), abs=1e-8)
+    assert [b - a for a, b in pairwise(times)] == pytest.approx([math.log(1.5)] * (len(times) - 1), abs=1e-8)
+    assert len(times) == 1 + int((10.0 - times[0]) / math.log(1.5))
+
+
+def test_a_jump_crosses_one_microstep_later() -> None:
+    actor = {
+        "type": "ODE",
+        "initial": {"x": 0},
+        "derivatives": {"x": 0},
+        "crossings": {"over": "u - 1"},
+        "directions": {"over": "rising"},
+        "resets": {"over": {"x": "x + u"}},
+    }
+    _, sent, results = feed(actor, {"u": [(1.0, 2.5), (2.0, 3.0), (3.0, 0.0), (4.0, 7.0)]})
+    assert sent["over"] == [(1.0, 0), (4.0, 1)]
+    assert sent["x"] == [(1.0, 2.5), (4.0, 9.5)]
+    assert {r.tag.microstep for r in results.log.records if r.actor == "it"} == {2}
+
+
+def test_equal_crossings_come_together() -> None:
+    actor = {
+        **BALL,
+        "crossings": {"bounce": "height", "also": "2 * height"},
+        "directions": {"bounce": "falling", "also": "falling"},
+    }
+    _, sent, _ = feed(actor, {}, until=8.0)
+    assert sent["also"] == sent["bounce"] != []
+
+
+def test_an_integrate_and_fire_neuron_spikes_at_its_rate() -> None:
+    """x' = i - x with a threshold at 1 and a reset to 0 spikes every ln(i / (i - 1))."""
+    actor = {
+        "type": "ODE",
+        "initial": {"x": 0},
+        "derivatives": {"x": "1.5 - x"},
+        "crossings": {"spike": "x - 1"},
+        "directions": {"spike": "rising"},
+        "resets": {"spike": {"x": 0}},
+    }
+    _, sent, _ = feed(actor, {}, until=30.0)
+    period = math.log(3)
+    expected = [k * period for k in range(1, int(30 / period) + 1)]
+    assert [time for time, _ in sent["spike"]] == pytest.approx(expected, abs=1e-8)
+
+
+def test_a_loop_through_the_states_needs_no_delay() -> None:
+    """A controller u = -x, sampled: x[k+1] = x[k] - h x[k]."""
+    model = (
+        "model: m\n"
+        "actors:\n"
+        "  clock: {type: Clock, period: 100 ms}\n"
+        "  plant: {type: ODE, initial: {x: 1}, derivatives: {x: u}}\n"
+        "  control: {type: Scale, factor: -1}\n"
+        "  keep: {type: Recorder}\n"
+        "connections:\n"
+        "  - clock.output -> plant.trigger\n"
+        "  - plant.x -> control.input, keep.input\n"
+        "  - control.output -> plant.u\n"
+    )
+    simulation = Simulation(load(model))
+    simulation.run(until=2.0)
+    assert simulation["keep"].tokens == pytest.approx([0.9**k for k in range(21)], abs=1e-9)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"initial": {}}, "it: initial: there is no state"),
+        ({"initial": [1]}, "it.initial: [1] is not a mapping of names to number"),
+        ({"initial": {"height": "x", "speed": 0}}, "it.initial: height: 'x' is not a number"),
+        ({"derivatives": {"height": "speed"}}, "it: derivatives: 'speed' is missing"),
+        (
+            {"derivatives": {"height": "speed", "sped": 1}},
+            "it: derivatives: there is no state 'sped', did you mean 'speed'?; states: height, speed",
+        ),
+        (
+            {"derivatives": {"height": "speed +", "speed": 1}},
+            "it.derivatives: height: 'speed +' is not an expression: this is not an expression: invalid syntax",
+        ),
+        (
+            {"directions": {"bounce": "down"}},
+            "it.directions: bounce: 'down' is not one of rising, falling, both",
+        ),
+        (
+            {"resets": {"bounze": {}}},
+            "it: resets: there is no crossing 'bounze', did you mean 'bounce'?; crossings: bounce",
+        ),
+        (
+            {"resets": {"bounce": {"sped": 0}}},
+            "it: resets: bounce: there is no state 'sped', did you mean 'speed'?; states: height, speed",
+        ),
+        ({"held": {"u": 1}}, "it: held: there is no input 'u'; inputs: none"),
+        (
+            {"crossings": {"height": "speed"}, "directions": {}, "resets": {}},
+            "it: crossings: 'height' is the name of a state, too",
+        ),
+        (
+            {"derivatives": {"height": "bounce", "speed": 1}},
+            "it: 'bounce' asks for 'bounce', which is a crossing and has no value",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told_at_load(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        model_of({**BALL, **change}, {})
+    assert [problem.message for problem in caught.value.problems] == [message]
+
+
+TOO_SMALL = "Required step size is less than spacing between numbers."
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45"])
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        ("1 / (x - 1)", "derivative of x: '1 / (x - 1)': 1 / (x - 1) divides by zero, with x = 1.0"),
+        ("x > 0", "derivative of x: 'x > 0' gives True, which is not a number"),
+        ("x ** 2", f"the solution cannot be continued beyond 1 s from here: {TOO_SMALL}"),
+        ("x * 1e300", f"the solution cannot be continued beyond 0 s from here: {TOO_SMALL}"),
+        ("inf * x", "derivative of x: 'inf * x': inf * x: the result is not a number (NaN), with x = nan"),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_what_goes_wrong_on_the_way(rate: str, message: str, method: str) -> None:
+    actor = {"type": "ODE", "initial": {"x": 1}, "derivatives": {"x": rate}, "method": method}
+    with pytest.raises(ActorError) as caught:
+        feed(actor, {"trigger": [(5.0, 0)]})
+    where = "fire() at (5 s, 1)" if "beyond" in message else "initialize() at (0 s, 1)"
+    assert str(caught.value).partition("\n")[0] == f"it failed in {where}: {message}"
+
+
+def test_a_crossing_that_fails_is_told_of() -> None:
+    actor = {"type": "ODE", "initial": {"x": 1}, "derivatives": {"x": -1}, "crossings": {"c": "sqrt(x - 0.5) + 1"}}
+    with pytest.raises(ActorError) as caught:
+        feed(actor, {})
+    message = str(caught.value).partition("\n")[0]
+    assert message.startswith("it failed in fire() at (")
+    assert "crossing c: 'sqrt(x - 0.5) + 1': sqrt(x - 0.5): sqrt is not defined for -" in message
+
+
+# -- what a step may jump over ---------------------------------------------------------------------------------------
+
+CLOCK: dict[str, Any] = {"type": "ODE", "initial": {"t": 0}, "derivatives": {"t": 1}}
+REST: dict[str, Any] = {"type": "ODE", "initial": {"x": 0}, "derivatives": {"x": 0}}
+
+
+@pytest.mark.parametrize("method", ["DOP853", "BDF", "Radau"])
+@pytest.mark.parametrize(
+    ("actor", "times"),
+    [
+        ({**REST, "crossings": {"c": "1 if 1000 < time < 1000.3 else -1"}}, [1000.0, 1000.3]),
+        ({**CLOCK, "crossings": {"c": "1 if 1000 < t < 1000.3 else -1"}}, [1000.0, 1000.3]),
+        ({**CLOCK, "crossings": {"c": "0.5 - exp(-(8 * (t - 1000)) ** 2)"}}, [999.895930674, 1000.104069326]),
+        ({**CLOCK, "crossings": {"c": "1 / (1 + 50 * (t - 1000) ** 2) - 0.5"}}, [999.858578644, 1000.141421356]),
+        ({**CLOCK, "crossings": {"c": "(t - 1000) ** 2 - 0.04"}}, [999.8, 1000.2]),
+        ({**CLOCK, "crossings": {"c": "t ** 2 - 2000 * t + 999999.96"}}, [999.8, 1000.2]),
+        ({**CLOCK, "crossings": {"c": "abs(t - 1000) - 0.1"}}, [999.9, 1000.1]),
+        ({**REST, "crossings": {"c": "sin(2 * pi * time / 512)"}}, [256.0, 512.0, 768.0, 1024.0]),
+        ({**REST, "crossings": {"c": "[1, -1][int(time / 300) % 2]"}}, [300.0, 600.0, 900.0]),
+        ({**REST, "crossings": {"c": "x - 0.5"}, "derivatives": {"x": "1 if 1000 < time < 1001 else 0"}}, [1000.5]),
+        (
+            {**REST, "crossings": {"c": "x - 0.0625"}, "derivatives": {"x": "max(0, min(time - 1000, 1001 - time))"}},
+            [1000 + 0.125**0.5],
+        ),
+        (
+            {
+                "type": "ODE",
+                "initial": {"t": 0, "x": 0},
+                "derivatives": {"t": 1, "x": "exp(-(t - 1000) ** 2)"},
+                "crossings": {"c": f"x - {math.sqrt(math.pi) / 2}"},
+            },
+            [1000.0],
+        ),
+    ],
+)
+def test_what_is_short_does_not_hide_in_a_long_step(actor: dict[str, Any], times: list[float], method: str) -> None:
+    """Nothing else happens for 1,000 s: without a look at where things may hide, a step would jump over it."""
+    _, sent, _ = feed({**actor, "method": method}, {}, until=1100.0)
+    # What a stiff solver makes of a rate that jumps is not good to nine digits.
+    tolerance = 1e-5 if method in ("BDF", "Radau") and "time" in str(actor["derivatives"]) else 2e-8
+    assert [time for time, _ in sent["c"]] == pytest.approx(times, abs=tolerance)
+
+
+def formulas_evaluated(monkeypatch: pytest.MonkeyPatch, actor: dict[str, Any], until: float) -> int:
+    count = 0
+
+    def counted(formula: Formula, values: Any) -> Any:
+        nonlocal count
+        count += 1
+        return evaluate(formula.source, values)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Formula, "__call__", counted)
+        feed(actor, {"trigger": ticks(until / 100, until)}, until=until)
+    return count
+
+
+@pytest.mark.parametrize("crossings", [{}, {"low": "charge - 100"}])
+@pytest.mark.parametrize(
+    ("rate", "most"),
+    [
+        ("-5 - 1e-5 * charge", 500),
+        ("-5 - 4 * sin(2 * pi * time / 86400)", 500),
+        ("-max(1, min(5, charge / 1000))", 700),
+        ("-5 if charge > 1 else 0", 500),
+    ],
+)
+def test_nobody_pays_for_steps_that_nothing_needs(
+    monkeypatch: pytest.MonkeyPatch, rate: str, most: int, crossings: dict[str, str]
+) -> None:
+    """A battery for two hours, looked at a hundred times; steps of 1 s took 100,000 formulas."""
+    actor = {"type": "ODE", "initial": {"charge": 1e5}, "derivatives": {"charge": rate}, "crossings": crossings}
+    assert formulas_evaluated(monkeypatch, actor, 7200.0) < most
+
+
+def test_a_bound_that_is_given_holds(monkeypatch: pytest.MonkeyPatch) -> None:
+    actor = {"type": "ODE", "initial": {"x": 0}, "derivatives": {"x": 1}, "max_step": 1}
+    assert 12 * 700 < formulas_evaluated(monkeypatch, actor, 700.0) < 13 * 800
+
+
+def test_a_guard_that_is_always_near_zero_is_looked_at_a_minute_ahead_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The step is a million seconds long; the run is not."""
+    actor = {**REST, "crossings": {"c": "0.1 + x - x + sin(1e5 * (time - time))"}}
+    assert formulas_evaluated(monkeypatch, actor, 10.0) < 1500
+
+
+def test_steps_of_a_nanosecond() -> None:
+    actor = {**CLOCK, "max_step": 1e-9, "crossings": {"c": "t - 1.0004e-6"}}
+    _, sent, _ = feed(actor, {"trigger": [(2e-6, 0)]}, until=2e-6)
+    assert sent["c"] == [(1e-6, 0)]
+    assert dict(sent["t"])[2e-6] == pytest.approx(2e-6, rel=1e-12)
+
+
+def test_what_was_seen_ahead_is_forgotten_with_the_solution() -> None:
+    """Left alone, x would be above zero after 1 s; the search knows by 0.5 s, when the input turns it round."""
+    actor = {
+        "type": "ODE",
+        "initial": {"x": -1},
+        "derivatives": {"x": "u"},
+        "crossings": {"up": "x", "down": "x"},
+        "directions": {"up": "rising", "down": "falling"},
+        "held": {"u": 1},
+    }
+    _, sent, _ = feed(actor, {"u": [(0.5, -1.0), (1.0, 1.0), (3.0, -1.0)]}, until=5.0)
+    assert sent["up"] == [(2.0, 0)]
+    assert sent["down"] == [(4.0, 0)]
+
+
+@pytest.mark.parametrize("method", STEPPERS)
+def test_the_solution_does_not_depend_on_when_it_is_looked_at(method: str) -> None:
+    actor = {
+        "type": "ODE",
+        "initial": {"x": 1, "v": 0},
+        "derivatives": {"x": "v", "v": "-x - 0.1 * v + 0.2 * sin(time / 7)"},
+        "crossings": {"zero": "x"},
+        "method": method,
+        "relative_tolerance": 1e-5,
+        "absolute_tolerance": 1e-7,
+    }
+    _, alone, _ = feed(actor, {"trigger": [(30.0, 0)]}, until=30.0)
+    _, watched, _ = feed(actor, {"trigger": ticks(0.3, 30.0)}, until=30.0)
+    assert watched["zero"] == alone["zero"] != []
+    assert watched["v"][-1] == alone["v"][-1]

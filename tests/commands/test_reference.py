@@ -1,0 +1,198 @@
+"""`epicycle actors`, `aspects` and `schema`: what they print, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from epicycle.actors import Actor, InputPort, OutputPort, Parameter, array_parameter
+from epicycle.runner.catalogue import TypeReference, built_in, describe, parts_of
+from epicycle.runner.cli import main
+from epicycle.runner.show import detail
+
+
+class Gate(Actor):
+    """Lets tokens through.  All of them.
+
+    Those of ``input``, that is; an array such as [1] is
+    as good as any.
+    """
+
+    __module__ = "acme.gates"
+
+    input = InputPort(float | str, multi=True, doc="what comes")
+    control = InputPort(Any, required=False, doc="opens it")
+    output = OutputPort(float, depends_on=("input",), doc="what goes")
+    mode = Parameter(str, "open", choices=("open", "shut"), doc="how it begins")
+    delay = Parameter(float, unit="s", min=0.0, doc="how long it takes")
+    corner = array_parameter((2,), (0.5, 1.0), unit="m", max=3.0, doc="where it is")
+
+
+GATE = """\
+Gate  actor, acme
+
+Lets tokens through. All of them.
+
+Those of `input`, that is; an array such as [1] is as good as any.
+
+input port  type                                  what it is
+input       float | str  any number of connections  what comes
+control     any          optional                   opens it
+
+output port  type                            what it is
+output       float  depends at once on input  what goes
+
+parameter  type                    unit  default   what it is
+mode       open or shut                  open      how it begins
+delay      number >= 0             s     required  how long it takes
+corner     list of 2 numbers <= 3  m     [0.5, 1]  where it is
+"""
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """What a command prints."""
+    assert main(arguments) == 0
+    return capsys.readouterr().out
+
+
+def references() -> list[TypeReference]:
+    """All that Epicycle itself declares."""
+    own = built_in()
+    types = [*own.actors.items(), *own.aspects.items()]
+    parts = parts_of([cls for _, cls in types]).values()
+    return [describe(name, cls) for name, cls in (*types, *(each for known in parts for each in known.items()))]
+
+
+@pytest.mark.parametrize("reference", references(), ids=lambda reference: reference.name)
+def test_everything_has_a_doc(reference: TypeReference) -> None:
+    assert reference.doc
+    assert [each.name for each in (*reference.ports, *reference.parameters) if not each.doc] == []
+
+
+@pytest.mark.parametrize("kind", ["actors", "aspects"])
+def test_list_has_a_line_for_each_type(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = printed(capsys, kind)
+    known = getattr(built_in(), kind)
+    listed = [line.split()[0] for line in text.splitlines() if line.startswith("  ") and not line.startswith("   ")]
+    assert sorted(listed) == sorted(known)
+    assert {each["name"] for each in json.loads(printed(capsys, kind, "--json"))} == set(known)
+
+
+def test_one_type_in_words() -> None:
+    console = Console(file=StringIO(), width=120)
+    console.print(detail(describe("Gate", Gate), {}))
+    words = [line.split() for line in console.file.getvalue().splitlines()]  # type: ignore[attr-defined]
+    assert words == [line.split() for line in GATE.splitlines()]
+
+
+def test_one_aspect_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    found = json.loads(printed(capsys, "aspects", "PacketLoss", "--json"))
+    assert (found["name"], found["kind"], found["group"]) == ("PacketLoss", "aspect", "communication")
+    assert (found["stands_at"], found["events"]) == (["input"], ["dropped"])
+    assert found["parameters"][0] == {
+        "name": "probability",
+        "type": "number",
+        "part": "",
+        "unit": "",
+        "required": True,
+        "optional": False,
+        "default": None,
+        "min": 0,
+        "max": 1,
+        "choices": [],
+        "doc": "probability that a message is lost",
+    }
+
+
+def test_parts_are_described_with_the_actor(capsys: pytest.CaptureFixture[str]) -> None:
+    text = printed(capsys, "actors", "RobustController")
+    assert "Inform  objective\n" in text
+    assert "Casadi  solver\n" in text
+    parts = json.loads(printed(capsys, "actors", "RobustController", "--json"))["parts"]
+    assert {base: [each["name"] for each in known] for base, known in parts.items()} == {
+        "Objective": ["Inform", "ReachGoal"],
+        "Solver": ["Barrier", "Casadi"],
+    }
+
+
+def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None:
+    options = (
+        "--set",
+        "observers=0",
+        "--set",
+        "disturbance=0.25",
+        "--aspect",
+        "late=Latency,delay=0.1,at=main.peer_plan",
+    )
+    found = json.loads(printed(capsys, "aspects", "collision_avoidance", *options, "--json"))
+    assert {port: [each[:2] for each in aspects] for port, aspects in found.items()} == {
+        "main.peer_measurement": [["packet_loss", "PacketLoss"]],
+        "main.peer_plan": [["plans_due", "Count"], ["packet_loss", "PacketLoss"], ["late", "Latency"]],
+        "main.controller.peer_plans": [["plans_heard", "Count"]],
+        "main.sensor.measurement": [["measurement_failure", "MeasurementFailure"]],
+    }
+    rows = [line.split() for line in printed(capsys, "aspects", "collision_avoidance", *options).splitlines()]
+    assert [row[:4] for row in rows[2:5]] == [
+        ["main.peer_plan", "1", "plans_due", "Count"],
+        ["2", "packet_loss", "PacketLoss", "probability:"],
+        ["3", "late", "Latency", "delay:"],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ("actors", "Clok"),
+            (
+                "error: there is no actor type 'Clok', did you mean 'Clock'?\n   help: 'epicycle actors' lists them\n"
+                "   help: one of your own is known after '--types FILE.py'\n"
+            ),
+        ),
+        (
+            ("actors", "Throttle"),
+            "error: Throttle is an aspect, not an actor\n   help: 'epicycle aspects Throttle' describes it\n",
+        ),
+        (
+            ("aspects", "Clock"),
+            "error: Clock is an actor, not an aspect\n   help: 'epicycle actors Clock' describes it\n",
+        ),
+        (
+            ("aspects", "PacketLos"),
+            (
+                "error: there is no aspect type or packaged model 'PacketLos', did you mean 'PacketLoss'?\n"
+                "   help: 'epicycle aspects' lists them\n"
+                "   help: one of your own is known after '--types FILE.py'\n"
+            ),
+        ),
+        (
+            ("aspects", "PacketLoss", "--set", "x=1"),
+            "error: --set, --overrides, --disturb, --aspect and --without change a model: name one\n",
+        ),
+        (("aspects", "nowhere/m.yaml"), "error: there is no file nowhere/m.yaml: there is no folder nowhere\n"),
+        (("schema", "-o", "nowhere/s.json"), "error: [Errno 2] No such file or directory: 'nowhere/s.json'\n"),
+    ],
+)
+def test_what_cannot_be_found(arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) != 0
+    assert capsys.readouterr().err == message
+
+
+def test_schema_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "s.json"
+    assert printed(capsys, "schema", "-o", str(file)) == f"wrote {file}\n"
+    assert file.read_text(encoding="utf-8") == printed(capsys, "schema")
+
+
+def test_help_needs_nothing_heavy() -> None:
+    heavy = {"numpy", "rich", "networkx", "yaml", "importlib.metadata"}
+    script = f"import sys, epicycle.runner.cli as c; c.parser(); print({heavy} & {{*sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"

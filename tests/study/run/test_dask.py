@@ -1,0 +1,297 @@
+"""Studies on Dask: a real scheduler and real workers on loopback, which start in folders of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from epicycle.runner.cli import main
+from epicycle.runner.language import read_study
+from epicycle.runner.study import Plan, open_study
+from epicycle.runner.study.run.backlog import Backlog
+from epicycle.runner.study.run.parcel import fitness, pack
+from epicycle.runner.study.run.runner import Runner
+from tests.study.dask_cluster import Cluster, a_cluster, without_epicycle
+from tests.study.study_commands import study
+from tests.study.study_parts import STUDY, THIS, command, write
+
+pytest.importorskip("distributed")
+from epicycle.runner.study.run import cluster as cluster_module
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with a_cluster(tmp_path_factory.mktemp("cluster"), workers=2) as found:
+        yield found
+
+
+def table_of(folder: Path) -> bytes:
+    return (folder / "table.parquet").read_bytes()
+
+
+def without_progress(text: str) -> str:
+    """What was said, without the line a minute that a slow machine may add."""
+    return re.sub(r"^\d\d:\d\d:\d\d walks: .*\n", "", text, flags=re.M)
+
+
+def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Runs that are ok, raise, hang, and end their process, batch by batch until the interval is narrow enough."""
+    text = STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]") + "until: {metric: place, half_width: 2.2, batch: 5}\n"
+    write(tmp_path, text + "set: {fails: [3], hangs: [5], dies: [7]}\n")
+    assert study(tmp_path, "--jobs", 2, "--run-timeout", 1, out="local") == 1
+    said = capsys.readouterr()
+    on_dask = ("--executor", "dask", "--scheduler", cluster.address, "--run-timeout", 1)
+    assert study(tmp_path, *on_dask, out="dask") == 1
+    expected = [without_progress(each).replace(str(tmp_path / "local"), str(tmp_path / "dask")) for each in said]
+    assert [without_progress(each) for each in capsys.readouterr()] == expected
+    assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
+    statuses = Counter(pq.read_table(tmp_path / "dask" / "table.parquet")["status"].to_pylist())
+    assert statuses.keys() == {"ok", "failed", "timeout", "killed"}
+    # Where there is nothing to do, no scheduler is asked.
+    assert main(["resume", str(tmp_path / "dask"), "--executor", "dask", "--scheduler", "127.0.0.1:9"]) == 1
+    assert f"0 new runs, {statuses.total()} there before" in capsys.readouterr().out
+
+
+def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path, STUDY.replace("replications: 5", "replications: 20"))
+    pause = ("--set", "pause=0.1")
+    assert study(tmp_path, *pause, "--jobs", 2, out="local") == 0
+    capsys.readouterr()
+    arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--out", tmp_path / "dask", *pause)
+    with a_cluster(tmp_path / "cluster", workers=2) as cluster:
+        on_dask = ("--executor", "dask", "--scheduler", cluster.address)
+        process = subprocess.Popen(command(*arguments, *on_dask), stderr=subprocess.PIPE, text=True)
+
+        def wait_for(rows: int) -> None:
+            while process.poll() is None and number_of_rows() < rows:
+                time.sleep(0.02)
+
+        def number_of_rows() -> int:
+            return sum(path.read_bytes().count(b"\n") for path in (tmp_path / "dask").glob("journals/*"))
+
+        wait_for(3)
+        cluster.workers[0].kill()
+        wait_for(8)
+        assert process.poll() is None
+        cluster.scheduler.kill()
+        _, said = process.communicate(timeout=60)
+    assert without_progress(said) == (
+        f"error: the scheduler {cluster.address} is gone\n"
+        f"   help: what was finished is kept; 'epicycle resume {tmp_path / 'dask'}' goes on\n"
+    )
+    assert process.returncode == 1
+    kept = len(open_study(tmp_path / "dask").table())
+    assert 8 <= kept < 40
+    assert main(["resume", str(tmp_path / "dask"), "--jobs", "2"]) == 0
+    assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {40 - kept} new runs, {kept} there before\n")
+    assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
+
+
+def test_a_cluster_of_its_own(tmp_path: Path) -> None:
+    """Interrupted in the middle, and resumed."""
+    write(tmp_path)
+    out = tmp_path / "out"
+    arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--set", "pause=0.5", "--out", out, "--jobs", 2)
+    process = subprocess.Popen(
+        command(*arguments, "--executor", "dask"), start_new_session=True, stderr=subprocess.PIPE, text=True
+    )
+    while process.poll() is None and not any(path.stat().st_size for path in out.glob("journals/*")):
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    _, said = process.communicate(timeout=60)
+    assert without_progress(said) == f"interrupted; what was finished is kept: 'epicycle resume {out}' goes on\n"
+    assert process.returncode == 130
+    assert 0 < len(open_study(out).table()) < 10
+
+
+# -- what travels -----------------------------------------------------------------------------------------------------
+
+FILES = {
+    "study/travels.yaml": """
+study: travels
+model: ../model/with_files.yaml
+vary: {recorded.file: [data/first.csv, data/second.csv]}
+disturb: {none: [], lossy: ./lossy.yaml}
+replications: 2
+""",
+    "study/lossy.yaml": """
+disturbance: lossy
+aspects: {lossy: {type: PacketLoss, probability: 0.5, at: filter.input}}
+""",
+    "model/with_files.yaml": """
+model: with_files
+include: parts/filter.yaml
+actors:
+  walk: {type: Stroll}
+  filter: {type: Filter}
+  recorded: {type: Replay, file: data/first.csv}
+  noise: {type: Replay, file: data/first.csv}
+  sum: {type: AddSubtract}
+connections:
+  - walk.output -> filter.input
+  - filter.output -> sum.plus
+  - recorded.output -> sum.plus
+  - noise.output -> sum.plus
+run: {stop: 10 s}
+metrics: {place: {of: sum.output, take: last}}
+""",
+    "model/parts/filter.yaml": """
+composites:
+  Filter:
+    inputs: [input]
+    outputs: [output]
+    actors: {scale: {type: Scale, factor: 3}}
+    connections: [input -> scale.input, scale.output -> output]
+""",
+    "model/data/first.csv": "time,value\n0,1\n5,2\n",
+    "study/data/first.csv": "time,value\n0,3\n5,4\n",
+    "study/data/second.csv": "time,value\n0,10\n5,20\n",
+    "here/noise.csv": "time,value\n9,0.5\n",
+    "types/strolls.py": """
+from steps import STEP
+
+from epicycle.actors import Actor, OutputPort
+
+class Stroll(Actor):
+    is_source = True
+    output = OutputPort(float)
+
+    def initialize(self):
+        self.wake_at(0)
+
+    def fire(self):
+        self.output.send(float(self.random.normal(STEP, 1.0)))
+        self.wake_in(1)
+""",
+    "types/steps.py": "STEP = 0.25\n",
+}
+UNPACKED = """
+import json, sys
+from pathlib import Path
+from epicycle.runner.study.run.runner import Runner
+from epicycle.runner.study.run.parcel import unpack
+from epicycle.runner.study.run.backlog import Backlog
+
+plan = unpack(Path(sys.argv[1]).read_bytes(), Path(sys.argv[2]).resolve())
+backlog, runner = Backlog(plan, {}), Runner(plan)
+print(json.dumps([runner.make(task) | {"wall_time": 0} for task in iter(backlog.next, None)]))
+"""
+
+
+def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Includes, data, disturbances, own types and what these import; from links, and in options, too."""
+    home, link, root = tmp_path / "home", tmp_path / "link", tmp_path / "elsewhere"
+    for name, text in FILES.items():
+        (home / name).parent.mkdir(parents=True, exist_ok=True)
+        (home / name).write_text(text)
+    link.symlink_to(home)
+    data = home / "study" / "data"
+    (data / "first.csv").rename(data / "real.csv")
+    (data / "first.csv").symlink_to("real.csv")
+    monkeypatch.chdir(home / "here")
+    changes = ("noise.file=noise.csv",)
+    plan = Plan.made(read_study("../../link/study/travels.yaml", set=changes, types=[link / "types" / "strolls.py"]))
+    parcel = tmp_path / "parcel"
+    parcel.write_bytes(pack(plan))
+    backlog, runner = Backlog(plan, {}), Runner(plan)
+    rows = [runner.make(task) | {"wall_time": 0} for task in iter(backlog.next, None)]
+    shutil.rmtree(home)
+    done = subprocess.run(
+        [sys.executable, "-X", "faulthandler", "-c", UNPACKED, str(parcel), str(root)],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert not done.returncode, done.stderr
+    found = json.loads(done.stdout)
+    assert [each["error"] for each in found] == [None] * 8
+    assert len({each["digest"] for each in found}) == 8
+    assert found == rows
+
+
+# -- who cannot take part ---------------------------------------------------------------------------------------------
+
+
+def error_of(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """What a study that cannot be run says, whole, without the folder."""
+    try:
+        code = study(folder, "--executor", "dask", *arguments)
+    except SystemExit as error:
+        code = error.code
+    said = capsys.readouterr().err.replace(str(folder), "HERE")
+    return f"{code}: {said[max(said.find('error:'), 0) :]}"
+
+
+def test_what_cannot_be(
+    cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path)
+    assert study(tmp_path, "--scheduler", "localhost:8786") == 2
+    assert capsys.readouterr().err == "error: --scheduler tcp://localhost:8786 is for --executor dask\n"
+    assert error_of(tmp_path, capsys, "--scheduler", "localhost:8786", "--jobs", 2) == (
+        "2: error: --jobs counts processes of this machine; a scheduler has the workers that were started for it\n"
+    )
+    for bad in ("localhost", "tcp://localhost:99999", "tcp://:8786", "inproc://localhost:8786"):
+        expected = f"2: error: argument --scheduler: {bad!r} is not an address such as tcp://localhost:8786\n"
+        assert error_of(tmp_path, capsys, "--scheduler", bad) == expected
+    monkeypatch.setattr(cluster_module, "CONNECT", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as nobody:  # who takes calls and says nothing
+        for port in (9, nobody.getsockname()[1]):
+            assert error_of(tmp_path, capsys, "--scheduler", f"127.0.0.1:{port}") == (
+                f"1: error: no scheduler answers at tcp://127.0.0.1:{port}\n"
+                "   help: 'dask scheduler' starts one, and says its address\n"
+            )
+    monkeypatch.setattr(cluster_module, "CONNECT", 10.0)
+    for name, unlike in (
+        ("numpy", f"numpy {fitness()['numpy']} there, 1.0 here"),
+        ("casadi", f"casadi {fitness()['casadi'] or 'is missing'} there, 1.0 here"),
+        ("code", "the code of Epicycle is not the same"),
+    ):
+        with monkeypatch.context() as context:
+            context.setitem(fitness(), name, "1.0")
+            said = error_of(tmp_path, capsys, "--scheduler", cluster.address)
+        assert re.sub(r"127.0.0.1:[0-9]+", "WORKER", said) == (
+            f"1: error: the Dask worker tcp://WORKER is not like this machine: {unlike}\n"
+            "   help: the same seed is to give the same run, so install the same there\n"
+        )
+    with monkeypatch.context() as context:
+        context.setitem(sys.modules, "distributed", None)
+        assert error_of(tmp_path, capsys) == "2: error: this needs dask: pip install 'epicycle[dask]'\n"
+
+
+@pytest.mark.slow
+def test_workers_that_are_missing_or_have_no_epicycle(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path)
+    monkeypatch.setattr(cluster_module, "PATIENCE", 1.0)
+    with a_cluster(tmp_path / "cluster") as cluster:
+        address = ("--scheduler", cluster.address)
+        assert error_of(tmp_path, capsys, *address) == (
+            f"1: error: the scheduler {cluster.address} has had no workers for 1 s\n"
+            f"   help: 'dask worker {cluster.address}' starts some\n"
+        )
+        monkeypatch.setattr(cluster_module, "PATIENCE", 60.0)
+        cluster.add_worker(**without_epicycle(tmp_path / "without"))
+        expected = (
+            " has no Epicycle like this one: No module named 'epicycle.runner'; 'epicycle' is not a package\n"
+            "   help: install it there, in the version that is here\n"
+        )
+        # While it is just coming, its name is not always known.
+        first, then = (error_of(tmp_path, capsys, *address) for _ in range(2))
+        assert re.sub(r"(a|the) Dask worker( tcp://[0-9.:]+)?", "WORKER", first) == f"1: error: WORKER{expected}"
+        assert re.sub(r"tcp://[0-9.:]+", "ADDRESS", then) == f"1: error: the Dask worker ADDRESS{expected}"

@@ -1,0 +1,134 @@
+"""Sessions of a study: what is made, what was there, and what cannot be gone on with."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from epicycle.runner import open_study
+from epicycle.runner.cli import main
+from epicycle.runner.study import session as session_module
+from epicycle.runner.study.plan import plan as plan_module
+from epicycle.runner.study.run.backlog import Backlog
+from epicycle.runner.study.run.manifest import manifest_text
+from tests.study.study_commands import message, study
+from tests.study.study_parts import MODEL, STUDY, plan_of, write
+
+
+def test_extension_makes_only_what_is_new(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(done, tmp_path, dirs_exist_ok=True)
+    before = open_study(tmp_path / "out").table().to_pylist()
+
+    def said(*arguments: object) -> str:
+        assert study(tmp_path, *arguments) == 0
+        return capsys.readouterr().out.splitlines()[0]
+
+    assert said() == "walks: 2 conditions, 0 new runs, 10 there before"
+    assert said("--replications", 7) == "walks: 2 conditions, 4 new runs, 10 there before"
+    (tmp_path / "walks.yaml").write_text(STUDY.replace("[0 m/s,", "[-1 m/s, 0 m/s,"))
+    assert said() == "walks: 3 conditions, 5 new runs, 10 there before"
+    after = open_study(tmp_path / "out").table().to_pylist()
+    assert [
+        row | {"condition": row["condition"] - 1} for row in after[5:] if row["replication"] < 5
+    ] == before  # fmt: skip
+    # Anything that a run hangs on makes it another one.
+    assert said("--set", "fails=[9]") == "walks: 3 conditions, 15 new runs, 0 there before"
+    (tmp_path / "walk.yaml").write_text(MODEL + "# as it was, but who knows\n")
+    assert said("--replications", 1) == "walks: 3 conditions, 3 new runs, 0 there before"
+
+
+def test_identity_hangs_on_content_and_not_on_place(
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(done, tmp_path / "moved")
+    monkeypatch.chdir(tmp_path)
+    here, there = plan_of(Path("moved/walks.yaml")), plan_of(done / "walks.yaml")
+    keys = [[plan.key(plan.condition(c), r) for c in range(2) for r in range(5)] for plan in (here, there)]
+    assert keys[0] == keys[1]
+    assert set(keys[0]) == {row["run"] for row in open_study(done / "out").table().to_pylist()}
+
+
+def test_another_first_seed_is_that_of_a_study_that_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path)
+    assert study(tmp_path, "--replications", 2, "--seed", 120, out="asked") == 0
+    with pytest.raises(SystemExit):
+        study(tmp_path, "--seed", 2**63)
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"epicycle study: error: argument --seed: '{2**63}' is not a whole number from 0 to {2**63 - 1 - 10**9}"
+    )
+    # The folder knows it, whatever the file says.
+    assert main(["resume", str(tmp_path / "asked")]) == 0
+    assert "0 new runs, 4 there before" in capsys.readouterr().out
+    write(tmp_path, STUDY.replace("seed: 20", "seed: 120"))
+    assert study(tmp_path, "--replications", 2, out="said") == 0
+    tables = [(tmp_path / out / "table.parquet").read_bytes() for out in ("asked", "said")]
+    assert tables[0] == tables[1]
+    assert set(pq.read_table(tmp_path / "asked" / "table.parquet")["seed"].to_pylist()) == {120, 121}
+
+
+def test_resume_wants_the_same_model(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (copied / "walk.yaml").write_text(MODEL + "\n")
+    manifest = json.loads((copied / "out" / "manifest.json").read_text())
+    (copied / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": str(copied / "walks.yaml")}))
+    assert main(["resume", str(copied / "out")]) == 2
+    assert message(capsys, copied) == (
+        "error: the model has changed since out was made: walk.yaml\n"
+        "   help: 'epicycle study walks.yaml --out out' makes the runs of the changed model\n"
+    )
+
+
+def test_results_can_be_read_where_their_model_is_not(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = open_study(copied / "out").means("place")
+    home = copied / "elsewhere"
+    home.mkdir()
+    (copied / "out").rename(home / "out")
+    manifest = json.loads((home / "out" / "manifest.json").read_text())
+    (home / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": "/nowhere/walks.yaml"}))
+    assert open_study(home / "out").means("place") == before
+    assert main(["status", str(home / "out")]) == 0
+    capsys.readouterr()
+    assert main(["resume", str(home / "out")]) == 2
+    assert capsys.readouterr().err == "error: there is no file /nowhere/walk.yaml: there is no folder /nowhere\n"
+
+
+def test_results_of_another_version_are_read_and_not_gone_on_with(
+    copied: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = open_study(copied / "out").table()
+    manifest = json.loads((copied / "out" / "manifest.json").read_text())
+    (copied / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": str(copied / "walks.yaml")}))
+    for module in (plan_module, session_module):
+        monkeypatch.setattr(module, "epicycle_version", lambda: "47.11")
+    assert open_study(copied / "out").table() == before
+    assert main(["resume", str(copied / "out")]) == 2
+    assert message(capsys, copied) == (
+        f"error: out was made with Epicycle {manifest['epicycle']}, and this is Epicycle 47.11\n"
+        "   help: install that one, or make all runs anew: 'epicycle study walks.yaml --out ANOTHER'\n"
+    )
+    assert study(copied) == 0
+    assert capsys.readouterr().out.startswith("walks: 2 conditions, 10 new runs, 0 there before\n")
+
+
+def test_a_thousand_million_runs_are_asked_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = STUDY.replace("[0 m/s, 100 cm/s]", "{from: 0, to: 1, step: 0.000001}").replace("ns: 5", "ns: 1000")
+    write(tmp_path, text)
+    assert study(tmp_path, "--jobs", 2) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(
+        "error: walks has 1,000,001 conditions of 1,000 replications: 1,000,001,000 runs, which take about "
+    )
+    assert said.endswith(" with 2 at a time\n   help: add --yes if that is what you want\n")
+    assert not (tmp_path / "out").exists()
+    plan = plan_of(tmp_path / "walks.yaml")
+    last = plan.condition(1_000_000)
+    assert last.values == {"drift": 1.0}
+    assert plan.find(last.key, {"drift": 1.0}) == 1_000_000
+    assert [plan.find(last.key, {"drift": each}) for each in (0.5, 0.25e-6, 2.0)] == [None] * 3
+    # A backlog takes no memory for what is still to come.
+    backlog = Backlog(plan, {})
+    tasks = [backlog.next() for _ in range(5)]
+    assert [(task.condition, task.replication) for task in tasks if task] == [(0, each) for each in range(5)]

@@ -1,0 +1,35 @@
+"""Patterns against the plainest way to say what they mean."""
+
+from __future__ import annotations
+
+import time
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from epicycle.runner.text import matches
+
+
+def fits(pattern: list[str], path: list[str]) -> bool:
+    """Whether the segments of a pattern select those of a path."""
+    if not pattern:
+        return not path
+    if pattern[0] == "**":
+        return any(fits(pattern[1:], path[taken:]) for taken in range(1, len(path) + 1))
+    return bool(path) and pattern[0] in ("*", path[0]) and fits(pattern[1:], path[1:])
+
+
+@given(
+    st.lists(st.sampled_from(["a", "b", "*", "**", "**"]), min_size=1, max_size=7),
+    st.lists(st.sampled_from("ab"), min_size=1, max_size=8),
+)
+def test_a_pattern_selects_what_its_segments_say(pattern: list[str], path: list[str]) -> None:
+    assert matches(".".join(pattern), ".".join(path)) == fits(pattern, path)
+
+
+def test_no_pattern_takes_for_ever() -> None:
+    started = time.process_time()
+    deep = ".".join("a" * 50)
+    assert not matches(".".join(["**"] * 25 + ["x"]), deep)
+    assert not matches(".".join(["**", "a"] * 12 + ["x"]), deep)
+    assert time.process_time() - started < 1

@@ -1,0 +1,1 @@
+from aspects.execution import *
