@@ -1,5 +1,6 @@
-"""Bits of elementary functions and their tables never change; ``python -m tests.actors.core.test_bits`` prints them.
+"""The bits of the elementary functions and their tables never change.
 
+``python -m tests.actors.core.elementary.test_bits`` prints them.
 How near the values are to the truth is ``test_elementary``'s matter.  Logs and tables of old runs depend on these bits.
 """
 
