@@ -56,7 +56,7 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "aspects/execution/crash.py": (("sum",), WHOLE),
     "runner/engine/statistic.py": (("sum",), WHOLE),
     "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
-    "runner/model/checks.py": (("sum",), WHOLE),
+    "runner/build/checks.py": (("sum",), WHOLE),
     "runner/text/problems.py": (("sum",), WHOLE),
     "runner/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),

@@ -14,7 +14,7 @@ from ..printing import complain, complain_traceback
 if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
 
-    from ..model import Model
+    from ..build import Model
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -136,7 +136,7 @@ def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) ->
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     """The model that the options describe; warnings are printed, or with ``strict`` raised."""
-    from ..model import load_model
+    from ..build import load_model
     from ..text import ModelError
 
     model = load_model(

@@ -20,7 +20,7 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Repeat the run, and compare its digest."""
-    from ..model import figures_of
+    from ..build import figures_of
     from ..results import write_log
     from ..show import check_folder, draw_figures, summary_table, write_folder
     from ..study import again, open_study, plan_of_folder

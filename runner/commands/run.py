@@ -16,7 +16,7 @@ from .options import add_model, add_several, complain_of, load, seconds, seed
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from ..model import Model
+    from ..build import Model
 
 DESCRIPTION = "Run a model once and report what came of it."
 
@@ -78,8 +78,8 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Run the model, report and write what was asked for."""
     from epicycle.actors import EpicycleError
 
+    from ..build import figures_of
     from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
-    from ..model import figures_of
     from ..results import LogFile
     from ..show import FigureError, check_folder, draw_figures, summary_object, summary_table, write_folder
     from ..text import Problems

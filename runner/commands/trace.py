@@ -13,8 +13,9 @@ from .options import DONE, add_model, add_several, load, seconds, seed
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Tag
 
+    from ..build import Model
     from ..engine import Firing
-    from ..model import Model, ModelGraph
+    from ..graph import ModelGraph
 
 DESCRIPTION = "Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."
 WIDEST = 80  # characters of a token

@@ -29,8 +29,9 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..model import Clock, Hop, ModelGraph, WovenAspect, describe
+from ..graph import Clock, Hop, ModelGraph, WovenAspect
 from ..results import EventLog, Signal, Write
+from ..text import describe
 from .aspect_context import EngineContext
 from .director import ActorError, Director, LoopError
 from .execution import Execution

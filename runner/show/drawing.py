@@ -7,9 +7,8 @@ from pathlib import Path
 from epicycle.actors import EpicycleError, readable
 
 from ..catalogue import Figure
-from ..model import describe, raised_at
 from ..results import Results
-from ..text import Position, told_raised
+from ..text import Position, describe, raised_at, told_raised
 from .pen import style
 
 

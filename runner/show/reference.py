@@ -12,6 +12,7 @@ from rich.text import Text
 
 from epicycle.actors import Configurable, bounds_text
 
+from ..build import Model
 from ..catalogue import (
     TAKES,
     Catalogue,
@@ -26,7 +27,6 @@ from ..catalogue import (
     shown,
 )
 from ..language import CONSTRUCTS
-from ..model import Model
 from ..printing import columns
 
 

@@ -9,7 +9,8 @@ from rich.text import Text
 
 from epicycle.actors import shortened, visible
 
-from ..model import Model, extent
+from ..build import Model
+from ..graph import extent
 from ..printing import columns
 from ..results import Results, plain
 from ..shown import finite, in_words

@@ -1,5 +1,6 @@
 """Positioned text: YAML as nodes that know where they stand, problems with places, and limits; it knows no language."""
 
+from .culprit import describe, raised_at
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, plain, read
 from .files import COMMAND_LINE, Noted, data_file, note_package, noting
 from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
@@ -61,6 +62,7 @@ __all__ = [
     "compile_pattern",
     "could_be_within",
     "data_file",
+    "describe",
     "did_you_mean",
     "entries_of",
     "in_general",
@@ -75,6 +77,7 @@ __all__ = [
     "noting",
     "parse",
     "plain",
+    "raised_at",
     "read",
     "select",
     "split",

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from epicycle.runner.build import load_model
 from epicycle.runner.catalogue import CatalogueError, Types, installed
-from epicycle.runner.model import load_model
 from epicycle.runner.text import ModelError
 
 THIRD_PARTY = Path(__file__).parents[1] / "third_party"

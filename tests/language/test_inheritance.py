@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.model import Model, load_composite, load_model
+from epicycle.runner.build import Model, load_composite, load_model
 from tests.model.model_parts import TYPES
 
 BASE = """

@@ -22,6 +22,8 @@ from epicycle.actors import (
 )
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
+from epicycle.runner.build.connect import _ENDPOINT as ENDPOINT
+from epicycle.runner.build.indices import BadIndexError, resolve
 from epicycle.runner.catalogue import Catalogue, built_in, figure_types, model_folders, packaged_models
 from epicycle.runner.language import (
     DeclarationReader,
@@ -37,8 +39,6 @@ from epicycle.runner.language.fields import QUANTITY, Construct
 from epicycle.runner.language.models import BESIDE
 from epicycle.runner.language.parameter_schema import schema_of as value_schema
 from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
-from epicycle.runner.model.connect import _ENDPOINT as ENDPOINT
-from epicycle.runner.model.indices import BadIndexError, resolve
 from epicycle.runner.show.report import study_figure_types
 from epicycle.runner.text import PatternError, Problems, compile_pattern, parse, plain
 from tests.bad_models.test_bad_models import CASES

@@ -11,8 +11,8 @@ import pytest
 
 from epicycle.actors import Actor, OutputPort
 from epicycle.runner import Simulation, load_model
+from epicycle.runner.build import figures_of
 from epicycle.runner.catalogue import packaged_models
-from epicycle.runner.model import figures_of
 from epicycle.runner.show import FigureError, draw
 from epicycle.runner.show.figures import Trajectories
 from epicycle.runner.show.pen import PALETTE, Sheet

@@ -6,8 +6,8 @@ from contextlib import suppress
 
 from epicycle.actors import UnitError, variants
 
+from ...build import Complaint, Model, made_figure, place_in_figure, tell_of_figure
 from ...language import in_si, split_number
-from ...model import Complaint, Model, made_figure, place_in_figure, tell_of_figure
 from ...study import Plan
 from ...text import Mapping, Node, Problems, Sequence, plain
 from . import of_signals  # noqa: F401  whose types are known by that

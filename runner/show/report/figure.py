@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
 
+from ...build import Complaint, Model
 from ...language import Dimension, Factor
-from ...model import Complaint, Model
 from ...results import Results
 from ...study import Plan
 from ..pen import MAX_LINES, MAX_PANELS, Sheet

@@ -23,8 +23,8 @@ from epicycle.actors import (
 )
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
+from ...build import Complaint, Model, figures_of
 from ...catalogue import Figure
-from ...model import Complaint, Model, figures_of
 from ...results import Results
 from ...study import Plan, half_width
 from ...text import Problems

@@ -11,8 +11,8 @@ from typing import Any
 
 from epicycle.actors import Parameter, counted, texts_parameter
 
+from ...build import Complaint
 from ...language import Factor
-from ...model import Complaint
 from ...study import Plan, mean
 from ..pen import DASHES, LIMIT, MARKERS, PALETTE
 from .data import Condition, Data, Names, is_numeric, mean_of

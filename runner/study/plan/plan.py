@@ -16,9 +16,9 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
+from ...build import Model, load_model
 from ...catalogue import types_of_file
 from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
-from ...model import Model, load_model
 from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
 from .described import Column, columns_of
 from .metrics import check_metric

@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from epicycle.runner import load_model
+from epicycle.runner.build import Model
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.commands.options import BAD_INPUT
-from epicycle.runner.model import Model
 from epicycle.runner.show.graph import mermaid, outline, write_graph
 from epicycle.runner.show.graph.layers import Cell, Net, Pin, Run
 from epicycle.runner.show.graph.layout import Drawing, Line, PlacedBox, draw

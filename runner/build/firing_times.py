@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from epicycle.actors import declared_parameters
 from epicycle.aspects import ByActorParameter, FiringTime, FiringTimeParameter
 
+from ..graph import ModelGraph, WovenAspect
 from ..text import did_you_mean
-from .graph import ModelGraph
-from .woven import WovenAspect
 
 Found = tuple[str, tuple[str, ...], str]  # what is wrong, the keys that lead there, and advice
 

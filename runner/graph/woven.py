@@ -10,7 +10,7 @@ from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
 
 from ..text import Problems
-from .graph import ModelGraph, is_within
+from .model_graph import ModelGraph, is_within
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, type_name
 
 from ..catalogue import Measure
+from ..graph import Metric, Watched
 from ..language import DeclarationReader, MetricText, ModelText, Values
 from ..text import (
     MAX_SEED,
@@ -25,40 +25,9 @@ from ..text import (
     plain,
 )
 from .draft import Draft
-from .graph import is_within
 from .settle import converted, nanoseconds
 
 # Larger seeds could not be told apart in the int64 columns of result files.
-
-
-@dataclass(frozen=True)
-class Metric:
-    """A number taken from what some ports send together."""
-
-    name: str
-    ports: list[str]
-    measure: Measure
-
-    def without(self, path: str) -> Metric:
-        """The metric when a part of the model is taken out that it watched, too."""
-        return replace(self, ports=[port for port in self.ports if not is_within(port, path)])
-
-    @property
-    def unit(self) -> str:
-        """What it counts in."""
-        return self.measure.to or self.measure.own_unit
-
-
-@dataclass
-class Watched:
-    """What is said about a run of a model: when it ends, and what is kept of it."""
-
-    stop_time: int | None = None  # ns
-    seed: int = 0
-    recorded: list[str] = field(default_factory=list)
-    stop_ports: list[str] = field(default_factory=list)
-    metrics: list[Metric] = field(default_factory=list)
-    stop_position: Position | None = None  # of what was said of ``stop_ports`` last
 
 
 class Watching:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import Actor, declared_ports, has_own_ports
 
+from ..graph import ModelGraph
 from ..text import could_be_within
-from .graph import ModelGraph
 
 
 @dataclass

@@ -10,10 +10,9 @@ import networkx as nx
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
+from ..graph import Detour, Hop, ModelGraph, Wire, dependencies
 from ..text import RAISE_IT, Position, Problems, in_general
 from .draft import Draft
-from .graph import Detour, Hop, ModelGraph, Wire
-from .schedule import dependencies
 
 MAX_PASSAGE = 200  # composite ports in a row
 MAX_SHOWN = 10  # names in one message

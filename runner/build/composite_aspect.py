@@ -15,14 +15,13 @@ import networkx as nx
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
+from ..graph import AspectModel, Detour, ModelGraph, WovenAspect
 from ..language import PartText, PointcutText
 from ..text import PathIndex, Position, Problems, did_you_mean
 from .draft import Draft
 from .firing_times import without_port
-from .graph import Detour, ModelGraph
 from .settle import place_of
 from .weave import Paths, Weaving
-from .woven import AspectModel, WovenAspect
 
 BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
 OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: not the composite's matter

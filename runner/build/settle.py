@@ -18,8 +18,20 @@ from epicycle.actors import (
 )
 
 from ..language import CompositeText, PartText, Setting, Settings, Values
-from ..text import RAISE_IT, Entry, Mapping, Node, Position, Problems, TooManyError, data_file, did_you_mean, nearest
-from .culprit import describe, raised_at
+from ..text import (
+    RAISE_IT,
+    Entry,
+    Mapping,
+    Node,
+    Position,
+    Problems,
+    TooManyError,
+    data_file,
+    describe,
+    did_you_mean,
+    nearest,
+    raised_at,
+)
 from .draft import Draft
 
 _INDEX = re.compile(r"\[(\d+|\*)\]")

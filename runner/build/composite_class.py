@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..catalogue import Catalogue, installed
+from ..graph import WovenAspect
 from ..language import (
     CompositeText,
     PartText,
@@ -20,7 +21,6 @@ from .draft import Draft
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .weave_all import weave_all
-from .woven import WovenAspect
 
 
 class CompositeClass:

@@ -24,11 +24,11 @@ from epicycle.aspects import (
     SelectionParameter,
 )
 
+from ..graph import WovenAspect
 from ..language import PointcutText
 from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, in_general, nearest
 from .draft import Draft
 from .firing_times import unknown_inputs
-from .woven import WovenAspect
 
 
 class Paths:

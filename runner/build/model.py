@@ -9,6 +9,7 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..catalogue import take_problem
 from ..collection import without_collection
+from ..graph import Metric, ModelGraph, Watched, WovenAspect, check_processors, firing_order, is_within
 from ..language import Values
 from ..shown import short
 from ..tables import Table, as_html, as_text
@@ -19,12 +20,9 @@ from .composite_aspect import check_nesting, detours
 from .decorated import arranged
 from .draft import Draft
 from .ends import Port, raising
-from .graph import ModelGraph, is_within
-from .schedule import firing_order
 from .scope import Composite, Scope
 from .settle import nanoseconds
-from .watch import Metric, Watched, Watching, checked_seed
-from .woven import WovenAspect, check_processors
+from .watch import Watching, checked_seed
 
 DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
+from ..graph import WovenAspect
 from ..text import ModelError, Position, Problem, Problems
 from .draft import Draft
 from .settle import drift, local_nanoseconds
-from .woven import WovenAspect
 
 if TYPE_CHECKING:
     from .scope import Composite

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
+from ..graph import ModelGraph, WovenAspect
 from ..language import ConnectionText, DeclarationReader, PointcutText, Values
 from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
 from .composite_aspect import ModelWeaving, check_nesting
@@ -33,9 +34,7 @@ from .ends import (
     mistake,
     raising,
 )
-from .graph import ModelGraph
 from .weave import Paths, Weaving
-from .woven import WovenAspect
 
 if TYPE_CHECKING:
     from .model import Model

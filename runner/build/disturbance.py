@@ -7,6 +7,7 @@ from collections.abc import Mapping as AnyMapping
 from typing import TYPE_CHECKING
 
 from ..catalogue import installed
+from ..graph import WovenAspect
 from ..language import (
     PARAMETER_THERE,
     CompositeText,
@@ -22,7 +23,6 @@ from .draft import Draft
 from .settle import Settler
 from .unfold import Known, Unfolded, Unfolding
 from .weave_all import weave_all
-from .woven import WovenAspect
 
 if TYPE_CHECKING:
     from .model import Model

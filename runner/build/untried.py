@@ -6,11 +6,11 @@ from collections.abc import Collection
 
 from epicycle.actors import counted
 
+from ..graph import ModelGraph
 from ..language import CompositeText, Settings, Values
 from ..text import RAISE_IT, Limits, Problems
 from .checks import check
 from .draft import Draft
-from .graph import ModelGraph
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .weave_all import weave_all

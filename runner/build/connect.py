@@ -9,10 +9,10 @@ from itertools import product
 
 from epicycle.actors import Actor, counted, declared_ports, has_own_ports
 
+from ..graph import ModelGraph
 from ..language import CompositeText, ConnectionText, Values
 from ..text import RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, within
 from .draft import Draft
-from .graph import ModelGraph
 from .indices import BadIndexError, resolve
 from .settle import converted, nanoseconds
 

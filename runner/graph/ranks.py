@@ -12,7 +12,7 @@ from typing import Any
 
 import networkx as nx
 
-from .graph import Hop, ModelGraph
+from .model_graph import Hop, ModelGraph
 
 
 def firing_order(graph: ModelGraph) -> dict[str, int]:

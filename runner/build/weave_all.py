@@ -14,6 +14,7 @@ from epicycle.aspects import (
 )
 
 from ..catalogue import CatalogueError
+from ..graph import WovenAspect
 from ..language import PartText, PointcutText
 from ..text import RAISE_IT, Position, TooManyError, did_you_mean
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
@@ -21,7 +22,6 @@ from .decorated import arranged, weave_decorations
 from .settle import Settler, converted, place_of
 from .unfold import AspectToWeave, Known, Unfolded
 from .weave import Paths, Weaving
-from .woven import WovenAspect
 
 
 def weave_all(made: Unfolded, known: Known, settler: Settler) -> list[WovenAspect]:

@@ -9,6 +9,7 @@ from epicycle.actors import counted_in_si, plain
 
 from ..catalogue import installed
 from ..collection import without_collection
+from ..graph import ModelGraph, check_processors
 from ..language import (
     COMPOSITE_THERE,
     ModelText,
@@ -32,14 +33,12 @@ from ..text import Mapping as MappingNode
 from .checks import check
 from .draft import Draft
 from .figures import figures_of
-from .graph import ModelGraph
 from .model import DeclaredFigure, Model
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolded, Unfolding
 from .untried import try_classes
 from .watch import Watching
 from .weave_all import weave_all
-from .woven import check_processors
 
 
 def load_model(

@@ -11,8 +11,7 @@ from typing import TypeVar
 from epicycle.actors import Configurable, ParameterError, declared_parameters, unknown_parameter
 
 from ..catalogue import Figure, figure_types
-from ..text import Mapping, PatternError, Position, Problems, Sequence, did_you_mean, plain, select
-from .culprit import describe, raised_at
+from ..text import Mapping, PatternError, Position, Problems, Sequence, describe, did_you_mean, plain, raised_at, select
 from .model import DeclaredFigure, Model
 from .settle import place_of
 

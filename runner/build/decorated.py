@@ -8,12 +8,11 @@ from dataclasses import replace
 from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import Aspect, Decoration, decorations
 
+from ..graph import ModelGraph, WovenAspect
 from ..language import PointcutText
 from ..text import Position, Problems, Text
 from .draft import Draft
-from .graph import ModelGraph
 from .weave import Paths, Weaving
-from .woven import WovenAspect
 
 Change = Callable[[str, Aspect], Mapping[str, object]]
 

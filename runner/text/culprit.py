@@ -10,7 +10,7 @@ from types import FrameType
 
 from epicycle.actors import Configurable, EpicycleError
 
-from ..text import Position
+from .problems import Position
 
 _LIBRARIES = tuple(sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib"))
 
