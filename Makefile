@@ -15,7 +15,7 @@ help:
 	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
 	@echo "make portable  every digest under settings that stand for other machines (10 min)"
-	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, and types"
+	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, the order of imports, and types"
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
@@ -58,6 +58,7 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python -m tests.arithmetic
+	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mypy
 
 reference: $(DEV)

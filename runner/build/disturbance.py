@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
-from typing import TYPE_CHECKING
 
 from ..catalogue import installed
 from ..graph import WovenAspect
@@ -20,16 +19,14 @@ from ..language import (
 )
 from ..text import Mapping, Position, Problems, node_of
 from .draft import Draft
+from .scope import Building
 from .settle import Settler
 from .unfold import Known, Unfolded, Unfolding
 from .weave_all import weave_all
 
-if TYPE_CHECKING:
-    from .model import Model
-
 
 def disturb(
-    model: Model, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
+    model: Building, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
 ) -> tuple[Draft, list[WovenAspect]]:
     """The model's draft with the aspects of a disturbance, and these; raises ``ModelError``."""
     problems = Problems()

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
-from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
+from epicycle.actors import InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph import WovenAspect
 from ..text import ModelError, Position, Problem, Problems
 from .draft import Draft
 from .settle import drift, local_nanoseconds
-
-if TYPE_CHECKING:
-    from .scope import Composite
 
 
 @dataclass(frozen=True)
@@ -32,8 +29,6 @@ class CompositePort:
 
 Port: TypeAlias = "InputPort[Any] | OutputPort[Any] | CompositePort"
 Ends: TypeAlias = "str | Port | Iterable[str | Port]"
-Place: TypeAlias = "str | Port | Actor | Composite"
-Places: TypeAlias = "Place | Iterable[Place]"
 
 
 @runtime_checkable
@@ -85,7 +80,7 @@ def firing_time_of(time: object, aspect: object, position: Position, problems: P
         return None
 
 
-def each_of(ends: Ends | Places) -> list[Any]:
+def each_of(ends: object) -> list[Any]:
     """One or several ends as a list; what is no end is found out later."""
     return list(ends) if isinstance(ends, Iterable) and not isinstance(ends, str) else [ends]
 

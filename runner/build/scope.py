@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import Any, Protocol, TypeAlias, TypeVar, overload
 
 from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
@@ -26,7 +26,7 @@ from .ends import (
     CompositePort,
     Ends,
     Instance,
-    Places,
+    Port,
     check_aspect,
     clock_of,
     each_of,
@@ -35,9 +35,6 @@ from .ends import (
     raising,
 )
 from .weave import Paths, Weaving
-
-if TYPE_CHECKING:
-    from .model import Model
 
 _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
 
@@ -68,17 +65,44 @@ class _Children(Mapping[str, Child]):
         return len(self._parts)
 
 
+Place: TypeAlias = "str | Port | Actor | Composite"
+Places: TypeAlias = "Place | Iterable[Place]"
+
+
+class Building(Protocol):
+    """A model in the making: what scopes read of it, and how they change it once they know what is right."""
+
+    name: str
+    draft: Draft
+    aspects: list[WovenAspect]
+    parameters: dict[str, object]
+
+    @property
+    def graph(self) -> ModelGraph:
+        """All actors, composites, ports and connections."""
+
+    def edit(self) -> Draft:
+        """The draft, which is then changed."""
+
+    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect]) -> None:
+        """Go on with a draft that came of the present one, with further aspects."""
+
+    def enlist(self, aspects: Iterable[WovenAspect]) -> None:
+        """These aspects stand in it from now on."""
+
+    def forget(self, path: str) -> None:
+        """Take out an actor or composite, and whatever stands at it or watches it."""
+
+    def scope(self, path: str) -> Composite:
+        """The composite at a path."""
+
+
 class Scope:
     """The inside of a model or of a composite: where actors are added and connected."""
 
-    def __init__(self, model: Model, path: str) -> None:
+    def __init__(self, model: Building, path: str) -> None:
         self.path = path
         self._model = model
-
-    @property
-    def model(self) -> Model:
-        """The model that it is, or is in."""
-        return self._model
 
     @property
     def _inside(self) -> Inside:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from epicycle.actors.expression import ExpressionError, Formula
 
@@ -18,9 +17,6 @@ from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline
 from .dimensions import Dimension, Factor, as_factor
 from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, names_of, node_as, number, ref
 from .files import named_file
-
-if TYPE_CHECKING:
-    from .study import Study
 
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which look at all of them
 
@@ -44,17 +40,23 @@ def levels_of(dimensions: Iterable[Dimension], factor: str) -> list[Factor]:
 class QuestionReader(NodeReader):
     """Reads ``claims`` and ``guideline`` of a study; what is misshapen or not in the study is told and left out.
 
-    ``factors_of`` says what another study varies, from its text's node and file.
+    ``kinds`` are the factors and what they hold, ``folder`` that of the study's file; ``factors_of`` says what another
+    study varies, from its text's node and file.
     """
 
     def __init__(
-        self, problems: Problems, study: Study, factors_of: Callable[[Node, Path, Problems], Mapping[str, str]]
+        self,
+        problems: Problems,
+        dimensions: tuple[Dimension, ...],
+        kinds: Mapping[str, str],
+        folder: Path,
+        factors_of: Callable[[Node, Path, Problems], Mapping[str, str]],
     ) -> None:
         super().__init__(problems)
-        self.study = study
+        self.dimensions = dimensions
+        self.kinds = kinds
+        self.folder = folder
         self.factors_of = factors_of
-        self.dimensions = study.dimensions
-        self.kinds = study.factors
 
     def questions(self, entries: Mapping[str, Entry], lender: tuple[str, str] | None = None) -> Questions:
         """All that is asked; ``lender``: file and text of the study whose claims these are, if they are known."""
@@ -77,7 +79,7 @@ class QuestionReader(NodeReader):
             return Questions(guideline=guideline)
         tree, factors = borrowed
         misfits = Problems()
-        claims = QuestionReader(misfits, self.study, self.factors_of).claims(tree)
+        claims = QuestionReader(misfits, self.dimensions, self.kinds, self.folder, self.factors_of).claims(tree)
         if first := next(iter(misfits.found), None):
             more = f", and {len(misfits) - 1} more" if len(misfits) > 1 else ""
             self.problems.add(
@@ -91,7 +93,7 @@ class QuestionReader(NodeReader):
     def lender(self, node: Scalar) -> tuple[str, str] | None:
         """File and text of the study that is named in the place of claims."""
         said = Text(node.text, node.position)
-        path = named_file(said, self.study.path.parent, "study", packaged_studies, self.problems, "claims: ")
+        path = named_file(said, self.folder, "study", packaged_studies, self.problems, "claims: ")
         return None if path is None else (str(path), path.read_text(encoding="utf-8", errors="replace"))
 
     def borrowed(self, node: Scalar, file: str, text: str) -> tuple[Node, Mapping[str, str]] | None:

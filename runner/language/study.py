@@ -196,7 +196,7 @@ class _StudyReader(NodeReader):
         self.columns(study)
         if len(self.problems) > before:
             return study
-        reader = QuestionReader(self.problems, study, self.factors_of)
+        reader = QuestionReader(self.problems, study.dimensions, study.factors, study.path.parent, self.factors_of)
         return replace(study, questions=reader.questions(entries, self.lender))
 
     def factors_of(self, node: Node, path: Path, problems: Problems) -> dict[str, str]:

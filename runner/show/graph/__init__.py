@@ -1,7 +1,7 @@
 """The model graph as a picture (SVG, PNG, PDF) or as Mermaid text, without any system package.
 
-Four steps: what is drawn (``outline``), which layer it stands in (``layers``), where exactly (``places``, ``layout``),
-and how it looks (``picture``, ``mermaid``).
+Four steps: what is drawn (``outlines``), which layer it stands in (``layers``), where exactly (``places``, ``layout``),
+and how it looks (``picture``, ``mermaid_text``).
 
 Why the layout is our own.  It needs nested boxes, ports at fixed sides, lines at right angles, trees for fan-out and
 room for badges.  Graphviz has no ports on clusters, and its right-angled lines ignore ports altogether; its builds for
@@ -18,8 +18,8 @@ from pathlib import Path
 from epicycle.actors import EpicycleError
 
 from .layout import draw
-from .mermaid import mermaid
-from .outline import Outline, outline
+from .mermaid_text import mermaid
+from .outlines import Outline, outline
 
 PICTURES, TEXTS = (".svg", ".png", ".pdf"), (".mmd", ".md")
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from . import text
 from .layers import Cell, Layering, Net, Pin, Run, layer, order
-from .outline import Box, Link, Outline, Port, label
+from .outlines import Box, Link, Outline, Port, label
 from .places import Trunk, place, tracks
 
 ROW = 14.0  # from port to port of an actor

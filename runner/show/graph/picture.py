@@ -18,7 +18,7 @@ from ...graph import extent
 from ..pen import new_canvas, save, style
 from . import text
 from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width
-from .outline import duration, short_name
+from .outlines import duration, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
 FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")

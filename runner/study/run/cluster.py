@@ -19,7 +19,7 @@ from epicycle.actors import EpicycleError
 
 from . import host
 from .backlog import Task
-from .making import Keeper
+from .keeper import Keeper
 from .parcel import SENT, differences, fitness, pack, unfit
 from .processes import DONE, Outcome, WorkerError
 

@@ -7,7 +7,7 @@ import pytest
 from epicycle.actors import Clock
 from epicycle.aspects import ExecutionTime, PacketLoss
 from epicycle.runner import Model, ModelError, Simulation
-from epicycle.runner.show.graph.outline import outline
+from epicycle.runner.show.graph.outlines import outline
 from tests.aspects.execution.execution_parts import PARTS, sent
 from tests.engine.engine_parts import Scale, load, simulate
 

@@ -21,7 +21,7 @@ from epicycle.runner.commands.options import BAD_INPUT
 from epicycle.runner.show.graph import mermaid, outline, write_graph
 from epicycle.runner.show.graph.layers import Cell, Net, Pin, Run
 from epicycle.runner.show.graph.layout import Drawing, Line, PlacedBox, draw
-from epicycle.runner.show.graph.outline import Box, Link, Outline, Port
+from epicycle.runner.show.graph.outlines import Box, Link, Outline, Port
 from epicycle.runner.show.graph.places import tracks
 
 Rectangle = tuple[float, float, float, float]  # left, top, right, bottom

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from .outline import Box, Link, Outline, Port, label
+from .outlines import Box, Link, Outline, Port, label
 
 RESERVED = {"call", "class", "classDef", "click", "default", "direction", "end"}
 RESERVED |= {"flowchart", "graph", "href", "linkStyle", "style", "subgraph"}
