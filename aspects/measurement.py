@@ -46,8 +46,7 @@ class MeasurementFailure(RandomLoss, MeasurementAspect):
         float, None, unit="1", min=1.0, doc="mean number of failures in a row; none: independent failures"
     )
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if self.burst is not None and self.probability > self.burst / (self.burst + 1.0):
             raise EpicycleError(
                 f"a failure probability of {self.probability:g} cannot come in runs of {self.burst:g} in the mean: "
@@ -220,8 +219,7 @@ class Saturate(Alteration):
     low = Parameter(float, -math.inf, doc="smallest number, in its own unit")
     high = Parameter(float, math.inf, doc="largest number, in its own unit")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if self.low > self.high:
             raise EpicycleError(f"low {self.low:g} is above high {self.high:g}")
 

@@ -25,8 +25,8 @@ import simpy
 from benchmarks.measure import Row, compare, cpu_seconds, table, take_turns
 from epicycle.actors import Tag, random_stream
 from epicycle.runner import Simulation, load_model
+from epicycle.runner.build import Model
 from epicycle.runner.engine import EventLog
-from epicycle.runner.model import Model
 
 HOPS = 200_000  # in each of five rounds
 JOBS = 200_000

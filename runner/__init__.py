@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .build import Composite, Model, load_composite, load_model
     from .engine import ActorError, Simulation
-    from .model import Composite, Model, load_composite, load_model
     from .results import Results, Signal
     from .study import StudyResults, open_study
     from .text import ModelError
@@ -30,15 +30,15 @@ __all__ = [
 
 _HOMES = {
     "ActorError": "engine",
-    "Composite": "model",
+    "Composite": "build",
     "Results": "results",
     "Signal": "results",
     "Simulation": "engine",
     "Trial": "trial",
-    "Model": "model",
+    "Model": "build",
     "ModelError": "text",
-    "load_composite": "model",
-    "load_model": "model",
+    "load_composite": "build",
+    "load_model": "build",
     "StudyResults": "study",
     "open_study": "study",
 }

@@ -7,8 +7,8 @@ from typing import Any
 
 from epicycle.aspects.testing import Woven
 
+from .build import Model, load_model
 from .engine import Record, Simulation
-from .model import Model, load_model
 
 
 class Trial:

@@ -56,10 +56,11 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "aspects/execution/crash.py": (("sum",), WHOLE),
     "runner/engine/statistic.py": (("sum",), WHOLE),
     "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
-    "runner/model/checks.py": (("sum",), WHOLE),
-    "runner/model/problems.py": (("sum",), WHOLE),
+    "runner/build/checks.py": (("sum",), WHOLE),
+    "runner/text/problems.py": (("sum",), WHOLE),
     "runner/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
+    "runner/shown.py": (("**", "math.log10"), DRAWN),
     "runner/study/judge/claims.py": (("sum",), WHOLE),
     "runner/study/run/cluster.py": (("sum",), WHOLE),
 }

@@ -12,8 +12,8 @@ import scipy.stats
 import simpy
 
 from epicycle.runner import Simulation, load_model
+from epicycle.runner.build import figures_of
 from epicycle.runner.engine import LoopError, Results
-from epicycle.runner.show import figures_of
 from epicycle.runner.text import Problems
 
 

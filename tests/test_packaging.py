@@ -161,7 +161,7 @@ def test_an_import_the_wrong_way_is_found(file: str, line: str, name: str) -> No
         ("actors/core/ports.py", "from . import Tag"),
         ("aspects/core/port.py", "from epicycle.actors import Actor"),
         ("runner/cli.py", "from .model import actors"),
-        ("runner/model/load.py", "from epicycle.aspects import Aspect"),
+        ("runner/build/load.py", "from epicycle.aspects import Aspect"),
     ],
 )
 def test_an_import_the_right_way_is_not(file: str, line: str) -> None:

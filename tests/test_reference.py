@@ -15,9 +15,9 @@ FILES = ("models/schema.json", "docs/reference.md")
 
 def texts() -> dict[str, str]:
     """What the files should hold: Epicycle's own types, whatever else is installed."""
-    from epicycle.runner.catalogue import built_in
+    from epicycle.runner.catalogue import built_in, figure_types
     from epicycle.runner.language import json_schema, schema_text
-    from epicycle.runner.show import figure_types, markdown
+    from epicycle.runner.show import markdown
     from epicycle.runner.show.report import study_figure_types
 
     own, figures, of_studies = built_in(), figure_types(), study_figure_types()

@@ -81,7 +81,7 @@ class Parameter(Generic[T]):
         above: float | None = None,
         max: float | None = None,
         choices: Sequence[str] = (),
-        renamed: Mapping[str, str] = types.MappingProxyType({}),
+        renamed: Mapping[str, str] | None = None,
         shape: tuple[int | None, ...] | None = None,
         optional: bool = False,
         doc: str = "",
@@ -93,7 +93,7 @@ class Parameter(Generic[T]):
         self.above = above
         self.max = max
         self.choices = tuple(choices)
-        self.renamed = renamed
+        self.renamed = dict(renamed or {})
         self.shape = shape
         self.optional = optional or default is None
         self.doc = doc

@@ -16,6 +16,8 @@ _NOTHING: Any = object()
 class ParameterPort(InputPort[T]):
     """The port of a ``PortParameter``: remembers the latest token beyond its tag."""
 
+    copies_share = ("_parameter",)  # the declaration is the class's
+
     def __init__(self, parameter: PortParameter[T], type: Any, doc: str) -> None:
         super().__init__(type, required=False, doc=doc)
         self._parameter = parameter

@@ -10,8 +10,10 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from operator import add, sub
+from operator import add, mul, sub, truediv
 from typing import Final
+
+from ..core.elementary import total
 
 State = list[float]
 Derivative = Callable[[float, State], list[float]]
@@ -36,11 +38,8 @@ def root_power(base: float, exponent: float) -> float:
 
 def norm(values: Sequence[float], scale: Sequence[float]) -> float:
     """The root of the mean of the squares of the values, each divided by its scale."""
-    total = 0.0
-    for value, unit in zip(values, scale, strict=True):
-        ratio = value / unit
-        total += ratio * ratio
-    return math.sqrt(total / len(scale))
+    ratios = list(map(truediv, values, scale))
+    return math.sqrt(dot(ratios, ratios) / len(scale))
 
 
 def added(one: Sequence[float], other: Sequence[float]) -> State:
@@ -55,10 +54,8 @@ def taken(one: Sequence[float], other: Sequence[float]) -> State:
 
 def dot(one: Sequence[float], other: Sequence[float]) -> float:
     """The sum of the products."""
-    total = 0.0
-    for left, right in zip(one, other, strict=True):
-        total += left * right
-    return total
+    result: float = total(map(mul, one, other))
+    return result
 
 
 def combined(weights: Sequence[float], rows: Sequence[State]) -> State:

@@ -47,11 +47,13 @@ class FilterPyEstimator(_Estimator):
         return bool(measurements) and self._update(measurements)
 
     def _predict(self, elapsed: float) -> None:
+        from .numerics.ukf import constant_velocity
+
         self._filter.Q = self._noise_over(elapsed)
         if self.filter in ("UnscentedKalmanFilter", "CubatureKalmanFilter"):
             self._filter.predict(dt=elapsed)
         else:
-            self._filter.F = _transition(elapsed)
+            self._filter.F = constant_velocity(elapsed)
             self._filter.predict()
 
     def _update(self, measurements: list[Measurement]) -> bool:
@@ -133,26 +135,18 @@ class FilterPyEstimator(_Estimator):
 def _make_filter(name: str, kappa: float) -> Any:
     from filterpy import kalman  # takes seconds, so only when it is used
 
+    from .numerics.definitions import target_after
+
     if name == "UnscentedKalmanFilter":
         points = kalman.JulierSigmaPoints(4, kappa=kappa)
-        made = kalman.UnscentedKalmanFilter(4, 2, 1.0, hx=_unused, fx=_move, points=points)
+        made = kalman.UnscentedKalmanFilter(4, 2, 1.0, hx=_unused, fx=target_after, points=points)
     elif name == "CubatureKalmanFilter":
-        made = kalman.CubatureKalmanFilter(4, 2, 1.0, hx=_unused, fx=_move)
+        made = kalman.CubatureKalmanFilter(4, 2, 1.0, hx=_unused, fx=target_after)
     else:
         made = getattr(kalman, name)(4, 2)
         if name != "ExtendedKalmanFilter":
             made.H = np.eye(2, 4)
     return made
-
-
-def _transition(elapsed: float) -> Array:
-    matrix = np.eye(4)
-    matrix[0, 2] = matrix[1, 3] = elapsed
-    return matrix
-
-
-def _move(state: Array, elapsed: float) -> Array:
-    return np.array([*(state[:2] + elapsed * state[2:]), *state[2:]])
 
 
 def _unused(state: Array) -> Array:

@@ -53,17 +53,21 @@ class _Known:
             if body not in self._states or state.time >= self._states[body].time:
                 self._states[body] = state
 
-    def positions(self) -> list[tuple[float, float]]:
-        """Where they all are at the time of the latest state: each has moved on with its velocity since its own."""
+    def tell(self, output: OutputPort[float]) -> None:
+        """Send the smallest distance between two, if so many are known, at the time of the latest state.
+
+        Each has moved on with its velocity since its own state.
+        """
         now = max((state.time for state in self._states.values()), default=0.0)
-        found = []
+        places = []
         for state in self._states.values():
             (x, y), elapsed = state.position.tolist(), now - state.time
             if elapsed > 0.0:
                 vx, vy = state.velocity.tolist()
                 x, y = x + elapsed * vx, y + elapsed * vy
-            found.append((x, y))
-        return found
+            places.append((x, y))
+        if len(places) >= 2:
+            output.send(min(distance(a, b) for a, b in combinations(places, 2)))
 
 
 class DistanceMonitor(Actor):
@@ -84,9 +88,7 @@ class DistanceMonitor(Actor):
     def fire(self) -> None:
         self._known.see(0, self.a.tokens)
         self._known.see(1, self.b.tokens)
-        places = self._known.positions()
-        if len(places) == 2:
-            self.distance.send(distance(*places))
+        self._known.tell(self.distance)
 
 
 class SeparationMonitor(Actor):
@@ -104,6 +106,4 @@ class SeparationMonitor(Actor):
     def fire(self) -> None:
         for body, states in enumerate(self.bodies.by_channel()):
             self._known.see(body, states)
-        places = self._known.positions()
-        if len(places) >= 2:
-            self.distance.send(min(distance(a, b) for a, b in combinations(places, 2)))
+        self._known.tell(self.distance)

@@ -2,22 +2,32 @@
 
 from .aspect import Aspect, Decoration, class_decorations, decorations
 from .composite import CompositeAspect, CompositeExecutionAspect, FiringRequest, Request
-from .duration import (
+from .execution import ActorPoint, ExecutionAspect, Job, Unit
+from .fields import STAMP, FieldError, altered, field_of, numbers_in, stamped_as
+from .join_point import TOKEN, AspectContext, JoinPoint, JoinPointAspect, Reading, Selection, aspect_stream
+from .parameters import (
+    ByActorParameter,
     Duration,
     DurationParameter,
     FiringTime,
     FiringTimeParameter,
+    GroupsParameter,
     LawParameter,
+    PortsParameter,
+    SelectionParameter,
     drawn,
     law,
     time_needed,
 )
-from .execution import ActorPoint, ExecutionAspect, Job, Unit
-from .fields import STAMP, FieldError, altered, field_of, numbers_in, stamped_as
-from .join_point import TOKEN, AspectContext, JoinPoint, JoinPointAspect, Reading, Selection, aspect_stream
-from .loss import LossAspect, RandomLoss, is_bad
-from .port import CommunicationAspect, MeasurementAspect, ObservationAspect, PortAspect
-from .selection import ByActorParameter, GroupsParameter, PortsParameter, SelectionParameter
+from .port import (
+    CommunicationAspect,
+    LossAspect,
+    MeasurementAspect,
+    ObservationAspect,
+    PortAspect,
+    RandomLoss,
+    is_bad,
+)
 from .server import NEWEST, OLDEST, Server, Task, WaitingLine
 
 __all__ = [

@@ -2,9 +2,8 @@
 
 from ..core import ActorPoint, ExecutionAspect, Job, Unit
 from .crash import CrashRestart
-from .execution_time import ExecutionTime
+from .execution_time import ExecutionTime, SkipFiring
 from .processor import Processor
-from .skip_firing import SkipFiring
 
 __all__ = [
     "ActorPoint",

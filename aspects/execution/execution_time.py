@@ -1,4 +1,4 @@
-"""Firings that take time."""
+"""Firings that take time, and firings that do not happen."""
 
 from __future__ import annotations
 
@@ -44,8 +44,7 @@ class ExecutionTime(ExecutionAspect):
     scale = Parameter(float, 1.0, min=0.0, unit="1", doc="how many times slower the processor is than what was given")
     busy = Parameter(str, WAIT, choices=(WAIT, SKIP), doc="what becomes of a firing while another takes its time")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if self.measure and (self.time != 0.0 or self.times is not None):
             raise EpicycleError("it cannot measure execution times where they are given: leave one or the other out")
         self._measured = None if self.times is None else MeasuredTimes(self.times)
@@ -83,3 +82,24 @@ class ExecutionTime(ExecutionAspect):
         delay = to_seconds(free + duration - now)
         point.act("delayed", delay)
         point.forward(job, delay)
+
+
+class SkipFiring(ExecutionAspect):
+    """Skips each firing with a fixed probability, independently: what came for it is lost.
+
+    An actor that asks for its next wake-up whenever it wakes up would sleep for ever after one that is skipped; so
+    a firing for which a wake-up is due always happens, unless ``wakes`` says that it may be skipped as well.
+    Event: ``skipped``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("skipped",)
+
+    probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a firing is skipped")
+    wakes = Parameter(bool, False, doc="whether firings for a wake-up may be skipped, too")
+
+    def schedule(self, job: Job, point: ActorPoint) -> None:
+        skipped = point.random.random() < self.probability
+        if skipped and (self.wakes or not job.wakes):
+            point.act("skipped", None)
+        else:
+            point.forward(job)

@@ -67,8 +67,7 @@ class RadioMedium(Medium):
     )
     loss = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability that noise spoils a transmission")
 
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
+    def check(self) -> None:
         if self.max_window < self.window:
             raise EpicycleError(f"max_window {self.max_window} is below window {self.window}")
         if self.length_field is None and not (self.message_length or self.number_length or self.overhead):

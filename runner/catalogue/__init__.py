@@ -1,6 +1,7 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
-from .measure import MSER5, TAKES, TIME, TOKENS, Measure, Take, conversion_problem, take_problem
+from .figure import Figure, figure_types
+from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
 from .own_types import TypesError, types_of_file
 from .packaged import (
     find,
@@ -8,10 +9,11 @@ from .packaged import (
     model_folders,
     packaged_disturbances,
     packaged_models,
+    packaged_ones,
     packaged_studies,
     unreadable,
 )
-from .port_types import BUILT_IN, PortTypeError, read_type, token_types
+from .port_types import PortTypeError, read_type, token_types
 from .reference import (
     ParameterReference,
     PortReference,
@@ -27,18 +29,17 @@ from .reference import (
 from .types import Catalogue, CatalogueError, Types, built_in, installed, load_all
 
 __all__ = [
-    "BUILT_IN",
     "MSER5",
     "TAKES",
     "TIME",
     "TOKENS",
     "Catalogue",
     "CatalogueError",
+    "Figure",
     "Measure",
     "ParameterReference",
     "PortReference",
     "PortTypeError",
-    "Take",
     "TypeReference",
     "Types",
     "TypesError",
@@ -47,6 +48,7 @@ __all__ = [
     "conversion_problem",
     "describe",
     "doc_of",
+    "figure_types",
     "find",
     "first_sentence",
     "installed",
@@ -56,6 +58,7 @@ __all__ = [
     "model_folders",
     "packaged_disturbances",
     "packaged_models",
+    "packaged_ones",
     "packaged_studies",
     "parts_of",
     "read_type",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
 
@@ -57,16 +57,21 @@ def unreadable(path: Path | None) -> str | None:
     return f"is {kind}" if kind else ""
 
 
-def find(name: str, kind: str, packaged_ones: Callable[[], dict[str, Path]], problems: Problems) -> Path | None:
+def packaged_ones(kind: str, packaged: Iterable[str]) -> str:
+    """What could be named in place of a model, disturbance or study that there is not."""
+    kinds = "studies" if kind == "study" else f"{kind}s"
+    return f"packaged {kinds}: {', '.join(packaged) or 'none'}; a path to a file ends in .yaml"
+
+
+def find(name: str, kind: str, packaged_files: Callable[[], dict[str, Path]], problems: Problems) -> Path | None:
     """The file that a name means: a path if it looks like one, otherwise what is packaged under it."""
     if is_path(name):
         return Path(name)
-    packaged = packaged_ones()
+    packaged = packaged_files()
     if name not in packaged:
         problems.add(
             f"there is no packaged {kind} {name!r}{did_you_mean(name, list(packaged))}",
             None,
-            f"packaged {'studies' if kind == 'study' else kind + 's'}: {', '.join(packaged) or 'none'}; "
-            "a path to a file ends in .yaml",
+            packaged_ones(kind, packaged),
         )
     return packaged.get(name)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from ..printing import complain, tell
-from .options import DONE, add_model, load
+from .options import DONE, add_model, load, whole
 
 DESCRIPTION = "Draw the model graph: actors, composites, ports, connections with their delays, and aspects."
 
@@ -24,19 +24,12 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--depth",
         metavar="N",
-        type=levels,
+        type=whole(0),
         help="open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)",
     )
     command.add_argument(
         "--expand", action="store_true", help="draw every instance of an array, also where they are alike"
     )
-
-
-def levels(text: str) -> int:
-    """How many levels of composites are opened."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
-    return int(text)
 
 
 def run(options: argparse.Namespace, given: list[str]) -> int:

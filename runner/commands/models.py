@@ -16,9 +16,9 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Print every packaged model, disturbance and study with the first sentence of its doc."""
+    from ..build import load_model
     from ..catalogue import packaged_disturbances, packaged_models, packaged_studies
     from ..language import load_disturbance, read_study
-    from ..model import load_model
     from ..text import Problems
 
     for name, path in packaged_models().items():

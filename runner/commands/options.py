@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from ..printing import complain, complain_traceback
 if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
 
-    from ..model import Model
+    from ..build import Model
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -26,57 +27,51 @@ def add_model(command: argparse.ArgumentParser) -> None:
 
 def add_changes(command: argparse.ArgumentParser) -> None:
     """The options that change a model."""
-    command.add_argument(
+    add_several(
+        command,
         "--set",
-        metavar="PATH=VALUE",
-        action="append",
-        default=[],
-        help="set a parameter, such as observers=3 or 'observer[*].sensor.max_range=5 m'; may be repeated",
+        "PATH=VALUE",
+        "set a parameter, such as observers=3 or 'observer[*].sensor.max_range=5 m'; may be repeated",
     )
-    command.add_argument(
+    add_several(
+        command,
         "--overrides",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
+        "FILE",
+        "set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
     )
-    command.add_argument(
+    add_several(
+        command,
         "--disturb",
-        metavar="NAME or FILE",
-        action="append",
-        default=[],
-        help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
+        "NAME or FILE",
+        "add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
         "--aspect and --without count after it",
     )
-    command.add_argument(
+    add_several(
+        command,
         "--aspect",
-        metavar="NAME=TYPE,KEY=VALUE,...",
-        action="append",
-        default=[],
-        help="add an aspect, or put it in the place of the one of that name; may be repeated",
+        "NAME=TYPE,KEY=VALUE,...",
+        "add an aspect, or put it in the place of the one of that name; may be repeated",
     )
-    command.add_argument(
-        "--without", metavar="NAME", action="append", default=[], help="remove an aspect; may be repeated"
-    )
+    add_several(command, "--without", "NAME", "remove an aspect; may be repeated")
     command.add_argument(
         "--max-actors",
         metavar="N",
-        type=positive,
+        type=whole(1, 10**9 - 1),
         help="how many actors and composites are not taken for a mistake, and a fifth of how many connections "
         "(default: 20,000)",
     )
     add_types(command)
 
 
+def add_several(command: argparse.ArgumentParser, flag: str, metavar: str, about: str) -> None:
+    """An option that may be given more than once, with a value each time."""
+    command.add_argument(flag, metavar=metavar, action="append", default=[], help=about)
+
+
 def add_types(command: argparse.ArgumentParser) -> None:
     """The option that makes types of the user's own known."""
-    command.add_argument(
-        "--types",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="a Python file with actors and aspects of your own, whose code is run; may be repeated",
-    )
+    about = "a Python file with actors and aspects of your own, whose code is run; may be repeated"
+    add_several(command, "--types", "FILE", about)
 
 
 def own_types(options: argparse.Namespace) -> list[type]:
@@ -86,21 +81,37 @@ def own_types(options: argparse.Namespace) -> list[type]:
     return [each for file in options.types for each in types_of_file(Path(file))]
 
 
+def whole(first: int, last: int | None = None, most: str = "") -> Callable[[str], int]:
+    """What reads a whole number, up to ``last``, which is written as ``most``."""
+
+    def read(text: str) -> int:
+        number = int(text) if text.isdecimal() and len(text) <= 20 else -1
+        if number < first or (last is not None and number > last):
+            end = "on" if last is None else f"to {most or last}"
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {first} {end}")
+        return number
+
+    return read
+
+
+count = whole(1, 10**9, "1e9")
+
+
 def seed(text: str, last: int | None = None) -> int:
     """A seed: a whole number from 0 on, and up to ``last`` where others follow it."""
     from ..text import MAX_SEED
 
-    last = MAX_SEED if last is None else last
-    if not text.isdecimal() or len(text) > 20 or int(text) > last:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to {last}")
-    return int(text)
+    return whole(0, MAX_SEED if last is None else last)(text)
 
 
-def positive(text: str) -> int:
-    """A whole number from 1 on."""
-    number = int(text) if text.isdecimal() and len(text) < 10 else 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 999999999")
+def positive_seconds(text: str) -> float:
+    """A number of seconds of real time."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
     return number
 
 
@@ -125,7 +136,7 @@ def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) ->
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     """The model that the options describe; warnings are printed, or with ``strict`` raised."""
-    from ..model import load_model
+    from ..build import load_model
     from ..text import ModelError
 
     model = load_model(

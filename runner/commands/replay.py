@@ -20,8 +20,9 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Repeat the run, and compare its digest."""
-    from ..engine import write_log
-    from ..show import check_folder, draw_figures, figures_of, summary_table, write_folder
+    from ..build import figures_of
+    from ..results import write_log
+    from ..show import check_folder, draw_figures, summary_table, write_folder
     from ..study import again, open_study, plan_of_folder
     from ..text import Problems
 

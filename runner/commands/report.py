@@ -9,8 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..printing import complain, console, tell
-from .options import DONE, FAILED
-from .study import count
+from .options import DONE, FAILED, count
 
 DESCRIPTION = "Write report.html, one file that holds all, and its figures; the study need not be finished."
 

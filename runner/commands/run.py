@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, console, notices, tell, tell_json
-from .options import add_model, complain_of, load, seconds, seed
+from .options import add_model, add_several, complain_of, load, seconds, seed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from ..model import Model
+    from ..build import Model
 
 DESCRIPTION = "Run a model once and report what came of it."
 
@@ -48,12 +48,11 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--log", metavar="FILE", type=Path, help="write the event log to FILE (.parquet, .csv or .jsonl)"
     )
-    command.add_argument(
+    add_several(
+        command,
         "--log-where",
-        metavar="COLUMN=PATTERN",
-        action="append",
-        default=[],
-        help="write only what fits, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
+        "COLUMN=PATTERN",
+        "write only what fits, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
         "actor='observer[*].**' or port=plan; of several for one column one must fit, and each column",
     )
     command.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
@@ -79,8 +78,10 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     """Run the model, report and write what was asked for."""
     from epicycle.actors import EpicycleError
 
-    from ..engine import ActorError, LogFile, LogFilter, LoopError, Pace, Simulation
-    from ..show import FigureError, check_folder, draw_figures, figures_of, summary_object, summary_table, write_folder
+    from ..build import figures_of
+    from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
+    from ..results import LogFile
+    from ..show import FigureError, check_folder, draw_figures, summary_object, summary_table, write_folder
     from ..text import Problems
 
     log = LogFile(options.log) if options.log is not None else None

@@ -22,9 +22,8 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, given: list[str]) -> int:
     """Write the schema."""
-    from ..catalogue import installed
+    from ..catalogue import figure_types, installed
     from ..language import json_schema, schema_text
-    from ..show import figure_types
     from ..show.report import study_figure_types
 
     catalogue, errors = installed().with_types(own_types(options)).loaded()

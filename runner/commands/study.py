@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, complain_traceback, tell
-from .options import DONE, FAILED, INTERRUPTED, add_types, seed
+from .options import DONE, FAILED, INTERRUPTED, add_several, add_types, count, positive_seconds, seed
 
 if TYPE_CHECKING:
     from ..study import Plan, StudyResults
@@ -21,13 +20,8 @@ SHOWN = 5  # failed runs that are told one by one
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle study``."""
     command.add_argument("study", metavar="STUDY", help="a path to a YAML file, or the name of a packaged study")
-    command.add_argument(
-        "--set",
-        metavar="PATH=VALUE",
-        action="append",
-        default=[],
-        help="set a parameter of the model that the study does not vary; may be repeated",
-    )
+    about = "set a parameter of the model that the study does not vary; may be repeated"
+    add_several(command, "--set", "PATH=VALUE", about)
     command.add_argument(
         "--replications", type=count, metavar="N", help="runs of each condition (default: the study's); more are added"
     )
@@ -57,20 +51,13 @@ def add_session(command: argparse.ArgumentParser) -> None:
     command.add_argument("--jobs", type=count, metavar="N", help="processes at a time (default: one for each core)")
     command.add_argument(
         "--run-timeout",
-        type=seconds,
+        type=positive_seconds,
         metavar="S",
         help="seconds of real time after which a run is ended, and counts as failed (default: none)",
     )
     command.add_argument(
         "--retry", action="store_true", help="make runs anew that took too long, or whose process was killed"
     )
-
-
-def count(text: str) -> int:
-    """A whole number from 1 on."""
-    if not text.isdecimal() or not 0 < int(text) <= 10**9:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 1e9")
-    return int(text)
 
 
 def first_seed(text: str) -> int:
@@ -86,17 +73,6 @@ def address(text: str) -> str:
     if found is None or int(found[3]) >= 2**16:
         raise argparse.ArgumentTypeError(f"{text!r} is not an address such as tcp://localhost:8786")
     return f"{found[1] or 'tcp://'}{found[2]}:{found[3]}"
-
-
-def seconds(text: str) -> float:
-    """A number of seconds."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not 0.0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
-    return number
 
 
 def run(options: argparse.Namespace, given: list[str]) -> int:

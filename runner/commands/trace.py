@@ -8,13 +8,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..printing import console, notices, tell, tell_json_text
-from .options import DONE, add_model, load, seconds, seed
+from .options import DONE, add_model, add_several, load, seconds, seed
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Tag
 
+    from ..build import Model
     from ..engine import Firing
-    from ..model import Model, ModelGraph
+    from ..graph import ModelGraph
 
 DESCRIPTION = "Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."
 WIDEST = 80  # characters of a token
@@ -23,13 +24,8 @@ WIDEST = 80  # characters of a token
 def add(command: argparse.ArgumentParser) -> None:
     """The options of ``epicycle trace``."""
     add_model(command)
-    command.add_argument(
-        "--actor",
-        metavar="PATTERN",
-        action="append",
-        default=[],
-        help="actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)",
-    )
+    about = "actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)"
+    add_several(command, "--actor", "PATTERN", about)
     command.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
     command.add_argument("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'")
     command.add_argument("--to", metavar="TIME", help="end there (default: the end of the run)")
@@ -125,7 +121,7 @@ def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], 
 
 def _token(token: Any) -> str:
     """A token on one line, its numbers to six digits, and not too much of it."""
-    from ..engine import plain
+    from ..results import plain
     from ..shown import six_digits
 
     text = json.dumps(six_digits(plain(token)), ensure_ascii=False)
@@ -133,7 +129,7 @@ def _token(token: Any) -> str:
 
 
 def _as_json(firing: Firing) -> str:
-    from ..engine import plain
+    from ..results import plain
 
     def tag(at: Tag | None) -> dict[str, float | int] | None:
         return None if at is None else {"time": at.seconds, "microstep": at.microstep}

@@ -32,8 +32,7 @@ from typing import Any, NoReturn
 from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake, readable
 from epicycle.aspects import Job
 
-from ..model import describe
-from ..text import NORMAL, RAISE_IT, Limits, Position, told_raised
+from ..text import NORMAL, RAISE_IT, Limits, Position, describe, told_raised
 from .agenda import Environment, Instant, Turn
 from .pace import Pace
 

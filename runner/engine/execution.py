@@ -15,7 +15,7 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import ActorPoint, Job
 
-from ..model import describe
+from ..text import describe
 from .agenda import Turn
 from .director import ActorError, Director
 from .local_time import LocalDirector

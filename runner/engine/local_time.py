@@ -15,7 +15,7 @@ from simpy.events import NORMAL, Event, EventPriority
 
 from epicycle.actors import Actor, Tag, Wake
 
-from ..model import Clock
+from ..graph import Clock
 from .director import Director
 
 Deliver = Callable[[Any], None]

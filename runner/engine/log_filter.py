@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..model import Model
+from ..build import Model
 from ..results import LogError
 from ..text import PatternError, did_you_mean, select
 

@@ -13,7 +13,7 @@ from epicycle.actors import Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula, operand
 
 from ..catalogue import MSER5, TIME, Measure
-from ..model import Metric
+from ..graph import Metric
 from ..results import Outcome
 from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser

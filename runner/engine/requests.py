@@ -8,7 +8,7 @@ from typing import Any
 from epicycle.actors import EpicycleError, to_nanoseconds, to_seconds
 from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
-from ..model import WovenAspect
+from ..graph import WovenAspect
 from .local_time import Deliver
 
 

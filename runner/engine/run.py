@@ -11,10 +11,12 @@ from typing import Any
 
 from epicycle.actors import Actor, to_seconds
 
+from ..build import Model
 from ..collection import without_collection
+from ..graph import WovenAspect
 from ..interrupt import between_steps
-from ..model import Model, WovenAspect, describe, raised_at
 from ..results import EventLog, Record, Results, Signal
+from ..text import describe, raised_at
 from .copies import Copies
 from .director import ActorError, Director
 from .local_time import Deliver

@@ -9,8 +9,9 @@ from typing import Any, TypeVar, overload
 from epicycle.actors import Actor, EpicycleError, Process, Tag, did_you_mean, to_nanoseconds
 from epicycle.aspects import Aspect
 
+from ..build import Model
 from ..collection import without_collection
-from ..model import Model, WovenAspect
+from ..graph import WovenAspect
 from ..results import EventLog, Record, Results, Signal
 from .copies import Copies
 from .director import Director

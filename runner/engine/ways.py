@@ -13,7 +13,6 @@ from epicycle.actors import (
     EpicycleError,
     OutputPort,
     PortError,
-    Tag,
     counted,
     declared_parameters,
 )
@@ -30,9 +29,11 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..model import Clock, Hop, ModelGraph, WovenAspect, describe
+from ..graph import Clock, Hop, ModelGraph, WovenAspect
 from ..results import EventLog, Signal, Write
-from .director import ActorError, CrowdError, Director, LoopError
+from ..text import describe
+from .aspect_context import EngineContext
+from .director import ActorError, Director, LoopError
 from .execution import Execution
 from .local_time import Deliver, LocalDirector, Passage
 from .parameters import VaryingParameter
@@ -298,31 +299,25 @@ class Ways:
         """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
         path = point.port
 
+        is_always_active = aspect.is_always_active
+
         def through(passing: T) -> None:
+            doing = name
             try:
+                if not is_always_active:
+                    doing = "is_due()"
+                    if not (aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)):
+                        doing = "pass_by()"
+                        aspect.pass_by(passing, point)
+                        return
+                    doing = name
                 act(passing, point)
-            except (ActorError, LoopError):  # of what comes behind it
-                raise
-            except Exception as error:
-                raise self._error(woven, f"{name} at {path}", error) from error
-
-        if aspect.is_always_active:
-            return through
-
-        def through_if_active(passing: T) -> None:
-            doing = "is_due()"
-            try:
-                if aspect.is_due(point.tag.time) and self._holds(woven, aspect, point):
-                    through(passing)
-                else:
-                    doing = "pass_by()"
-                    aspect.pass_by(passing, point)
             except (ActorError, LoopError):  # of what comes behind it
                 raise
             except Exception as error:
                 raise self._error(woven, f"{doing} at {path}", error) from error
 
-        return through_if_active
+        return through
 
     def _answer(self, woven: WovenAspect, request: Any) -> None:
         """Let a token go on that has come through an aspect's composite."""
@@ -407,57 +402,6 @@ class Ways:
                 raise
             except Exception as error:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
-
-
-class EngineContext:
-    """What the engine offers to a join point: the time of the director that it stands under, the log and signals."""
-
-    def __init__(
-        self,
-        local: Director | LocalDirector,
-        director: Director,
-        log: EventLog,
-        latest: dict[str, Any],
-        signals: dict[str, Signal],
-        blame: Callable[[Exception], ActorError],
-    ) -> None:
-        self.seed = director.seed
-        self.latest = latest.get
-        self.stop = director.stop
-        self.hold = director.hold
-        self._blame = blame
-        self._local = local
-        self._director = director
-        self._log = log
-        self._signals = signals
-
-    @property
-    def tag(self) -> Tag:
-        """The present tag."""
-        return self._local.tag
-
-    def later(self, delay: int, deliver: Deliver, token: Any) -> None:
-        """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
-        try:
-            self._local.later(delay, partial(self._deliver, deliver), token)
-        except CrowdError as error:
-            raise error.of(self._blame(error).path) from None
-
-    def _deliver(self, deliver: Deliver, token: Any) -> None:
-        try:
-            deliver(token)
-        except (ActorError, LoopError):  # of what comes behind it
-            raise
-        except Exception as error:
-            raise self._blame(error) from error
-
-    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        """Write an act of an aspect into the log."""
-        self._log.add(self._director.tag, event, owner, port, None, aspect, token)
-
-    def record(self, signal: str, token: Any) -> None:
-        """Append a token to a signal of the results."""
-        self._signals.setdefault(signal, Signal(signal)).add(self._director.tag, token)
 
 
 def _all(ways: list[Deliver]) -> Deliver:

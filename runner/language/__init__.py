@@ -1,5 +1,6 @@
 """What a file says: models, composites, disturbances, studies and what is set from outside, as declared constructs."""
 
+from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Questions, Selection
 from .declarations import (
     CompositeText,
     ConnectionText,
@@ -10,28 +11,37 @@ from .declarations import (
     PointcutText,
     PortText,
 )
-from .dimensions import Dimension, Factor, Level, Listed, Ranged, in_si, split_number
-from .disturbance import Disturbance, add_disturbances, add_parameters, load_disturbance, load_disturbances
-from .files import find_library, find_model, included_composites, read_model
+from .dimensions import Dimension, Factor, Level, in_si, split_number
+from .disturbance import (
+    COMPOSITE_THERE,
+    PARAMETER_THERE,
+    Disturbance,
+    add_disturbances,
+    joined,
+    load_disturbance,
+    load_disturbances,
+)
+from .files import read_library, read_model
 from .inheritance import inherit
 from .models import DeclarationReader
-from .questions import ALWAYS, FALLS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection
-from .schema import json_schema, schema_text
-from .settings import Setting, Settings, change_aspect, parse_setting, put_aspect, read_overrides, settings_in, without
-from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, find_study, is_study, read_study, study_of_text
+from .schema import CONSTRUCTS, json_schema, schema_text
+from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
+from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
-from .usage import check_own_usage, check_usage
+from .usage import check_usage
 from .values import Values
 
 __all__ = [
     "ALWAYS",
     "ASPECTS",
+    "COMPOSITE_THERE",
+    "CONSTRUCTS",
     "FALLS",
     "GREATER",
-    "LESS",
     "MAX_REPLICATIONS",
     "MAX_STUDY_SEED",
     "NUMBERS",
+    "PARAMETER_THERE",
     "RESERVED",
     "RISES",
     "SIGNALS",
@@ -44,7 +54,6 @@ __all__ = [
     "Factor",
     "Guideline",
     "Level",
-    "Listed",
     "MetricText",
     "ModelText",
     "ParameterText",
@@ -52,7 +61,6 @@ __all__ = [
     "PointcutText",
     "PortText",
     "Questions",
-    "Ranged",
     "Selection",
     "Setting",
     "Settings",
@@ -60,23 +68,18 @@ __all__ = [
     "StudyMetric",
     "Values",
     "add_disturbances",
-    "add_parameters",
     "asks_for_none",
     "change_aspect",
-    "check_own_usage",
     "check_usage",
-    "find_library",
-    "find_model",
-    "find_study",
     "in_si",
-    "included_composites",
     "inherit",
     "is_study",
+    "joined",
     "json_schema",
     "load_disturbance",
     "load_disturbances",
     "parse_setting",
-    "put_aspect",
+    "read_library",
     "read_model",
     "read_overrides",
     "read_study",

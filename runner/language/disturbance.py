@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 from ..catalogue import find, packaged_disturbances
 from ..text import Mapping, Node, NodeReader, Problems, read
-from .declarations import CompositeText, ModelText
+from .declarations import CompositeText, ModelText, ParameterText
 from .fields import NAMED, Construct, Key
 from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, parts
 from .settings import Setting, put_aspect, settings_like
@@ -23,6 +24,9 @@ class Disturbance:
     composites: dict[str, CompositeText] = field(default_factory=dict)
     settings: tuple[Setting, ...] = ()
 
+
+T = TypeVar("T", CompositeText, ParameterText)
+PARAMETER_THERE, COMPOSITE_THERE = "the model has a parameter {!r} already", "there is a composite {!r} already"
 
 # Its aspects may take over the ports of those whose places they take.
 DISTURBANCE = Construct(
@@ -84,54 +88,42 @@ def _declared(node: Node, problems: Problems) -> Disturbance | None:
     return Disturbance(text, composites, settings)
 
 
-def load_disturbances(
-    names: Iterable[str], composites: dict[str, CompositeText], problems: Problems
-) -> list[Disturbance]:
-    """Disturbances by their names or paths; their classes join those of the model."""
-    found: list[Disturbance] = []
-    seen: set[str] = set()
+def load_disturbances(names: Iterable[str], problems: Problems) -> list[Disturbance]:
+    """Disturbances by their names or paths."""
+    found: dict[str, Disturbance | None] = {}
     for name in names:
-        if name in seen:
+        if name in found:
             problems.add(f"the disturbance {name} is given twice", None, "leave one of them out")
-            continue
-        seen.add(name)
-        disturbance = load_disturbance(name, problems)
-        if disturbance is None:
-            continue
-        for key, composite in disturbance.composites.items():
-            if (first := composites.get(key)) is not None:
-                problems.add(
-                    f"there is a composite {key!r} already",
-                    composite.position,
-                    f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
-                )
-            composites.setdefault(key, composite)
-        found.append(disturbance)
-    return found
+        else:
+            found[name] = load_disturbance(name, problems)
+    return [disturbance for disturbance in found.values() if disturbance is not None]
 
 
-def add_disturbances(text: ModelText, disturbances: Iterable[Disturbance], problems: Problems) -> list[Setting]:
-    """Add what disturbances hold to a model; what they set of the model's own parameters is returned.
+def add_disturbances(
+    text: ModelText, disturbances: Iterable[Disturbance], problems: Problems
+) -> tuple[ModelText, list[Setting]]:
+    """A model with what disturbances hold, and what they set of the model's own parameters.
 
     Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
     after the model's own, but one that has the name of another stands in its place.
     """
     settings: list[Setting] = []
     for disturbance in disturbances:
-        add_parameters(disturbance.text, text.root, problems)
+        parameters = joined(text.root.parameters, disturbance.text.parameters, PARAMETER_THERE, problems)
+        text = replace(text, root=replace(text.root, parameters=parameters))
         for part in disturbance.text.aspects.values():
-            put_aspect(text, part)
+            text = put_aspect(text, part)
         settings += disturbance.settings
-    return settings
+    return text, settings
 
 
-def add_parameters(disturbance: CompositeText, root: CompositeText, problems: Problems) -> None:
-    """The parameters of a disturbance join those of a model."""
-    for key, parameter in disturbance.parameters.items():
-        if (first := root.parameters.get(key)) is not None:
+def joined(known: dict[str, T], more: dict[str, T], message: str, problems: Problems) -> dict[str, T]:
+    """What two files declare; of two things of one name the first one counts, and the second is a problem."""
+    for name, second in more.items():
+        if (first := known.get(name)) is not None:
             problems.add(
-                f"the model has a parameter {key!r} already",
-                parameter.position,
+                message.format(name),
+                second.position,
                 f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
             )
-        root.parameters.setdefault(key, parameter)
+    return {**known, **more, **known}

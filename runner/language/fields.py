@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from epicycle.actors import Parameter, ParameterError
 
 from ..catalogue import as_written
-from ..text import Entry, Node, NodeReader, Position, Scalar, Sequence, Text, is_empty
+from ..text import Entry, Node, NodeReader, Position, Scalar, Text, is_empty
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -100,13 +100,11 @@ def node_as(schema: Schema) -> Shape:
     return Shape(schema, lambda reader, node, what: node)
 
 
-def number(kind: type, low: float | None = None, high: float | None = None, *, shown: bool = True) -> Shape:
-    """A number that is written out; without ``shown``, editors do not know its greatest value."""
+def number(kind: type, low: float | None = None, high: float | None = None) -> Shape:
+    """A number that is written out."""
     parameter: Parameter[Any] = Parameter(kind, min=low, max=high)
     schema: Schema = {"type": "integer" if kind is int else "number"}
     schema |= {key: as_written(bound) for key, bound in (("minimum", low), ("maximum", high)) if bound is not None}
-    if not shown:
-        schema.pop("maximum", None)
 
     def read(reader: NodeReader, node: Node, what: str) -> Any:
         try:
@@ -200,8 +198,3 @@ class Construct:
         """What a node says, by attribute; None if it is no mapping."""
         entries = self.entries(reader, node, what)
         return None if entries is None else self.values(reader, entries, what, at or node.position)
-
-
-def items_of(node: Node) -> tuple[Node, ...]:
-    """The items of a list, or what stands in place of one."""
-    return node.items if isinstance(node, Sequence) else (node,)

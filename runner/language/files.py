@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from epicycle.actors import irregular
 
-from ..catalogue import find, model_folders, packaged_models
-from ..text import Mapping, Problems, did_you_mean, read
+from ..catalogue import find, is_path, model_folders, packaged_models, packaged_ones, unreadable
+from ..text import Mapping, Problems, Text, did_you_mean, read
 from .declarations import CompositeText, ModelText
 from .models import DeclarationReader
 
@@ -19,40 +20,67 @@ def find_model(name: str, problems: Problems) -> Path | None:
     return find(name, "model", packaged_models, problems)
 
 
-def find_library(path: Path) -> Path:
-    """The file of a library of composites: as given, or else among the packaged ones."""
-    packaged = [folder / path for folder in model_folders()]
-    return next((each for each in (path, *packaged) if each.is_file()), path)
+def named_file(
+    said: Text,
+    folder: Path,
+    kind: str,
+    packaged: Callable[[], dict[str, Path]],
+    problems: Problems,
+    who: str = "",
+) -> Path | None:
+    """The file that a name in a file means: as seen from its folder, or packaged; None, and a problem, if it cannot be.
+
+    ``who`` begins the message.
+    """
+    known = packaged()
+    path = folder / said.text if is_path(said.text) else known.get(said.text)
+    if (reason := unreadable(path)) == "":
+        return path
+    if reason is not None:
+        problems.add(f"{who}the {kind} {said.text!r} {reason}", said.position)
+        return None
+    problems.add(
+        f"{who}there is no {kind} {said.text!r}{did_you_mean(said.text, list(known))}",
+        said.position,
+        packaged_ones(kind, known),
+    )
+    return None
 
 
-def read_model(name: str, problems: Problems) -> tuple[ModelText, Path, DeclarationReader]:
-    """The declarations of a model's file, which file that is, and what reads those of the files that it includes."""
+def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
+    """What a model's file declares, and the composite classes of it and of all that it includes."""
     path = find_model(name, problems)
-    if path is None:
-        problems.raise_if_any()
-        raise AssertionError("a model that is not found is a problem")
-    node = read(path, problems)
-    if node is None:
-        problems.raise_if_any()
-        raise AssertionError("a file that cannot be read is a problem")
+    node = None if path is None else read(path, problems)
     if isinstance(node, Mapping) and "study" in node.entries:
         problems.add(f"{name} is a study, not a model", None, f"run it: epicycle study {name}")
-        problems.raise_if_any()
-    if isinstance(node, Mapping) and "disturbance" in node.entries and "model" not in node.entries:
+        node = None
+    elif isinstance(node, Mapping) and "disturbance" in node.entries and "model" not in node.entries:
         problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
-        problems.raise_if_any()
-    reader = DeclarationReader(problems)
-    text = reader.model(node)
+        node = None
+    text = None if node is None else DeclarationReader(problems).model(node)
     if text is None:
         problems.raise_if_any()
-        raise AssertionError("a model that is no mapping is a problem")
-    return text, path, reader
+    assert text is not None, "what cannot be read is a problem"
+    assert path is not None, "and so is what cannot be found"
+    return text, _composites(text, path, problems)
 
 
-def included_composites(
-    text: ModelText, path: Path, reader: DeclarationReader, problems: Problems
-) -> dict[str, CompositeText]:
-    """The composite classes of a model and of all that it includes."""
+def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeText]:
+    """The composite classes of a file, as given or else among the packaged ones, and of all that it includes."""
+    path = Path(file)
+    candidates = (path, *(folder / path for folder in model_folders()))
+    path = next((each for each in candidates if each.is_file()), path)
+    node, reader = read(path, problems), DeclarationReader(problems)
+    text = None
+    if node is not None:
+        is_model = isinstance(node, Mapping) and "model" in node.entries
+        text = reader.model(node) if is_model else reader.included(node)
+    problems.raise_if_any()
+    assert text is not None, "what cannot be read is a problem"
+    return _composites(text, path, problems)
+
+
+def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, CompositeText]:
     # Included files must lie in or below the model's folder: a model cannot make us read other files.
     root = path.parent.resolve()
     composites: dict[str, CompositeText] = {}
@@ -98,7 +126,7 @@ def included_composites(
                 problems.add(f"the included file {include.text!r} {kind}", include.position)
                 continue
             node = read(target, problems, str(where.parent / include.text))
-            inner = reader.included(node) if node is not None else None
+            inner = DeclarationReader(problems).included(node) if node is not None else None
             if inner is not None:
                 waiting.append((inner, target))
     return composites

@@ -88,11 +88,7 @@ def _is_sound(
         problems.add(
             f"{base.text} extends itself: {' -> '.join([*(text.name for text in loop), base.text])}",
             loop[0].extends.position if loop[0].extends is not None else None,
-            *(
-                f"{text.name} extends {text.extends.text} at {_at(text.extends.position)}"
-                for text in loop
-                if text.extends
-            ),
+            *(f"{text.name} extends {text.extends.text} at {text.extends.position}" for text in loop if text.extends),
         )
         return False
     if len(way) > MAX_BASES:
@@ -153,7 +149,7 @@ class _Heir:
                 self._problem(
                     f"{name!r} is an {other} of {self.base.name} and cannot become an {direction}",
                     port.position,
-                    f"{self.base.name} declares it at {_at(crossed.position)}",
+                    f"{self.base.name} declares it at {crossed.position}",
                 )
                 continue
             ports[name] = port if old is None else replace(port, type=port.type or old.type, doc=port.doc or old.doc)
@@ -239,7 +235,3 @@ def _head(text: Text | PointcutText) -> str:
     """The actor that an endpoint or pointcut names first; nothing for an own port."""
     first, dot, _ = text.text.partition(".")
     return first.partition("[")[0] if dot or isinstance(text, PointcutText) else ""
-
-
-def _at(position: Position) -> str:
-    return f"{position.file}:{position.line}:{position.column}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from keyword import iskeyword, kwlist
 from typing import Any
 
-from epicycle.actors import Actor, Parameter, ParameterError, UnitError, declared_parameters, parse_unit
+from epicycle.actors import Actor, Parameter, UnitError, declared_parameters, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
@@ -40,6 +40,7 @@ from .fields import (
     named,
     names_of,
     node_as,
+    number,
     one_or_more,
     ref,
 )
@@ -89,14 +90,6 @@ def _port(reader: NodeReader, name: str, entry: Entry) -> PortText:
     return PortText(name, entry.key.position, **said)
 
 
-def _bound(reader: NodeReader, node: Node, what: str) -> float | None:
-    try:
-        return Parameter(float).convert(node.value if isinstance(node, Scalar) else "")
-    except ParameterError as error:
-        reader.problems.add(f"{what}: {error}", node.position)
-        return None
-
-
 def _unit(reader: NodeReader, node: Node, what: str) -> str | None:
     unit = reader.text(node, f"unit of {what}")
     try:
@@ -115,15 +108,14 @@ def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...]:
     return found
 
 
-_BOUND = Shape({"type": "number"}, _bound)
 _OF_PARAMETER = "{key} of {what}"
 PARAMETER = Construct(
     "",
     {
         "value": Key(node_as({}), "The default; without one, a value must be given."),
         "unit": Key(Shape(ref("text"), _unit), "What numbers count in, such as m/s; 1 for a pure number.", "{what}"),
-        "min": Key(_BOUND, "The smallest value.", _OF_PARAMETER),
-        "max": Key(_BOUND, "The greatest value.", _OF_PARAMETER),
+        "min": Key(number(float), "The smallest value.", _OF_PARAMETER),
+        "max": Key(number(float), "The greatest value.", _OF_PARAMETER),
         "choices": Key(Shape(one_or_more(LABEL), _choices), "The texts to choose from.", "{what}"),
         "doc": Key(TEXT, "What it is.", _OF_PARAMETER),
     },

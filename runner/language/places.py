@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..text import Mapping, Node, NodeReader, Scalar, Text, inside, split
+from ..text import Mapping, Node, NodeReader, Scalar, Sequence, Text, inside, split
 from .declarations import ConnectionText, PointcutText
 from .fields import (
     AT,
@@ -16,7 +16,6 @@ from .fields import (
     Schema,
     Shape,
     computed,
-    items_of,
     looks_like,
     node_as,
     one_or_more,
@@ -28,11 +27,11 @@ _INDEX = rf"\s*(\*|{_BOUND}|{_BOUND}?\s*\.\.\s*{_BOUND}?)\s*"
 _ENDPOINT = rf"({NAME}(\[{_INDEX}(,{_INDEX})*\])?\.)?{NAME}"
 _LIST = rf"[\s,]*{_ENDPOINT}(\s*,[\s,]*{_ENDPOINT})*[\s,]*"
 _SIDE = rf"(\s*\[{_LIST}\]\s*|{_LIST})"
-CONNECTION = f"^{_SIDE}(->|=>){_SIDE}$"
+CONNECTION_TEXT = f"^{_SIDE}(->|=>){_SIDE}$"
 _SEGMENT = rf"(\*\*|(\*|{NAME})(\[(\*|[0-9]{{1,9}})\])?)"
 _PATH = rf"{_SEGMENT}(\.{_SEGMENT})*"
 PATTERN = f"^{_PATH}$"
-POINTCUT = rf"^\s*!?\s*{_PATH}(\s*->\s*{_PATH})?\s*$"
+POINTCUT_TEXT = rf"^\s*!?\s*{_PATH}(\s*->\s*{_PATH})?\s*$"
 
 PORT_SCHEMA: Schema = {
     "type": "string",
@@ -51,7 +50,7 @@ PATTERN_SCHEMA: Schema = {
 _POINTCUT_SCHEMA: Schema = {
     "type": "string",
     **looks_like(
-        POINTCUT, "expected ports or actors as a pattern, a connection 'a.out -> b.in', or one of these after a !"
+        POINTCUT_TEXT, "expected ports or actors as a pattern, a connection 'a.out -> b.in', or one of these after a !"
     ),
 }
 
@@ -59,7 +58,7 @@ _POINTCUT_SCHEMA: Schema = {
 # -- connections --------------------------------------------------------------------------------------------------
 
 _ENDS = TEXTS.described(ref("ports"))
-_CONNECTION = Construct(
+CONNECTION = Construct(
     "From ports, to ports.",
     {
         "from": Key(_ENDS, "The sending ports.", name="sources"),
@@ -93,11 +92,11 @@ def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText
             "write 'actor.port -> actor.port' or {from: ..., to: ..., delay: ...}",
         )
         return None
-    entries = _CONNECTION.entries(reader, node, "a connection") or {}
+    entries = CONNECTION.entries(reader, node, "a connection") or {}
     before = len(problems)
-    said = _CONNECTION.values(reader, entries, "a connection", node.position)
+    said = CONNECTION.values(reader, entries, "a connection", node.position)
     for key in ("from", "to"):
-        if not said.setdefault(_CONNECTION.keys[key].name, ()) and len(problems) == before:
+        if not said.setdefault(CONNECTION.keys[key].name, ()) and len(problems) == before:
             problems.add(f"the connection has no {key!r}", node.position)
     is_whole = said["sources"] and said["destinations"]
     return ConnectionText(position=node.position, **said) if is_whole else None
@@ -134,7 +133,7 @@ def _endpoints(node: Scalar, text: str, start: int, end: int) -> tuple[Text, ...
 
 def connection_schema() -> Schema:
     """What editors know of one entry of ``connections``."""
-    declared = _CONNECTION.schema
+    declared = CONNECTION.schema
     removal = {"description": "A connection of the extended class to do without.", "$ref": "#/$defs/connection"}
     return {
         **declared,
@@ -143,14 +142,14 @@ def connection_schema() -> Schema:
         "if": {"type": "object", "required": ["remove"]},
         "then": {"maxProperties": 1},
         "else": {"required": ["from", "to"]},
-        **looks_like(CONNECTION, "expected 'actor.port -> actor.port', with => for all to all"),
+        **looks_like(CONNECTION_TEXT, "expected 'actor.port -> actor.port', with => for all to all"),
     }
 
 
 # -- pointcuts ----------------------------------------------------------------------------------------------------
 
 _OF_POINTCUT = "{key} of a pointcut"
-_POINTCUT = Construct(
+POINTCUT = Construct(
     "",
     {
         "at": Key(
@@ -170,12 +169,12 @@ _POINTCUT = Construct(
 def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText, ...]:
     """A pattern, ``!pattern``, ``{at: ...}``, ``{type: ..., port: ...}`` or ``{tag: ...}``, or a list of these."""
     found = []
-    for item in items_of(node):
+    for item in node.items if isinstance(node, Sequence) else (node,):
         if not isinstance(item, Mapping):
             found += [PointcutText.of(text) for text in reader.texts(item, what)]
             continue
-        entries = _POINTCUT.entries(reader, item, "a pointcut") or {}
-        said = _POINTCUT.values(reader, entries, "a pointcut", item.position)
+        entries = POINTCUT.entries(reader, item, "a pointcut") or {}
+        said = POINTCUT.values(reader, entries, "a pointcut", item.position)
         at = said.pop("at", None)
         where = PointcutText("", item.position) if at is None else PointcutText.of(at)
         if sum(key in entries for key in ("at", "type", "tag")) != 1 or (at is not None and "port" in said):
@@ -189,7 +188,7 @@ def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText, 
     return tuple(found)
 
 
-POINTCUTS_SCHEMA = one_or_more({"anyOf": [_POINTCUT_SCHEMA, _POINTCUT.schema]})
+POINTCUTS_SCHEMA = one_or_more({"anyOf": [_POINTCUT_SCHEMA, POINTCUT.schema]})
 PATTERNS = node_as(ref("patterns"))
 POINTCUTS = Shape(ref("pointcuts"), pointcuts)
 CONNECTIONS = Shape(

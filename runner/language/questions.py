@@ -1,109 +1,28 @@
-"""What a study asks of its results: claims and a guideline, read with positions and checked against the study."""
+"""The keys of claims and of a guideline, and what reads them, and checks them against the study."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..catalogue import find, is_path, packaged_studies, unreadable
+from ..catalogue import packaged_studies
 from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence, Text, did_you_mean, inside, parse
 from ..text import Mapping as MappingNode
+from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
 from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, names_of, node_as, number, ref
+from .files import named_file
 
 if TYPE_CHECKING:
     from .study import Study
 
-LESS, GREATER, RISES, FALLS, ALWAYS = "less", "greater", "rises", "falls", "always"
-FORMS = {
-    LESS: ("at", "than", "where", "share"),
-    GREATER: ("at", "than", "where", "share"),
-    RISES: ("over", "per", "where"),
-    FALLS: ("over", "per", "where"),
-    ALWAYS: ("where", "share"),
-}
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which look at all of them
-
-Selection = dict[str, tuple[Factor, ...]]  # levels by factor
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One hypothesis on the results of a study; see docs/studies.md for what each form says.
-
-    ``form`` is a key of ``FORMS``.  ``metrics`` are the names that it is about; for ``always``, those of ``condition``.
-    """
-
-    name: str
-    form: str
-    metrics: tuple[Text, ...]
-    position: Position
-    doc: str = ""
-    condition: str = ""
-    at: Selection = field(default_factory=dict)
-    than: Selection | None = None  # None: all other levels
-    over: str = ""
-    per: str = ""
-    where: Selection = field(default_factory=dict)
-    share: float = 1.0
-
-    @property
-    def statement(self) -> str:
-        """The hypothesis in words."""
-        where = f", where {_shown(self.where)}" if self.where else ""
-        share = f" in at least {self.share:.0%} of all cases" if self.share < 1 else ""
-        if self.form == ALWAYS:
-            often = "holds in every run" if self.share == 1 else f"holds in at least {self.share:.0%} of the runs"
-            return f"{self.condition} {often}{where}"
-        metrics = " and ".join(metric.text for metric in self.metrics)
-        if self.form in (RISES, FALLS):
-            what = f"the slope of {metrics} over {self.per}" if self.per else metrics
-            return f"{what} {self.form} over {self.over}{where}"
-        than = "any other level" if self.than is None else _shown(self.than)
-        return f"{metrics} is {self.form} at {_shown(self.at)} than at {than}{share}{where}"
-
-
-@dataclass(frozen=True)
-class Guideline:
-    """Which level of ``choose`` makes ``metric`` least (or ``greatest``), at every combination of the other factors.
-
-    A level is sufficient if it is not significantly worse than the best, or its mean is no more than ``tolerance`` off.
-    """
-
-    choose: str
-    metric: Text
-    greatest: bool = False
-    tolerance: float = 0.0
-
-
-@dataclass(frozen=True)
-class Questions:
-    """All that a study asks; ``apart`` are the factors for each level of which the claims are judged anew."""
-
-    claims: tuple[Claim, ...] = ()
-    guideline: Guideline | None = None
-    apart: tuple[str, ...] = ()
-    lender: tuple[str, str] | None = None  # file and text of the study whose claims these are
-
-    def check(self, metrics: Iterable[str], problems: Problems) -> None:
-        """Note metrics that the study has not."""
-        known = list(metrics)
-        asked = [(f"claim {claim.name}", metric) for claim in self.claims for metric in claim.metrics]
-        if self.guideline is not None:
-            asked.append(("guideline", self.guideline.metric))
-        for who, metric in asked:
-            if metric.text not in known:
-                problems.add(
-                    f"{who}: the study has no metric {metric.text!r}{did_you_mean(metric.text, known)}",
-                    metric.position,
-                    f"its metrics: {', '.join(known) or 'none'}",
-                )
 
 
 def without(node: Node, *keys: str) -> Node:
@@ -171,23 +90,9 @@ class QuestionReader(NodeReader):
 
     def lender(self, node: Scalar) -> tuple[str, str] | None:
         """File and text of the study that is named in the place of claims."""
-        name = node.text
-        path = find(
-            str(self.study.path.parent / name) if is_path(name) else name, "study", packaged_studies, Problems()
-        )
-        reason = unreadable(path)
-        if path is not None and reason == "":
-            return str(path), path.read_text(encoding="utf-8", errors="replace")
-        if reason:
-            self.problems.add(f"claims: the study {name!r} {reason}", node.position)
-            return None
-        known = list(packaged_studies())
-        self.problems.add(
-            f"claims: there is no study {name!r}{did_you_mean(name, known)}",
-            node.position,
-            f"packaged studies: {', '.join(known)}; a path to a file ends in .yaml",
-        )
-        return None
+        said = Text(node.text, node.position)
+        path = named_file(said, self.study.path.parent, "study", packaged_studies, self.problems, "claims: ")
+        return None if path is None else (str(path), path.read_text(encoding="utf-8", errors="replace"))
 
     def borrowed(self, node: Scalar, file: str, text: str) -> tuple[Node, Mapping[str, str]] | None:
         """The claims of another study, and what it varies."""
@@ -322,7 +227,7 @@ class QuestionReader(NodeReader):
             if is_number and math.isclose(float(each or 0), float(value or 0), rel_tol=1e-9):
                 return (each,)
         shown = node.text if isinstance(node, Scalar) else "what stands here"
-        texts = [_level(each) for each in known]
+        texts = [shown_level(each) for each in known]
         guess = did_you_mean(shown, texts) if self.kinds[factor] == "text" else ""
         self.problems.add(
             f"{what}: the study has no level {shown} of {factor}{guess}",
@@ -408,18 +313,6 @@ class QuestionReader(NodeReader):
         if len(self.problems) > before:
             return None
         return Guideline(said["choose"], said[aims[0]], aims[0] == "greatest", said.get("tolerance", 0.0))
-
-
-def _level(value: Factor) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _shown(selection: Selection) -> str:
-    parts = []
-    for factor, levels in selection.items():
-        shown = [_level(each) for each in levels]
-        parts.append(f"{factor}={shown[0]}" if len(shown) == 1 else f"{factor}={', '.join(shown[:-1])} or {shown[-1]}")
-    return " and ".join(parts)
 
 
 _METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})

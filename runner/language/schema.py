@@ -15,14 +15,48 @@ from epicycle.aspects import FiringTimeParameter
 
 from ..catalogue import Catalogue, doc_of, first_sentence, parts_of
 from .disturbance import DISTURBANCE
-from .fields import EXPRESSION, LABEL, NAME, Schema, looks_like, one_or_more, ref
-from .models import BESIDE, DIRECTOR, LIBRARY, METRIC, MODEL, PARAMETER, PORT, RESERVED, RUN, composite_schema
+from .fields import EXPRESSION, LABEL, NAME, Construct, Schema, looks_like, one_or_more, ref
+from .models import (
+    BESIDE,
+    COMPOSITE,
+    DIRECTOR,
+    LIBRARY,
+    METRIC,
+    MODEL,
+    PARAMETER,
+    PORT,
+    RESERVED,
+    RUN,
+    composite_schema,
+)
 from .parameter_schema import about, part_name, schema_of
-from .places import PATTERN_SCHEMA, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
-from .questions import CLAIM
-from .study import STUDY
-from .variation import dimension_schema
+from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
+from .questions import CLAIM, GUIDELINE
+from .study import METRIC as METRIC_OF_STUDY
+from .study import STUDY, UNTIL
+from .variation import HYPERCUBE, RANGE, dimension_schema
 
+# What has keys of its own, for a reference.
+CONSTRUCTS = {
+    "A model": MODEL,
+    "A file of composite classes": LIBRARY,
+    "A composite class": COMPOSITE,
+    "A parameter": PARAMETER,
+    "A port of a composite": PORT,
+    "A director": DIRECTOR,
+    "A connection": CONNECTION,
+    "A pointcut": POINTCUT,
+    "Beside the parameters of an actor or aspect": Construct("", BESIDE),
+    "A run": RUN,
+    "A disturbance": DISTURBANCE,
+    "A study": STUDY,
+    "A range": RANGE,
+    "A Latin hypercube": HYPERCUBE,
+    "A metric of a study": METRIC_OF_STUDY,
+    "Until": UNTIL,
+    "A claim": CLAIM,
+    "A guideline": GUIDELINE,
+}
 _OTHER_TYPE = f"^{NAME}(\\.{NAME})?$"  # a composite, or a type of another package
 
 

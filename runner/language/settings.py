@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..text import (
+    COMMAND_LINE,
     NAME,
     NAMES_HAVE,
     NORMAL,
@@ -22,7 +23,6 @@ from ..text import (
     Position,
     Problems,
     Scalar,
-    Sequence,
     Text,
     check_pattern,
     did_you_mean,
@@ -38,18 +38,13 @@ from .declarations import ModelText, PartText, PointcutText
 from .fields import Shape
 
 
-@dataclass
+@dataclass(frozen=True)
 class Setting:
     """A value for every parameter whose path matches a pattern."""
 
     path: str
     node: Node
     position: Position
-    used: bool = False
-
-    def matches(self, full: str) -> bool:
-        """Whether the setting is for the parameter at this path."""
-        return matches(self.path, full)
 
 
 class Settings:
@@ -57,6 +52,7 @@ class Settings:
 
     def __init__(self, settings: Iterable[Setting] = (), limits: Limits = NORMAL) -> None:
         self._all = list(settings)
+        self._used: set[int] = set()
         # An overrides file may name thousands of paths: only patterns are tried one after the other, and of these only
         # those that ask for a name that the path has, the one that fewest paths will have.
         self._exact: dict[str, list[int]] = {}
@@ -76,9 +72,8 @@ class Settings:
         if self._patterns:
             likely = [number for name in ("", *names_of(full)) for number in self._patterns.get(name, ())]
             self._comparisons.spend(len(likely))
-            found = found + [number for number in likely if self._all[number].matches(full)]
-        for number in found:
-            self._all[number].used = True
+            found = found + [number for number in likely if matches(self._all[number].path, full)]
+        self._used.update(found)
         return self._all[max(found)] if found else None
 
     @property
@@ -89,7 +84,7 @@ class Settings:
 
     def unused(self) -> list[Setting]:
         """Those that no parameter has taken."""
-        return [setting for setting in self._all if not setting.used]
+        return [setting for number, setting in enumerate(self._all) if number not in self._used]
 
 
 def read_overrides(path: Path, problems: Problems) -> list[Setting]:
@@ -143,7 +138,7 @@ def is_pattern(path: str, position: Position, problems: Problems) -> bool:
 def parse_setting(text: str, problems: Problems) -> Setting | None:
     """``path=value``, where value is a YAML value such as ``3``, ``5 m`` or ``[0, 1]``."""
     option = f"--set {text}"
-    position = Position("command line", 1, 7, max(1, len(text)), option)
+    position = _in_option(option, 6)
     path, equals, value = text.partition("=")
     path = path.strip()
     if not equals or not path:
@@ -155,60 +150,46 @@ def parse_setting(text: str, problems: Problems) -> Setting | None:
     return None if node is None else Setting(path, node, position)
 
 
+def _in_option(option: str, start: int, length: int | None = None) -> Position:
+    """A place on the command line: what stands in an option from ``start`` on."""
+    return Position(COMMAND_LINE, 1, start + 1, max(1, len(option) - start if length is None else length), option)
+
+
 def _value(text: str, option: str, offset: int, problems: Problems) -> Node | None:
     """The YAML value that stands in an option from ``offset`` on."""
     if not text.strip():
-        return Scalar(None, "", True, Position("command line", 1, 1, len(option), option))
+        return Scalar(None, "", True, _in_option(option, 0))
     if len(option.splitlines()) > 1:  # lines and columns are those of the value, then
-        return parse(text, "command line", problems)
-    found = Problems()
-    node = parse(" " * offset + text, "command line", found)
-    for problem in found.found:
-        position = None if problem.position is None else replace(problem.position, source=option)
-        problems.add(problem.message, position, *problem.help)
-    return None if node is None else _within(node, option)
+        return parse(text, COMMAND_LINE, problems)
+    return parse(" " * offset + text, COMMAND_LINE, problems, option)
 
 
-def _within(node: Node, option: str) -> Node:
-    """The node with the option as the line in which it stands."""
-    position = replace(node.position, source=option)
-    if isinstance(node, Sequence):
-        return Sequence(tuple(_within(item, option) for item in node.items), position)
-    if isinstance(node, Mapping):
-        entries = {
-            key: Entry(
-                replace(entry.key, position=replace(entry.key.position, source=option)), _within(entry.value, option)
-            )
-            for key, entry in node.entries.items()
-        }
-        return Mapping(entries, position)
-    return replace(node, position=position)
-
-
-def without(text: ModelText, name: str, problems: Problems) -> None:
-    """Take an aspect out of a model."""
-    if text.root.aspects.pop(name, None) is None:
-        option = f"--without {name}"
+def without(text: ModelText, name: str, problems: Problems) -> ModelText:
+    """The model without one of its aspects."""
+    aspects = text.root.aspects
+    if name not in aspects:
         problems.add(
-            f"the model has no aspect {name!r}{did_you_mean(name, list(text.root.aspects))}",
-            Position("command line", 1, 11, max(1, len(name)), option),
-            f"its aspects: {', '.join(text.root.aspects) or 'none'}",
+            f"the model has no aspect {name!r}{did_you_mean(name, list(aspects))}",
+            _in_option(f"--without {name}", 10),
+            f"its aspects: {', '.join(aspects) or 'none'}",
         )
+    left = {key: part for key, part in aspects.items() if key != name}
+    return replace(text, root=replace(text.root, aspects=left))
 
 
-def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
-    """``name=Type,key=value,...``: add an aspect, or put another in the place of one that is there.
+def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText:
+    """``name=Type,key=value,...``: the model with one more aspect, or another in the place of one that is there.
 
     What an aspect that is replaced leaves to the new one, ``put_aspect`` says.
     """
     option = f"--aspect {change}"
-    position = Position("command line", 1, 10, max(1, len(change)), option)
+    position = _in_option(option, 9)
     name, equals, rest = change.partition("=")
     places = split(rest, ",")
     parts = [rest[start:end].strip() for start, end in places]
     if not equals or not name.strip() or not parts or not parts[0]:
         problems.add(f"{change!r} is not of the form name=Type,key=value", position)
-        return
+        return text
     name = name.strip()
     values: dict[str, Entry] = {}
     at: tuple[PointcutText, ...] | None = None
@@ -217,24 +198,24 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> None:
         key = key.strip()
         if not equals or not key:
             problems.add(f"{part!r} is not of the form key=value", position)
-            return
+            return text
         stop = len(option) - len(rest) + end
         if key == "at":
             at = _pointcuts(value, option, stop - len(value))
             continue
-        node = _value(value, option[:stop], stop - len(value), problems)
+        node = _value(value, option, stop - len(value), problems)
         if node is None:
-            return
-        values[key] = Entry(Scalar(key, key, True, position), _within(node, option))
+            return text
+        values[key] = Entry(Scalar(key, key, True, position), node)
     if not NAME.match(name):
         problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
-        return
+        return text
     enabled = values.pop("enabled").value if "enabled" in values else None
-    put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or (), enabled))
+    return put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or (), enabled))
 
 
-def put_aspect(text: ModelText, part: PartText) -> None:
-    """Add an aspect to a model, or put it in the place of the one of its name.
+def put_aspect(text: ModelText, part: PartText) -> ModelText:
+    """The model with one more aspect, or with another in the place of the one of its name.
 
     The one that goes leaves its ports unless the new one has its own, and its parameters if the type stays the same.
     """
@@ -242,7 +223,7 @@ def put_aspect(text: ModelText, part: PartText) -> None:
     if old is not None:
         values = {**old.values, **part.values} if old.type.text == part.type.text else part.values
         part = replace(part, at=part.at or old.at, values=values)
-    text.root.aspects[part.name] = part
+    return replace(text, root=replace(text.root, aspects={**text.root.aspects, part.name: part}))
 
 
 def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]:
@@ -252,6 +233,6 @@ def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]
     found = []
     for start, end in split(value, ","):
         text = value[start:end].strip(" '\"")
-        column = offset + start + value[start:end].find(text) + 1
-        found.append(PointcutText.of(Text(text, Position("command line", 1, column, max(1, len(text)), option))))
+        at = offset + start + value[start:end].find(text)
+        found.append(PointcutText.of(Text(text, _in_option(option, at, len(text)))))
     return tuple(found)

@@ -7,14 +7,23 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..catalogue import find, is_path, packaged_disturbances, packaged_models, packaged_studies, unreadable
+from ..catalogue import (
+    find,
+    is_path,
+    packaged_disturbances,
+    packaged_models,
+    packaged_ones,
+    packaged_studies,
+    unreadable,
+)
 from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Problems, Scalar, did_you_mean, parse, read
+from .claims import Questions
 from .declarations import PartText
 from .dimensions import Dimension, Level, Listed
-from .disturbance import find_disturbance
 from .fields import FLAG, LABEL, NAMED, TEXT, Construct, Key, Shape, names_of, node_as, number, one_or_more, ref
+from .files import named_file
 from .models import parts
-from .questions import CLAIMS, GUIDELINE, QuestionReader, Questions, without
+from .questions import CLAIMS, GUIDELINE, QuestionReader, without
 from .settings import Setting, parse_setting, settings_like
 from .study_metric import StudyMetric, checked_metric
 from .variation import DIMENSIONS
@@ -93,8 +102,8 @@ def read_study(
     problems.raise_if_any()
     assert path is not None
     assert node is not None
-    text = path.read_text(encoding="utf-8")
-    return _made(node, _StudyReader(problems, path), text, tuple(set), tuple(types), replications, seed)
+    reader = _StudyReader(problems, path)
+    return _made(node, reader, path.read_text(encoding="utf-8"), set, types, replications, seed)
 
 
 def study_of_text(
@@ -112,19 +121,18 @@ def study_of_text(
     """
     problems = Problems()
     node = parse(text, str(path), problems)
-    if node is None:
-        problems.raise_if_any()
-        raise AssertionError("a text that cannot be read is a problem")
+    problems.raise_if_any()
+    assert node is not None, "a text that cannot be read is a problem"
     reader = _StudyReader(problems, path, lender, asks_for_files=False)
-    return _made(node, reader, text, tuple(set), tuple(types), replications, seed)
+    return _made(node, reader, text, set, types, replications, seed)
 
 
 def _made(
     node: Node,
     reader: _StudyReader,
     text: str,
-    changes: tuple[str, ...],
-    types: tuple[Path, ...],
+    set: Iterable[str],
+    types: Iterable[Path],
     replications: int | None,
     seed: int | None,
 ) -> Study:
@@ -132,22 +140,21 @@ def _made(
     study = reader.study(node, text)
     problems.raise_if_any()
     assert study is not None, "what is no study is a problem"
-    fixed = list(study.fixed)
-    for change in changes:
-        setting = parse_setting(change, problems)
-        if setting is None:
-            continue
+    changes = tuple(set)
+    settings = [setting for change in changes if (setting := parse_setting(change, problems)) is not None]
+    for setting in settings:
         if setting.path in study.factors:
-            problems.add(f"--set {change}: {setting.path} is what the study varies", None, "change it in the study")
-        fixed.append(setting)
+            problems.add(
+                f"{setting.position.source}: {setting.path} is what the study varies", None, "change it in the study"
+            )
     problems.raise_if_any()
     return replace(
         study,
         replications=study.replications if replications is None else replications,
         seed=study.seed if seed is None else seed,
-        fixed=tuple(fixed),
+        fixed=(*study.fixed, *settings),
         changes=changes,
-        types=types,
+        types=tuple(types),
     )
 
 
@@ -217,7 +224,7 @@ class _StudyReader(NodeReader):
             self.problems.add(
                 f"there is no packaged model {name!r}{did_you_mean(name, known)}",
                 node.position,
-                f"packaged models: {', '.join(known)}; a path to a file ends in .yaml",
+                packaged_ones("model", known),
             )
         return name
 
@@ -230,22 +237,10 @@ class _StudyReader(NodeReader):
             variants = {Path(text.text).stem: [text] for text in texts}
         levels = []
         for variant, texts in variants.items():
-            names = []
-            for text in texts:
-                name = str(self.path.parent / text.text) if is_path(text.text) else text.text
-                found = Problems()
-                file = find_disturbance(name, found)
-                reason = unreadable(file) if self.asks_for_files else ""
-                if reason:
-                    self.problems.add(f"the disturbance {text.text!r} {reason}", text.position)
-                elif reason is None:
-                    known = list(packaged_disturbances())
-                    self.problems.add(
-                        f"there is no disturbance {text.text!r}{did_you_mean(text.text, known)}",
-                        text.position,
-                        f"packaged disturbances: {', '.join(known)}; a path to a file ends in .yaml",
-                    )
-                names.append(name)
+            if self.asks_for_files:
+                for text in texts:
+                    named_file(text, self.path.parent, "disturbance", packaged_disturbances, self.problems)
+            names = [str(self.path.parent / each.text) if is_path(each.text) else each.text for each in texts]
             levels.append(Level((), {"disturb": variant}, tuple(names)))
         return [Listed(what, node.position, {"disturb": "text"}, levels)] if levels else []
 

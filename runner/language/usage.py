@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 
 from epicycle.actors import Actor, declared_parameters
 from epicycle.actors.expression import ExpressionError, names_in
 
 from ..catalogue import CatalogueError
-from ..text import Entry, Node, Problems, Scalar, Sequence, nearest
+from ..text import Entry, Node, Position, Problems, Scalar, Sequence, Text, nearest
+from ..text import Mapping as MappingNode
 from .declarations import CompositeText, ModelText, PartText
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
@@ -39,10 +41,7 @@ def check_usage(
         if not composite.spoilt:
             _add_unused(composite, declared[name].parameters, used[name], composites, actor_types, problems)
     if not text.root.spoilt:
-        around = (entry.value for entry in text.run.values())
-        figures = (entry.value for part in text.figures.values() for entry in part.values.values())
-        metrics = (entry.value for metric in text.metrics for entry in metric.values.values())
-        names = _names([*_nodes(text.root), *around, *metrics, *figures])
+        names = _names(_nodes((text.root, text.run, text.metrics, text.figures)))
         _add_unused(text.root, text.root.parameters, names, composites, actor_types, problems)
 
 
@@ -89,25 +88,23 @@ def _parameters(
         return ()
 
 
-def _nodes(composite: CompositeText) -> Iterator[Node]:
-    """Every node in which an expression may stand."""
-    for parameter in composite.parameters.values():
-        if parameter.value is not None:
-            yield parameter.value
-    yield from _values(composite.director or {})
-    for part in (*composite.actors.values(), *composite.aspects.values()):
-        yield from _values(part.values)
-        yield from (node for node in (part.count, part.priority, part.enabled) if node is not None)
-    for connection in composite.connections:
-        if connection.delay is not None:
-            yield connection.delay
-        for end in (*connection.sources, *connection.destinations):
-            if "${" in end.text:
-                yield Scalar(end.text, end.text, True, end.position)
-
-
-def _values(entries: Mapping[str, Entry]) -> Iterator[Node]:
-    return (entry.value for entry in entries.values())
+def _nodes(part: object) -> Iterator[Node]:
+    """Every node in which an expression may stand, of what has been declared."""
+    waiting = [part]
+    while waiting:
+        match waiting.pop():
+            case Scalar() | Sequence() | MappingNode() as node:
+                yield node
+            case Text(text, position) if "${" in text:
+                yield Scalar(text, text, True, position)
+            case Entry(_, value):
+                yield value
+            case Mapping() as parts:
+                waiting += parts.values()
+            case tuple() as parts:
+                waiting += parts
+            case declared if is_dataclass(declared) and not isinstance(declared, (Position, Text)):
+                waiting += (getattr(declared, each.name) for each in fields(declared))
 
 
 def _names(nodes: Iterable[Node]) -> frozenset[str]:
@@ -123,5 +120,5 @@ def _names(nodes: Iterable[Node]) -> frozenset[str]:
                 except ExpressionError:
                     found |= set(_WORD.findall(node.value))  # what it would ask for, were it right
         else:
-            waiting += node.items if isinstance(node, Sequence) else _values(node.entries)
+            waiting += node.items if isinstance(node, Sequence) else (each.value for each in node.entries.values())
     return frozenset(found)

@@ -69,11 +69,10 @@ class DimensionReader(NodeReader):
             pairs = list(zip(items, nodes, strict=True))
             values = {path: as_factor(node, kinds[path]) for path, node in pairs}
             if (first := seen.setdefault(repr(values), nodes[0])) is not nodes[0]:
-                at = first.position
                 self.problems.add(
                     f"{name!r} takes the same value twice",
                     nodes[0].position,
-                    f"first at {at.file}:{at.line}:{at.column}",
+                    f"first at {first.position}",
                 )
             levels.append(Level(tuple(Setting(path, node, keys[path]) for path, node in pairs), values))
         return Listed(name, position, kinds, levels)

@@ -1,9 +1,10 @@
 """What people see: of a run summary, figures, results folder; of what is installed, the reference."""
 
-from .drawing import FigureError, draw, figures_of
-from .figures import Figure, Histogram, TimeSeries, Trajectories
+from ..catalogue import Figure
+from .drawing import FigureError, draw
+from .figures import Histogram, TimeSeries, Trajectories
 from .folder import check_folder, draw_figures, write_folder
-from .reference import aspects_at, described, detail, figure_types, markdown, overview, parts_described, weaving
+from .reference import aspects_at, described, detail, markdown, overview, parts_described, weaving
 from .summary import summary_object, summary_table
 
 __all__ = [
@@ -18,8 +19,6 @@ __all__ = [
     "detail",
     "draw",
     "draw_figures",
-    "figure_types",
-    "figures_of",
     "markdown",
     "overview",
     "parts_described",

@@ -1,31 +1,15 @@
-"""From a ``figures`` section to figures that can be drawn, and to what is drawn."""
+"""From a figure to what is drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from collections.abc import Mapping as AnyMapping
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
-from epicycle.actors import (
-    Configurable,
-    EpicycleError,
-    ParameterError,
-    declared_parameters,
-    readable,
-    unknown_parameter,
-    variants,
-)
+from epicycle.actors import EpicycleError, readable
 
-from ..engine import Results
-from ..model import Model, describe, place_of, raised_at
-from ..text import Mapping, PatternError, Position, Problems, Sequence, did_you_mean, plain, select, told_raised
-from .figures import Figure
+from ..catalogue import Figure
+from ..results import Results
+from ..text import Position, describe, raised_at, told_raised
 from .pen import style
-
-T = TypeVar("T", bound=Configurable)
 
 
 class FigureError(EpicycleError):
@@ -49,114 +33,3 @@ def draw(name: str, figure: Figure, results: Results, path: Path) -> None:
             figure.draw(results, path)
     except Exception as error:
         raise FigureError(name, describe(error), raised_at(error)) from error
-
-
-@dataclass(frozen=True)
-class Complaint:
-    """What is wrong with a figure: a parameter (any, if empty) and the ``key`` in it, what is said, and what to do."""
-
-    parameter: str
-    message: str
-    help: str = ""
-    key: str = ""
-
-
-def tell(complaint: Complaint, name: str, written: Mapping, problems: Problems) -> None:
-    """Add a complaint to the problems, at the place of what it is about."""
-    problems.add(
-        f"figure {name}: {complaint.message}", place(complaint, written), *([complaint.help] if complaint.help else [])
-    )
-
-
-def place(complaint: Complaint, written: Mapping) -> Position:
-    """Where the value stands, or the one name in it."""
-    entry = written.entries.get(complaint.parameter)
-    for each in [entry] if entry is not None else [] if complaint.parameter else written.entries.values():
-        if isinstance(each.value, Mapping) and complaint.key in each.value.entries:
-            return each.value.entries[complaint.key].key.position
-        for item in each.value.items if isinstance(each.value, Sequence) else [each.value]:
-            if complaint.key and plain(item) == complaint.key:
-                return item.position
-    return written.position if entry is None else entry.value.position
-
-
-def made(
-    name: str,
-    known: AnyMapping[str, type[T]],
-    declared: tuple[str, AnyMapping[str, object], Mapping],
-    problems: Problems,
-    *,
-    of_study: bool = False,
-) -> T | None:
-    """The figure that is declared by a type, values, and the same as written; None, and problems, if it cannot be."""
-    type_name, values, written = declared
-    cls, before = known.get(type_name), len(problems)
-    if cls is None:
-        problems.add(
-            f"figure {name}: there is no figure {'of a study of type' if of_study else 'type'} {type_name!r}"
-            f"{did_you_mean(type_name, list(known))}",
-            written.position,
-            f"valid types: {', '.join(sorted(known))}",
-        )
-        return None
-    parameters, owner = declared_parameters(cls), "" if of_study else f"{cls.__name__}."
-    for key, value in values.items():
-        if key not in parameters:
-            place = place_of(written, (key,), of_key=True)
-            valid = f"valid parameters: {', '.join(parameters)}"
-            problems.add(f"figure {name}: {unknown_parameter(cls, key)}", place, valid)
-            continue
-        try:
-            parameters[key].convert(value)
-        except ParameterError as error:
-            place = place_of(written, (key, *error.keys), of_key=error.of_key)
-            problems.add(f"figure {name}: {owner}{key}: {error}", place)
-    for key, parameter in parameters.items():
-        if parameter.required and key not in values and values.keys() <= parameters.keys():
-            advice = [parameter.doc] if of_study else []
-            problems.add(f"figure {name}: {cls.__name__} needs a value for {key!r}", written.position, *advice)
-    figure = None
-    if len(problems) == before:
-        with _blamed(name, written, problems):
-            figure = cls(**values)
-    return figure
-
-
-@contextmanager
-def _blamed(name: str, written: Mapping, problems: Problems) -> Iterator[None]:
-    """Add what a figure's class raises to the problems."""
-    try:
-        yield
-    except ParameterError as error:
-        problems.add(f"figure {name}: {error}", place_of(written, error.keys, of_key=error.of_key))
-    except PatternError as error:
-        problems.add(f"figure {name}: {error}", written.position)
-    except Exception as error:  # of a user's
-        problems.add(f"figure {name}: {describe(error)}", written.position, raised=raised_at(error), cause=error)
-
-
-def figures_of(model: Model, problems: Problems, recorded: Collection[str] | None = None) -> dict[str, Figure]:
-    """The figures of a model by name; what is wrong with them is added to ``problems``.
-
-    ``recorded``: the ports of which a run keeps the signals, if not those that the model names.
-    """
-    # If something else is wrong, a signal may not be recorded because of that.
-    kept = None if len(problems) else model.recorded if recorded is None else recorded
-    known: dict[str, type[Figure]] = variants(Figure)
-    found: dict[str, Figure] = {}
-    for name, declared in model.figures.items():
-        figure = made(name, known, declared, problems)
-        if figure is not None:
-            with _blamed(name, declared[2], problems):
-                for complaint in _unrecorded(figure, kept):
-                    tell(complaint, name, declared[2], problems)
-                found[name] = figure
-    return found
-
-
-def _unrecorded(figure: Figure, recorded: Collection[str] | None) -> Iterator[Complaint]:
-    """Complaints about the signals that are not there; a pattern over an array may rightly select nothing."""
-    for pattern in figure.signal_patterns():
-        if recorded is not None and not select(pattern, recorded) and "*" not in pattern:
-            message = f"{pattern!r} is not recorded{did_you_mean(pattern, list(recorded))}"
-            yield Complaint("", message, "add it to 'record' in the run section", pattern)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import Configurable, EpicycleError, Parameter, array_parameter, texts_parameter
+from epicycle.actors import EpicycleError, Parameter, array_parameter, texts_parameter
 from epicycle.aspects import STAMP
 
-from ..engine import Results, Signal, cell, leaves
+from ..catalogue import Figure
+from ..results import Results, Signal, cell, leaves
 from ..shown import short
 from ..text import select
 from .pen import LIMIT, PALETTE, Sheet, legend_beside
@@ -22,20 +23,6 @@ MAX_STATES = 24  # in a legend
 
 Numbers: TypeAlias = dict[str, tuple["array[float]", "array[float]"]]  # times and values
 States: TypeAlias = dict[str, tuple["array[float]", list[str | None]]]  # times and names
-
-
-class Figure(Configurable):
-    """Base of the figures: declare parameters, write ``draw``."""
-
-    reserved: ClassVar[frozenset[str]] = frozenset({"type"})
-
-    def signal_patterns(self) -> tuple[str, ...]:
-        """The signals that the figure reads, as patterns; each must be recorded."""
-        raise NotImplementedError
-
-    def draw(self, results: Results, path: Path) -> None:
-        """Draw the figure into a file, whose ending decides the format."""
-        raise NotImplementedError
 
 
 class Trajectories(Figure):

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from epicycle.actors import EpicycleError, abridged, read_regular
 
+from ..catalogue import Figure
 from ..provenance import versions
 from ..results import Results, write_signals
 from .drawing import FigureError, draw
-from .figures import Figure
 from .summary import summary_object
 
 MAX_NAME = 60  # letters of a file's name, which file systems bound

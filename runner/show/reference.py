@@ -10,11 +10,13 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from epicycle.actors import Configurable, bounds_text, variants
+from epicycle.actors import Configurable, bounds_text
 
+from ..build import Model
 from ..catalogue import (
     TAKES,
     Catalogue,
+    Figure,
     Measure,
     ParameterReference,
     PortReference,
@@ -24,14 +26,8 @@ from ..catalogue import (
     parts_of,
     shown,
 )
-from ..model import Model
+from ..language import CONSTRUCTS
 from ..printing import columns
-from .figures import Figure
-
-
-def figure_types() -> dict[str, type[Figure]]:
-    """The figures that a model may ask for, by name."""
-    return dict(sorted(variants(Figure).items()))
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
@@ -158,6 +154,10 @@ def markdown(
     for title, types in (("Figures", figures), ("Figures of studies", study_figures)):
         lines.append(f"## {title}\n")
         lines += [block for each in described(types) for block in _markdown(each)]
+    lines.append("## Keys\n")
+    for title, construct in CONSTRUCTS.items():
+        rows = [[f"`{key}`", each.doc.replace("<", "\\<")] for key, each in construct.keys.items()]
+        lines += [f"### {title}\n", _rows(("key", "what it is"), rows)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

@@ -9,9 +9,10 @@ from rich.text import Text
 
 from epicycle.actors import shortened, visible
 
-from ..engine import Results, plain
-from ..model import Model, extent
+from ..build import Model
+from ..graph import extent
 from ..printing import columns
+from ..results import Results, plain
 from ..shown import finite, in_words
 
 WIDEST = 400  # characters of a text in the table

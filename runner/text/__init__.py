@@ -1,7 +1,8 @@
 """Positioned text: YAML as nodes that know where they stand, problems with places, and limits; it knows no language."""
 
-from .document import MAX_BYTES, Entry, Mapping, Node, Scalar, Sequence, Value, parse, plain, read
-from .files import COMMAND_LINE, Noted, data_file, note_file, note_package, noting
+from .culprit import describe, raised_at
+from .document import Entry, Mapping, Node, Scalar, Sequence, parse, plain, read
+from .files import COMMAND_LINE, Noted, data_file, note_package, noting
 from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
 from .patterns import (
     Comparisons,
@@ -11,6 +12,7 @@ from .patterns import (
     check_pattern,
     compile_pattern,
     could_be_within,
+    in_general,
     matches,
     names_asked,
     names_of,
@@ -23,17 +25,14 @@ from .problems import (
     Problem,
     Problems,
     did_you_mean,
-    marked,
     nearest,
     told_raised,
-    visible,
 )
 from .reading import NAME, NAMES_HAVE, SURE, NodeReader, Text, inside, is_empty, split, within
 from .site import call_site, entries_of, node_of
 
 __all__ = [
     "COMMAND_LINE",
-    "MAX_BYTES",
     "MAX_PROBLEMS",
     "MAX_SEED",
     "NAME",
@@ -58,31 +57,30 @@ __all__ = [
     "Sequence",
     "Text",
     "TooManyError",
-    "Value",
     "call_site",
     "check_pattern",
     "compile_pattern",
     "could_be_within",
     "data_file",
+    "describe",
     "did_you_mean",
     "entries_of",
+    "in_general",
     "inside",
     "is_empty",
-    "marked",
     "matches",
     "names_asked",
     "names_of",
     "nearest",
     "node_of",
-    "note_file",
     "note_package",
     "noting",
     "parse",
     "plain",
+    "raised_at",
     "read",
     "select",
     "split",
     "told_raised",
-    "visible",
     "within",
 ]

@@ -101,12 +101,15 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
     return parse(text, name, problems)
 
 
-def parse(text: str, name: str, problems: Problems) -> Node | None:
-    """Turn YAML text into nodes; None if nothing can be made of it. `name` is the file in messages."""
+def parse(text: str, name: str, problems: Problems, shown_as: str | None = None) -> Node | None:
+    """Turn YAML text into nodes; None if nothing can be made of it.
+
+    `name` is the file in messages, `shown_as` the line in which a text of one line stands.
+    """
     if len(text) > MAX_BYTES:
         problems.add(_too_large(name))
         return None
-    return _Builder(text.removeprefix("\ufeff"), name, problems).build()
+    return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as).build()
 
 
 def plain(node: Node) -> object:
@@ -230,11 +233,11 @@ class _Frame:
 class _Builder:
     """Builds nodes from parser events with a stack of its own, so that no depth can overflow Python's."""
 
-    def __init__(self, text: str, name: str, problems: Problems) -> None:
+    def __init__(self, text: str, name: str, problems: Problems, shown_as: str | None) -> None:
         self._text = text
         self._name = name
         self._problems = problems
-        self._lines = _LINE_BREAK.split(text)
+        self._lines = _LINE_BREAK.split(text) if shown_as is None else [shown_as]
         self._stack: list[_Frame] = []
         self._root: Node | None = None
         self._anchors: dict[str, tuple[Node, int, int] | None] = {}  # None: still open
@@ -352,7 +355,7 @@ class _Builder:
                 value = _resolve(text)
         except ValueError as error:
             self._problems.add(str(error), position)
-            self._problems.spoil(position)
+            position = dataclasses.replace(position, told=True)
         return Scalar(value, text, is_plain, position)
 
     def _tagged(self, tag: str, text: str, position: Position) -> Value:

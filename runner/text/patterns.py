@@ -44,6 +44,11 @@ class Comparisons:
             raise TooManyError(f"patterns are compared with more than {self._most:,} paths")
 
 
+def in_general(path: str) -> str:
+    """``a[*].b`` for ``a[2].b``: what holds of one instance is said of all."""
+    return _INDEX.sub("[*]", path)
+
+
 def names_asked(pattern: str) -> list[str]:
     """The segments of a pattern that a path must have, one for one: ``s[3]``, ``s[*]`` or ``s``."""
     return [segment for segment in pattern.split(".") if not segment.startswith("*")]
@@ -214,7 +219,7 @@ class PathIndex:
         start = f"{scope}." if scope else ""
         near = (path.removeprefix(start) for path in near)
         if "[*]" in pattern:
-            near = dict.fromkeys(_INDEX.sub("[*]", path) for path in near)
+            near = dict.fromkeys(map(in_general, near))
         return did_you_mean(pattern, near)
 
     def advice(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, ...]:
@@ -234,7 +239,7 @@ class PathIndex:
         if self.did_you_mean(pattern, scope, fits):
             return ()
         firsts = (path.removeprefix(start).partition(".")[0] for path in self.inside(scope) if fits(path))
-        holders = list(dict.fromkeys(_INDEX.sub("[*]", first) for first in firsts))
+        holders = list(dict.fromkeys(map(in_general, firsts)))
         if not holders:
             return ("there is no port that would do",)
         more = ", ..." if len(holders) > MAX_SHOWN else ""

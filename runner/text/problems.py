@@ -1,6 +1,5 @@
 """What is wrong with a model, said so that it can be mended: where, what, and what would be right."""
 
-import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ __all__ = ["ModelError", "Position", "Problem", "Problems", "did_you_mean", "nea
 MAX_PROBLEMS = 100
 MAX_SOURCE_WIDTH = 120
 _CUT = "..."
-_INDEX = re.compile(r"\[[0-9]+\]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +23,11 @@ class Position:
     column: int
     length: int
     source: str
+    told: bool = False  # what is wrong there has been told: what else might be said would be a consequence
+
+    def __str__(self) -> str:
+        """``file:line:column``, to say in a message where something else stands."""
+        return f"{self.file}:{self.line}:{self.column}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +71,18 @@ class ModelError(EpicycleError):
 
 
 class Problems:
-    """Collects problems, so that one run shows them all; identical ones count once, and after 100 it is enough."""
+    """Collects problems, so that one run shows them all; identical ones count once, and after 100 it is enough.
+
+    What is wrong in an array is told for the first instance: ``about`` is what a problem is about in all of them, where
+    the message names one.  A fault of a composite class is told for its first use: ``scope`` is the path of the
+    instance that has it, and what stands at one place is told for the first of them.
+    """
 
     def __init__(self) -> None:
-        # What is wrong in an array is told for the first instance; a composite class's fault, for its first use.
-        self._kept: dict[tuple[str, Position | None], Problem] = {}
-        self._warnings: dict[tuple[str, Position | None], Problem] = {}
+        self._kept: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
+        self._warnings: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
         self._unsaid = 0
-        self._spoilt: set[Position] = set()
+        self._scopes: dict[Position, str] = {}
         self._cause: BaseException | None = None  # the first exception that was not ours
         self.muted = False  # while true, problems count for len() alone: they repeat what has been said
 
@@ -96,11 +103,10 @@ class Problems:
         """What is odd but not wrong, as far as noted."""
         return tuple(self._warnings.values())
 
-    def warn(self, message: str, position: Position | None = None, *hints: str) -> None:
+    def warn(self, message: str, position: Position | None = None, *hints: str, about: tuple[str, ...] = ()) -> None:
         """Note what may be meant, but most likely is not; it does not count as a problem."""
         if len(self._warnings) < MAX_PROBLEMS:
-            key = _INDEX.sub("[]", message), position
-            self._warnings.setdefault(key, Problem(message, position, hints, "warning"))
+            self._warnings.setdefault((about or message, position), Problem(message, position, hints, "warning"))
 
     def add(
         self,
@@ -108,30 +114,25 @@ class Problems:
         position: Position | None = None,
         *hints: str,
         scope: str = "",
+        about: tuple[str, ...] = (),
         raised: Position | None = None,
         cause: BaseException | None = None,
     ) -> None:
         """Note a problem; each hint becomes a line of help.  One too many raises all that there are as a ModelError.
 
-        ``scope`` is the path, within the message, of the instance of a composite class that stands for them all.
         ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
         """
-        if self.muted or position in self._spoilt:
+        if self.muted or (position is not None and position.told):
             self._unsaid += 1
             return
-        key = (_INDEX.sub("[]", message.replace(f"{scope}.", "") if scope else message), position)
-        if key in self._kept:
+        key = about or message, position
+        if key in self._kept or (position is not None and self._scopes.setdefault(position, scope) != scope):
             return
         if len(self._kept) == MAX_PROBLEMS:
-            raise self._error(
-                more=True
-            ) from self._cause  # to find them all, and what each was meant to be, may take very long
+            # To find them all, and what each was meant to be, may take very long.
+            raise self._error(more=True) from self._cause
         self._kept[key] = Problem(message, position, hints, raised=raised)
         self._cause = self._cause or cause
-
-    def spoil(self, position: Position) -> None:
-        """Let nothing more be said of what stands there: it would only be a consequence of what has been said."""
-        self._spoilt.add(position)
 
     def raise_if_any(self) -> None:
         """Raise all problems as one ModelError, if there are any."""

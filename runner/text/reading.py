@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
@@ -105,7 +105,7 @@ def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
     start = at.column - 1 + (0 if node.plain else 1)
     if not at.source.startswith(text, start):
         return at
-    return Position(at.file, at.line, start + offset + 1, len(part), at.source)
+    return replace(at, column=start + offset + 1, length=len(part))
 
 
 def is_empty(node: Node) -> bool:
@@ -117,7 +117,7 @@ def within(text: Text, part: str) -> Position:
     """Where a part of a text stands; all of it if that cannot be seen in the file."""
     at = text.position
     start = at.source.find(part, at.column - 1)
-    return at if start < 0 else Position(at.file, at.line, start + 1, len(part), at.source)
+    return at if start < 0 else replace(at, column=start + 1, length=len(part))
 
 
 def split(text: str, sign: str) -> list[tuple[int, int]]:

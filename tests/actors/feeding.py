@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from epicycle.actors import Actor, OutputPort, Parameter
+from epicycle.runner.build import Model, load_model
 from epicycle.runner.engine import Results, Simulation
-from epicycle.runner.model import Model, load_model
 
 Events = Sequence[tuple[float, Any]]
 

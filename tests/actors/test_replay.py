@@ -10,8 +10,8 @@ import pyarrow as arrow
 import pytest
 from pyarrow import parquet
 
+from epicycle.runner.build import load_model
 from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.model import load_model
 from epicycle.runner.text import ModelError
 from tests.engine.engine_parts import sends
 

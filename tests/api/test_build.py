@@ -25,7 +25,7 @@ from epicycle.actors import (
 from epicycle.aspects import MeasurementFailure, PacketLoss
 from epicycle.runner import Model, ModelError, Results, Simulation, load_composite, load_model
 from epicycle.runner.catalogue import packaged_models
-from epicycle.runner.model import firing_order
+from epicycle.runner.graph import firing_order
 
 
 class Noisy(Actor):

@@ -20,10 +20,10 @@ from pathlib import Path
 import pytest
 
 from epicycle.aspects import MeasurementFailure, PacketLoss
+from epicycle.runner.build import load as load_module
+from epicycle.runner.build import load_model
 from epicycle.runner.catalogue import Catalogue
 from epicycle.runner.cli import main
-from epicycle.runner.model import load as load_module
-from epicycle.runner.model import load_model
 from epicycle.runner.text import ModelError
 from tests import cases
 from tests.cases import Case

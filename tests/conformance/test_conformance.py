@@ -17,10 +17,10 @@ from typing import Any
 import pytest
 
 from epicycle.aspects import FiringRequest, Request
+from epicycle.runner.build import Model, load_model
 from epicycle.runner.catalogue import built_in
 from epicycle.runner.engine import Simulation
-from epicycle.runner.model import Model, load_model
-from epicycle.runner.model.schedule import dependencies, depths
+from epicycle.runner.graph.ranks import dependencies, depths
 from epicycle.runner.text import ModelError
 from tests.conformance.conformance_parts import TYPES, TestActorPortDepth
 

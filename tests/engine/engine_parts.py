@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 from simpy.events import Event
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
+from epicycle.runner.build import Model, load_model
 from epicycle.runner.engine import Results, Simulation
-from epicycle.runner.model import Model, load_model
 
 
 class Ticker(Actor):

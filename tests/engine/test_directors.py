@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process, Tag
 from epicycle.aspects import JoinPoint, PortAspect
 from epicycle.runner.engine import ActorError
-from epicycle.runner.model import Clock
+from epicycle.runner.graph import Clock
 from epicycle.runner.text import ModelError
 from tests.engine.engine_parts import Plan, load, seen, sends, simulate
 

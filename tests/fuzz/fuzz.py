@@ -37,9 +37,9 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from epicycle.runner import Simulation
+from epicycle.runner.build import load_model
 from epicycle.runner.catalogue import built_in, model_folders
 from epicycle.runner.engine import ActorError, LoopError
-from epicycle.runner.model import load_model
 from epicycle.runner.text import NORMAL, ModelError
 from tests.fuzz.mutants import Mutation, Seedling, of_options, of_text, of_tree, seedling
 from tests.fuzz.recipes import cooked

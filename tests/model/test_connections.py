@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors import Actor, InputPort, OutputPort
-from epicycle.runner.model import load_model
-from epicycle.runner.model.indices import BadIndexError, resolve
+from epicycle.runner.build import load_model
+from epicycle.runner.build.indices import BadIndexError, resolve
 from tests.model.model_parts import TYPES
 
 

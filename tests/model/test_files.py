@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors import Actor, Parameter
-from epicycle.runner.model import load_model
+from epicycle.runner.build import load_model
 from epicycle.runner.text import ModelError
 
 

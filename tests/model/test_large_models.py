@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import validation
-from epicycle.runner.model import load_model
+from epicycle.runner.build import load_model
 from epicycle.runner.text import PathIndex, matches
 
 

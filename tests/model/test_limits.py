@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epicycle.runner.build import load_model
 from epicycle.runner.cli import main
-from epicycle.runner.model import load_model
 from epicycle.runner.text import RAISE_IT, ModelError, PathIndex, compile_pattern, matches
 
 END = "  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\nrun: {stop: 1}\n"

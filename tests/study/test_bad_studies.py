@@ -15,10 +15,9 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from epicycle.runner import ModelError, load_model
-from epicycle.runner.catalogue import built_in
+from epicycle.runner.catalogue import built_in, figure_types
 from epicycle.runner.cli import main
 from epicycle.runner.language import json_schema
-from epicycle.runner.show import figure_types
 from epicycle.runner.show.report import check_figures, study_figure_types
 from epicycle.runner.text import Problems, parse, plain
 from tests import cases

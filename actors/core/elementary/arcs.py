@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import copysign, frexp, inf, sqrt
 
+from .double import quotient
 from .outside import undefined
 from .tables import ARC_HIGH, ARC_LOW, HALF_PI, HALF_PI_LOW, POWERS
 
@@ -25,11 +26,15 @@ def atan2(y: float, x: float) -> float:
     along = x * 1.0 if x >= 0.0 else -x
     if not (1e-150 < above < 1e150 and 1e-150 < along < 1e150):
         return copysign(_far_arc(above, along, copysign(1.0, x)), y)
-    if x >= 0.0:
-        angle = _arc(above, along, 0) if above <= along else _arc(along, above, 65)
-    else:
-        angle = _arc(above, along, 130) if above <= along else _arc(along, above, 195)
+    angle = _turned(above, along, x)
     return angle if y > 0.0 else -angle
+
+
+def _turned(above: float, along: float, x: float) -> float:
+    """The angle from the axis that x lies on to the other sides of a triangle."""
+    if x >= 0.0:
+        return _arc(above, along, 0) if above <= along else _arc(along, above, 65)
+    return _arc(above, along, 130) if above <= along else _arc(along, above, 195)
 
 
 def _far_arc(above: float, along: float, sign: float) -> float:
@@ -48,9 +53,7 @@ def _far_arc(above: float, along: float, sign: float) -> float:
     above *= POWERS[2048 - e + half]
     along *= POWERS[2048 - half]
     along *= POWERS[2048 - e + half]
-    if sign > 0.0:
-        return _arc(above, along, 0) if above <= along else _arc(along, above, 65)
-    return _arc(above, along, 130) if above <= along else _arc(along, above, 195)
+    return _turned(above, along, sign)
 
 
 def _arc(side: float, base: float, table: int) -> float:
@@ -69,16 +72,7 @@ def _arc(side: float, base: float, table: int) -> float:
     step = c * side
     below = base + step
     below_low = (base - below) + step
-    t = above / below
-    d = t * 134217729.0
-    t_first = d - (d - t)
-    t_rest = t - t_first
-    d = below * 134217729.0
-    first = d - (d - below)
-    rest = below - first
-    product = t * below
-    missed = ((t_first * first - product) + t_first * rest + t_rest * first) + t_rest * rest
-    low = (((above - product) - missed) + (above_low - t * below_low)) / below
+    t, low = quotient(above, above_low, below, below_low)
     z = t * t
     low -= t * z * (0.3333333333333333 - z * (0.2 - z * (0.14285714285714285 - z * 0.1111111111111111)))
     i += table

@@ -129,5 +129,7 @@ def tan(x: float) -> float:
     cosine = start + bent
     cosine_low = (start - cosine) + bent
     if n & 1:
-        return -quotient(cosine, cosine_low, sine, sine_low)
-    return quotient(sine, sine_low, cosine, cosine_low)
+        high, low = quotient(cosine, cosine_low, sine, sine_low)
+        return -(high + low)
+    high, low = quotient(sine, sine_low, cosine, cosine_low)
+    return high + low

@@ -22,8 +22,8 @@ def product(high: float, low: float, factor: float, factor_low: float) -> tuple[
     return total, (result - total) + missed
 
 
-def quotient(high: float, low: float, below: float, below_low: float) -> float:
-    """(high + low) / (below + below_low), rounded almost once."""
+def quotient(high: float, low: float, below: float, below_low: float) -> tuple[float, float]:
+    """(high + low) / (below + below_low)."""
     first = high / below
     c = first * 134217729.0
     first_high = c - (c - first)
@@ -33,4 +33,4 @@ def quotient(high: float, low: float, below: float, below_low: float) -> float:
     rest = below - below_high
     product = first * below
     missed = ((first_high * below_high - product) + first_high * rest + first_low * below_high) + first_low * rest
-    return first + (((high - product) - missed) + (low - first * below_low)) / below
+    return first, (((high - product) - missed) + (low - first * below_low)) / below

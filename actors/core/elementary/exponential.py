@@ -120,7 +120,8 @@ def tanh(x: float) -> float:
         return x * 1.0 if x != x else 1.0 if x > 0.0 else -1.0
     high, low, below, below_low = _sinh_and_cosh(x)
     above, divisor = high + low, below + below_low
-    return quotient(above, (high - above) + low, divisor, (below - divisor) + below_low)
+    high, low = quotient(above, (high - above) + low, divisor, (below - divisor) + below_low)
+    return high + low
 
 
 def _sinh_and_cosh(x: float) -> tuple[float, float, float, float]:

@@ -32,16 +32,10 @@ def constraints_of(problem: HorizonProblem, spare: float) -> Array:
     Steps 1 and 2 are decided before U_{t+1} acts: none bind there.
     """
     steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
+    count = 0
     table = np.zeros(((1 + obstacles + peers) * steps, _COLUMNS))
-    return table[: _fill(problem, table, spare)]
-
-
-@borrower
-def _fill(problem: HorizonProblem, table: Array, spare: float) -> int:
-    """Write the constraints into an empty table; returns how many they are."""
-    obstacles, count = problem.obstacle_mean.shape[0], 0
-    for other in range(1 + obstacles + problem.peer_mean.shape[0]):
-        for s in range(2, problem.tube_radius.shape[0]):
+    for other in range(1 + obstacles + peers):
+        for s in range(2, steps):
             margin = xx = xy = yy = 0.0
             if other == 0:
                 x, y, distance = problem.tube_centre[s, 0], problem.tube_centre[s, 1], problem.tube_radius[s]
@@ -63,7 +57,7 @@ def _fill(problem: HorizonProblem, table: Array, spare: float) -> int:
                 table[count, X], table[count, Y], table[count, MARGIN] = x, y, margin
                 table[count, XX], table[count, XY], table[count, YY] = xx, xy, yy
                 count += 1
-    return count
+    return table[:count]
 
 
 @borrower

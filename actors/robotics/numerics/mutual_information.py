@@ -41,9 +41,9 @@ def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) ->
 # Columns of a table of sigma points, one a row.
 _PLACE = 0  # x, y
 _WEIGHT = 2
-_RANGE = 3  # r,
-_DIRECTION = 4  # its gradient u,
-_BEND = 6  # and its Hessian (1 - u u^T) / r as (xx, xy, yy)
+_RANGE = 3  # r, the distance from the own position
+_DIRECTION = 4  # vector u, the gradient of r
+_BEND = 6  # (xx, xy, yy) of the Hessian of r, (1 - u u^T) / r
 _SUM = 9  # sum over j of w_j exp(-E_ij), later its inverse
 _MEAN = 10  # sum over j of q_ij grad E_ij
 _PAIRS = 12  # others_distance_ij for all j < i, each followed by exp(-E_ij)

@@ -24,13 +24,13 @@ _CURVATURE = 1e-9  # smallest eigenvalue of a repaired block
 
 # Columns of the table of stages, which has a row for each prediction step.  It is one array, as seven would be five
 # times the words at every call; and it is indexed, never sliced: a slice costs as much as a whole term.
-POSITION = 0  # quadratic function of the position at the step
-VELOCITY = 5  # of the velocity there
-CONTROL = 10  # of the control that begins to act there
-_CONSTANT = 15  # vector, then two matrices: the Newton step in the control is
-_BY_POSITION = 17  # -(constant + by_position (step in the position) + by_velocity (step in the velocity))
-_BY_VELOCITY = 21
-STEP = 25  # vector: the Newton step in the control
+POSITION = 0  # a quadratic function of the position at the step
+VELOCITY = 5  # a quadratic function of the velocity at the step
+CONTROL = 10  # a quadratic function of the control that begins to act at the step
+STEP = 15  # vector, the Newton step in the control: -(constant + by_position * dP + by_velocity * dV)
+_CONSTANT = 17  # vector
+_BY_POSITION = 19  # matrix
+_BY_VELOCITY = 23  # matrix
 _COLUMNS = 27
 
 
@@ -51,8 +51,8 @@ def clear(stages: Array) -> None:
 @inlined
 def put(stages: Array, s: int, column: int, function: Quadratic) -> None:
     """Write what the function is in the velocity or the control of step ``s``."""
-    stages[s, column], stages[s, column + 1], stages[s, column + 2] = function[0], function[1], function[2]
-    stages[s, column + 3], stages[s, column + 4] = function[3], function[4]
+    for c in range(5):
+        stages[s, column + c] = function[c]
 
 
 @borrower

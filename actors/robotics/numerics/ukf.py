@@ -17,8 +17,8 @@ RANGE = 1
 _KIND = 0
 _OBSERVER = 1  # x, y
 _VALUE = 3  # x, y from there to the target, or the range and anything
-_ALONG = 5  # standard deviations along the line of sight
-_ACROSS = 6  # and across it; no part of a range
+_ALONG = 5  # standard deviation along the line of sight
+_ACROSS = 6  # standard deviation across the line of sight; no part of a range
 
 
 @inner
@@ -166,26 +166,22 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
         rows += 1 if measurements[m, _KIND] == RANGE else 2
     if rows == 0:
         return mean.copy(), covariance.copy()
-    noise = np.zeros((rows, rows))
-    images = np.empty((count, rows))
-    observed = np.empty(rows)
+    noise, images, observed = np.zeros((rows, rows)), np.empty((count, rows)), np.empty(rows)
     row = 0
     for m in range(measurements.shape[0]):
-        x, y = measurements[m, _OBSERVER], measurements[m, _OBSERVER + 1]
+        width = 1 if measurements[m, _KIND] == RANGE else 2
         noise[row, row] = noises[m, 0]
-        observed[row] = measurements[m, _VALUE]
-        if measurements[m, _KIND] == RANGE:
-            for i in range(count):
-                images[i, row] = hypot(points[i, 0] - x, points[i, 1] - y)
-            row += 1
-        else:
+        if width == 2:
             noise[row, row + 1] = noise[row + 1, row] = noises[m, 1]
             noise[row + 1, row + 1] = noises[m, 2]
-            observed[row + 1] = measurements[m, _VALUE + 1]
-            for i in range(count):
-                images[i, row] = points[i, 0] - x
-                images[i, row + 1] = points[i, 1] - y
-            row += 2
+        for c in range(width):
+            observed[row + c] = measurements[m, _VALUE + c]
+        for i in range(count):
+            dx, dy = points[i, 0] - measurements[m, _OBSERVER], points[i, 1] - measurements[m, _OBSERVER + 1]
+            images[i, row] = hypot(dx, dy) if width == 1 else dx
+            if width == 2:
+                images[i, row + 1] = dy
+        row += width
     for k in range(rows):  # from here on, all as seen from what is expected
         expected = 0.0
         for i in range(count):

@@ -39,24 +39,9 @@ def _call_every_kernel() -> None:
     means, covariances, sigma_positions, weights = expected_target(
         mean, covariance, np.eye(4), False, 0.0, period, 0.0, steps
     )
-    controls = np.zeros((steps, 2))
-    zero, tube = np.zeros(2), np.ones(steps)
-    centre, radius, starts = standing_plan(zero, zero, controls, 0.0, tube, zero, 0.0, 1.0, period)
-    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), 0.0, period, tube, 0.4, 1.0, 1.0)
-    posed = HorizonProblem(
-        period=period,
-        position=np.zeros(2),
-        velocity=np.zeros(2),
-        max_speed=1.0,
-        max_acceleration=1.0,
-        tube_centre=centre,
-        tube_radius=radius,
-        safe_distance=1.0,
-        margin=1.0,
-        obstacle_mean=means + 100.0,
-        obstacle_covariance=covariances,
-        peer_mean=peer_mean + 200.0,
-        peer_distance=peer_distance,
-    )
-    problem = posed.to_inform(sigma_positions, weights, peer_mean, 1.0, 1.0, 1.0).to_reach(np.ones(2))
-    solve(problem, starts)
+    controls, zero, ones = np.zeros((steps, 2)), np.zeros(2), np.ones(steps)
+    centre, radius, starts = standing_plan(zero, zero, controls, 0.0, ones, zero, 0.0, 1.0, period)
+    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), 0.0, period, ones, 0.4, 1.0, 1.0)
+    seen, heard = (means + 100.0, covariances), (peer_mean + 200.0, peer_distance)
+    posed = HorizonProblem(period, zero, zero, 1.0, 1.0, centre, radius, 1.0, 1.0, *seen, *heard)
+    solve(posed.to_inform(sigma_positions, weights, peer_mean, 1.0, 1.0, 1.0).to_reach(np.ones(2)), starts)

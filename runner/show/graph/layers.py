@@ -10,7 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right, insort
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
+from itertools import groupby, product
 from operator import itemgetter
 from typing import Any, TypeVar
 
@@ -148,14 +148,12 @@ def _spread(net: Net, layers: list[list[Cell]], runs: list[list[Run]]) -> None:
 
     run(start).left.append(net.source)
     forward = [pin for pin in net.targets if pin.cell.layer > start]
-    for number in range(start + 1, max([start, *(pin.cell.layer for pin in forward)])):
+    for number in range(start + 1, max((pin.cell.layer for pin in forward), default=start)):
         pass_through(number)
-    for pin in forward:
-        run(pin.cell.layer - 1).right.append(pin)
     backward = [pin for pin in net.targets if pin.cell.layer <= start]
-    for number in range(start, min([start + 1, *(pin.cell.layer for pin in backward)]) - 1, -1):
+    for number in range(start, min((pin.cell.layer for pin in backward), default=start + 1) - 1, -1):
         pass_through(number)
-    for pin in backward:
+    for pin in (*forward, *backward):
         run(pin.cell.layer - 1).right.append(pin)
 
 
@@ -194,16 +192,14 @@ def _joints(layering: Layering, number: int) -> list[tuple[Pin, Pin]]:
     """The pairs of pins that the runs to the right of a layer join; where one turns round, a cell holds its place."""
     pairs = []
     for run in layering.runs[number]:
-        left, right = run.left, run.right
-        if not right:
-            turn = Cell("turn", layer=number + 1)
-            layering.layers[number + 1].append(turn)
-            right = [turn.pin("left")]
-        if not left:
-            turn = Cell("turn", layer=number)
-            layering.layers[number].append(turn)
-            left = [turn.pin("right")]
-        pairs += [(one, other) for one in left for other in right]
+        ends = []
+        for pins, beyond, side in ((run.left, number, "right"), (run.right, number + 1, "left")):
+            if not pins:
+                turn = Cell("turn", layer=beyond)
+                layering.layers[beyond].append(turn)
+                pins = [turn.pin(side)]
+            ends.append(pins)
+        pairs += list(product(ends[0], ends[1]))
     return pairs
 
 
@@ -222,16 +218,13 @@ def _sweep(
     layers: list[list[Cell]], joints: list[list[tuple[Pin, Pin]]], given: dict[Cell, int], rightwards: bool
 ) -> None:
     """Order each layer by where its pins are connected to in the layer before it, in one direction or the other."""
-    numbers = range(1, len(layers)) if rightwards else range(len(layers) - 2, -1, -1)
-    for number in numbers:
-        if rightwards:
-            ranks = _ranks(layers[number - 1], "right")
-            pairs = [(right, left) for left, right in joints[number - 1]]
-        else:
-            ranks = _ranks(layers[number + 1], "left")
-            pairs = joints[number]
+    last = len(layers) - 1
+    for number in range(1, last + 1) if rightwards else range(last - 1, -1, -1):
+        before = number - 1 if rightwards else number + 1
+        ranks = _ranks(layers[before], "right" if rightwards else "left")
         there: dict[Pin, list[int]] = {}
-        for here, far in pairs:
+        for left, right in joints[min(before, number)]:
+            here, far = (right, left) if rightwards else (left, right)
             there.setdefault(here, []).append(ranks[far])
         _arrange(layers[number], there, given)
 

@@ -14,7 +14,8 @@ from typing import Any
 
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 
-from ...model import Clock, Hop, Model, WovenAspect
+from ...build import Model
+from ...graph import Clock, Hop, WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded if nothing else is asked for
 

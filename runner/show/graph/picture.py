@@ -14,7 +14,7 @@ from typing import Any
 
 import networkx as nx
 
-from ...model import extent
+from ...graph import extent
 from ..pen import new_canvas, save, style
 from . import text
 from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width

@@ -6,26 +6,13 @@ from contextlib import suppress
 
 from epicycle.actors import UnitError, variants
 
+from ...build import Complaint, Model, made_figure, place_in_figure, tell_of_figure
 from ...language import in_si, split_number
-from ...model import Model
 from ...study import Plan
 from ...text import Mapping, Node, Problems, Sequence, plain
-from ..drawing import Complaint, made, place, tell
+from . import of_signals  # noqa: F401  whose types are known by that
 from .figure import SignalFigure, StudyFigure
-from .of_signals import Series, SingleRun, Tracks
 from .of_table import CURVES, Distributions, Means
-
-__all__ = [
-    "Distributions",
-    "Means",
-    "Series",
-    "SingleRun",
-    "Tracks",
-    "check_figures",
-    "default_figures",
-    "figures_of_study",
-    "study_figure_types",
-]
 
 
 def study_figure_types() -> dict[str, type[StudyFigure]]:
@@ -58,11 +45,11 @@ def figures_of_study(plan: Plan, problems: Problems) -> dict[str, StudyFigure]:
         values = {key: plain(entry.value) for key, entry in part.values.items()}
         if "where" in part.values and isinstance(where := part.values["where"].value, Mapping):
             values["where"] = {factor: _levels(entry.value, plan, factor) for factor, entry in where.entries.items()}
-        figure = made(name, known, (part.type.text, values, written), problems, of_study=True)
+        figure = made_figure(name, known, (part.type.text, values, written), problems, of_study=True)
         if figure is not None:
             found[name] = figure
             for complaint in figure.complaints(plan):
-                tell(complaint, name, written, problems)
+                tell_of_figure(complaint, name, written, problems)
     return found
 
 
@@ -80,11 +67,11 @@ def _levels(node: Node, plan: Plan, factor: str) -> object:
 def _check_signals(name: str, figure: SignalFigure, models: list[Model], written: Mapping, problems: Problems) -> None:
     """Tell what is wrong with a figure in all of the models."""
     for complaint in figure.check_model(models[0]):
-        tell(complaint, name, written, problems)
+        tell_of_figure(complaint, name, written, problems)
         return
     patterns = [(key, pattern) for key in figure.signal_parameters for pattern in figure.named(key)]
     for key, pattern in patterns:
-        position = place(Complaint(key, "", key=pattern), written)
+        position = place_in_figure(Complaint(key, "", key=pattern), written)
         tried = [Problems() for _ in models]
         for model, told in zip(models, tried, strict=True):
             model.outputs(pattern, f"figure {name}", position, told)

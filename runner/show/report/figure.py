@@ -10,11 +10,10 @@ from typing import Any, ClassVar
 
 from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
 
-from ...engine import Results
+from ...build import Complaint, Model
 from ...language import Dimension, Factor
-from ...model import Model
+from ...results import Results
 from ...study import Plan
-from ..drawing import Complaint
 from ..pen import MAX_LINES, MAX_PANELS, Sheet
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 

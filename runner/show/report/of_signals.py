@@ -23,12 +23,13 @@ from epicycle.actors import (
 )
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
-from ...engine import Results
-from ...model import Model
+from ...build import Complaint, Model, figures_of
+from ...catalogue import Figure
+from ...results import Results
 from ...study import Plan, half_width
 from ...text import Problems
-from ..drawing import Complaint, draw, figures_of
-from ..figures import Figure, positions, selected
+from ..drawing import draw
+from ..figures import positions, selected
 from ..pen import DASHES, FORMATS, PALETTE
 from .data import Condition, Data
 from .figure import Layout, Roles, RunKey, SignalFigure, layout, roles

@@ -11,9 +11,9 @@ from typing import Any
 
 from epicycle.actors import Parameter, counted, texts_parameter
 
+from ...build import Complaint
 from ...language import Factor
 from ...study import Plan, mean
-from ..drawing import Complaint
 from ..pen import DASHES, LIMIT, MARKERS, PALETTE
 from .data import Condition, Data, Names, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure

@@ -12,9 +12,8 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, abridged
 
-from ...model import describe, raised_at
 from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
-from ...text import ModelError, Problems
+from ...text import ModelError, Problems, describe, raised_at
 from ..drawing import FigureError
 from ..folder import MAX_NAME
 from ..pen import FORMATS, style

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from epicycle.actors import declared_parameters, parse_unit
 
+from ...build import Model
 from ...language import Dimension, StudyMetric, split_number
-from ...model import Model
 from ...text import select
 
 

@@ -8,10 +8,10 @@ from typing import Any
 from epicycle.actors import EpicycleError, Quantity, did_you_mean
 from epicycle.actors.expression import operand
 
+from ...build import Model
 from ...catalogue import conversion_problem
 from ...engine import Results, Signal
 from ...language import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
-from ...model import Model
 from ...text import Problems, inside
 
 

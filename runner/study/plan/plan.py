@@ -6,7 +6,7 @@ import hashlib
 import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
@@ -16,9 +16,9 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
+from ...build import Model, load_model
 from ...catalogue import types_of_file
 from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
-from ...model import Model, load_model
 from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
 from .described import Column, columns_of
 from .metrics import check_metric
@@ -315,8 +315,7 @@ def _together(study: Study, place: Iterable[int]) -> Level:
 
 def _load(study: Study, level: Level) -> Model:
     types = [each for file in study.types for each in types_of_file(file)]
-    settings = [replace(setting, used=False) for setting in level.settings]
-    return load_model(study.model, set=settings, disturb=level.disturb, types=types)
+    return load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
 
 
 @dataclass

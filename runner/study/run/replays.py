@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 from epicycle.actors import EpicycleError
 
+from ...build import Model
 from ...engine import Results, Simulation
-from ...model import Model
 from ..plan import Plan
 from .processes import DONE, Processes
 

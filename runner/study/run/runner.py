@@ -9,8 +9,8 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, readable
 
+from ...build import Model
 from ...engine import LogFilter, Results, Simulation
-from ...model import Model
 from ..plan import Condition, Plan, value_of
 from .backlog import FAILED, OK, Task
 from .manifest import columns_of_rows

@@ -1,0 +1,287 @@
+"""What must hold of a whole model before it runs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+
+import networkx as nx
+
+from epicycle.actors import InputPort, accepts, counted, type_name
+
+from ..graph import Detour, Hop, ModelGraph, Wire, dependencies
+from ..text import RAISE_IT, Position, Problems, in_general
+from .draft import Draft
+
+MAX_PASSAGE = 200  # composite ports in a row
+MAX_SHOWN = 10  # names in one message
+
+
+def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
+    """Add every problem of wiring: types, missing connections, two writers, loops without delay.
+
+    If it is the ``whole`` model and nothing is wrong, warn of actors that can never fire.
+    """
+    graph = draft.graph
+    if not check_passages(graph, problems):
+        return
+    check_types(graph, problems)
+    check_connections(draft, problems)
+    check_loops(graph, problems)
+    if whole and not len(problems):
+        check_reach(graph, problems)
+
+
+def check_passages(graph: ModelGraph, problems: Problems) -> bool:
+    """Whether the ways through composite ports end, and are few enough to be followed one by one."""
+    ports = graph.ports
+    between = nx.DiGraph(ports.subgraph([path for path, port in ports.nodes(data="port") if port is None]))
+    if not nx.is_directed_acyclic_graph(between):
+        cycle = [source for source, _ in nx.find_cycle(between)]
+        hop = graph.outgoing(cycle[-1])[0]
+        problems.add(
+            f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}",
+            hop.position,
+            "a composite that hands its input straight on to its output cannot be connected to itself",
+        )
+        return False
+    if nx.dag_longest_path_length(between) > MAX_PASSAGE:
+        path = nx.dag_longest_path(between)
+        problems.add(f"a way of more than {MAX_PASSAGE} composite ports in a row, from {path[0]} to {path[-1]}")
+        return False
+    # How many wires lead on from each port, without walking along them: they may be very many.
+    onward: dict[str, int] = {}
+    for path in reversed(list(nx.topological_sort(between))):
+        onward[path] = sum(onward.get(far, 1) for _, far in ports.out_edges(path))
+    wires = 0
+    for actor in graph.actors.values():
+        for port in actor.outputs.values():
+            wires += sum(onward.get(far, 1) for _, far in ports.out_edges(port.path))
+            limit = graph.limits.wires
+            if wires > limit:
+                problems.add(f"the model has more than {limit:,} wires", graph.positions.get(actor.path), RAISE_IT)
+                return False
+    return True
+
+
+def check_types(graph: ModelGraph, problems: Problems) -> None:
+    """What each port sends or hands on must be what the next port with a type takes."""
+    for path in graph.ports.nodes:
+        given = graph.type_of(path)
+        if given is None:
+            continue
+        for hops in _stretches(graph, path):
+            far = hops[-1].destination
+            wanted = graph.type_of(far)
+            if accepts(wanted, given):
+                continue
+            way = " -> ".join([path, *(hop.destination for hop in hops)])
+            verb = "sends" if graph.ports.nodes[path]["port"] is not None else "hands on"
+            problems.add(
+                f"{path} {verb} {type_name(given)}, but {far} takes {type_name(wanted)}",
+                hops[0].position,
+                *(who for who in (_who(graph, path), _who(graph, far)) if who),
+                *((f"the way: {way}",) if len(hops) > 1 else ()),
+                *_other_position(hops[0].position, hops[-1].position),
+                about=("types", in_general(path), in_general(far)),
+            )
+
+
+def _stretches(graph: ModelGraph, path: str) -> Iterator[tuple[Hop, ...]]:
+    """The ways from a port to the next ports that have a type."""
+    for hop in graph.outgoing(path):
+        if graph.type_of(hop.destination) is not None:
+            yield (hop,)
+        else:
+            for rest in _stretches(graph, hop.destination):
+                yield (hop, *rest)
+
+
+def _who(graph: ModelGraph, port: str) -> str:
+    """Whose port it is, and where that stands."""
+    owner = graph.owner(port)
+    if owner in graph.actors:
+        what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.positions.get(owner)
+    else:
+        what, at = f"{port} is a port of {graph.composites.get(owner, owner)}", graph.ports.nodes[port].get("declared")
+    return f"{what}, declared at {at.file}:{at.line}:{at.column}" if at is not None else ""
+
+
+def _other_position(first: Position | None, last: Position | None) -> tuple[str, ...]:
+    if first is None or last is None or first == last:
+        return ()
+    return (f"connected onward at {last.file}:{last.line}:{last.column}",)
+
+
+def check_connections(draft: Draft, problems: Problems) -> None:
+    """Required inputs are connected, and single inputs have one writer."""
+    graph = draft.graph
+    for actor in graph.actors.values():
+        position = graph.positions.get(actor.path)
+        for port in actor.inputs.values():
+            wires = graph.wires_to(port)
+            if not wires and port.required and not _may_be_connected(draft, port.path):
+                problems.add(
+                    f"{port.path} is not connected, and {type(actor).__name__} cannot do without it",
+                    position,
+                    *_open_end(graph, port.path),
+                    f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
+                    about=("missing", in_general(port.path)),
+                )
+            if len(wires) > 1 and not port.multi:
+                times = Counter(wire.source.path for wire in wires)
+                writers = ", ".join(
+                    f"{path} ({number} times)" if number > 1 else path for path, number in times.items()
+                )
+                what = f"{counted(len(times), 'sender')} write{'s' if len(times) == 1 else ''}"
+                problems.add(
+                    f"{port.path} takes one connection, but {what} to it: {writers}",
+                    wires[1].hops[-1].position,
+                    *_first_connection(wires),
+                    "connect one of them, or send through an actor that merges them",
+                    about=("several", in_general(port.path)),
+                )
+
+
+def _may_be_connected(draft: Draft, path: str) -> bool:
+    """Whether a missing connection may be due to another problem: a wrong connection, or an actor not made."""
+    before = nx.ancestors(draft.graph.ports, path) if draft.is_wired and draft.open else ()
+    return not draft.is_wired or path in draft.open or not draft.open.isdisjoint(before)
+
+
+def _first_connection(wires: list[Wire]) -> tuple[str, ...]:
+    at = wires[0].hops[-1].position
+    return (f"the first connection is at {at.file}:{at.line}:{at.column}",) if at is not None else ()
+
+
+def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
+    """Where a chain of composite ports that leads to an unconnected input begins."""
+    end = path
+    while incoming := graph.incoming(end):
+        end = incoming[0].source
+    return (f"nothing is connected to {end}, which leads to it",) if end != path else ()
+
+
+def check_loops(graph: ModelGraph, problems: Problems) -> None:
+    """Every loop needs a delay somewhere, or no order of firing exists within a tag."""
+    declared = {path: place for place, path in enumerate(graph.ports.nodes)}
+    for region in dependencies(graph).values():
+        for component in nx.strongly_connected_components(region):
+            if len(component) > 1:
+                # A graph in the order of declaration: a view would follow that of a set, which varies between runs.
+                inner = nx.DiGraph()
+                for path in sorted(component, key=declared.__getitem__):
+                    inner.add_edges_from((path, far, way) for far, way in region.adj[path].items() if far in component)
+                _add_loop(graph, _shortest_loop(graph, inner), problems)
+
+
+def _shortest_loop(graph: ModelGraph, inner: nx.DiGraph) -> list[list[Hop]]:
+    """The ways from actor to actor around a loop, from the first actor of a strongly connected graph back to it."""
+    start = next(path for path in inner if graph.is_end(path))
+    loop = [start, *min((nx.shortest_path(inner, after, start) for after in inner.successors(start)), key=len)]
+    ways: list[list[Hop]] = []
+    for edge in pairwise(loop):
+        hop = inner.edges[edge].get("hop")
+        if hop is not None:
+            if graph.is_end(hop.source):
+                ways.append([])
+            ways[-1].append(hop)
+    return ways
+
+
+def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> None:
+    actors = [graph.owner(way[0].source) for way in ways]
+    detour = next((hop for way in ways for hop in way if isinstance(hop, Detour)), None)
+    if detour is not None:
+        problems.add(
+            f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
+            detour.position,
+            *map(_step, ways),
+            f"the aspect {detour.aspect} sends the tokens of all its ports through one model: let it stand at fewer of "
+            "them, or give that model a delay",
+            about=("loop", *map(in_general, actors)),
+        )
+        return
+    # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
+    # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
+    back = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
+    problems.add(
+        f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
+        back.position,
+        *map(_step, ways),
+        *(
+            f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
+            for path in dict.fromkeys(actors)
+            if path in graph.clocks
+        ),
+        f"give one of these connections a delay, best the one that leads back: {_with_delay(graph, back)}",
+        about=("loop", *map(in_general, actors)),
+    )
+
+
+def _step(way: list[Hop]) -> str:
+    ports = [way[0].source, *(hop.destination for hop in way)]
+    places = [f"{hop.position.file}:{hop.position.line}" for hop in way if hop.position is not None]
+    return " -> ".join(ports) + (f" ({', '.join(dict.fromkeys(places))})" if places else "")
+
+
+def _scope(graph: ModelGraph, hop: Hop) -> str:
+    """The path of the composite inside which a connection is made, with a dot after each name."""
+    owner = hop.source.rpartition(".")[0]
+    # What comes from an input comes from the composite's own port, else from a port of one of its actors.
+    scope = owner if graph.direction(hop.source) == "input" else owner.rpartition(".")[0]
+    return f"{scope}." if scope else ""
+
+
+def _with_delay(graph: ModelGraph, hop: Hop) -> str:
+    scope = _scope(graph, hop)
+    ends = [end.removeprefix(scope) for end in (hop.source, hop.destination)]
+    source, destination = (f'"{end}"' if "[" in end else end for end in ends)
+    return f"{{from: {source}, to: {destination}, delay: ...}}"
+
+
+def check_reach(graph: ModelGraph, problems: Problems) -> None:
+    """Warn of actors that can never fire, because no source is before them."""
+    alive: set[str] = set()
+    detours: dict[str, list[str]] = {}
+    for detour in graph.detours:
+        detours.setdefault(detour.source, []).append(detour.destination)
+    waiting = [port.path for actor in graph.actors.values() if actor.is_source for port in actor.outputs.values()]
+    while waiting:
+        path = waiting.pop()
+        if path in alive:
+            continue
+        alive.add(path)
+        waiting += [*graph.ports.successors(path), *detours.get(path, ())]
+        port = graph.ports.nodes[path]["port"]
+        if isinstance(port, InputPort):
+            waiting += [output.path for output in port.actor.outputs.values()]
+    idle = nx.DiGraph()
+    for actor in graph.actors.values():
+        if not actor.is_source and not any(port.path in alive for port in actor.inputs.values()):
+            idle.add_node(actor.path)
+    if not idle:
+        return
+    for wire in graph.wires():
+        if wire.destination.actor.path in idle:
+            idle.add_edge(wire.source.actor.path, wire.destination.actor.path)
+    groups = nx.condensation(idle)
+    order = {path: place for place, path in enumerate(idle)}
+    for group in groups:
+        if groups.in_degree(group):
+            continue  # told with what is before it
+        first, *others = sorted(groups.nodes[group]["members"], key=order.__getitem__)
+        behind = {path for after in nx.descendants(groups, group) for path in groups.nodes[after]["members"]}
+        in_loop = others or idle.has_edge(first, first)
+        why = f"only the loop {_some([first, *others])} feeds it" if in_loop else "nothing feeds it"
+        problems.warn(
+            f"{first} can never fire: it is no source, and {why}",
+            graph.positions.get(first),
+            *((f"nor can what it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
+            about=("idle", in_general(first)),
+        )
+
+
+def _some(paths: list[str]) -> str:
+    return ", ".join(paths[:MAX_SHOWN]) + (f" and {len(paths) - MAX_SHOWN} more" if len(paths) > MAX_SHOWN else "")

@@ -1,0 +1,293 @@
+"""Aspects that are models: a composite class that is woven around ports, and stands beside them in the graph.
+
+Tokens come in by a *request port*, an input of the composite, and go on when they leave by its *response port*: the
+output ``response``, or its only output.  Which of several inputs takes the tokens of a pointcut is said there
+(``request: in2``); else it is the input ``request``, or the only input.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import networkx as nx
+
+from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
+from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
+
+from ..graph import AspectModel, Detour, ModelGraph, WovenAspect
+from ..language import PartText, PointcutText
+from ..text import PathIndex, Position, Problems, did_you_mean
+from .draft import Draft
+from .firing_times import without_port
+from .settle import place_of
+from .weave import Paths, Weaving
+
+BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
+OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: not the composite's matter
+
+
+def as_actor(part: PartText) -> PartText:
+    """The composite of an aspect's declaration, as it would be declared among the actors."""
+    values = {name: entry for name, entry in part.values.items() if name not in OWN}
+    priority = values.pop("priority").value if "priority" in values else None
+    return replace(part, values=values, priority=priority)
+
+
+class ModelWeaving(Weaving):
+    """Finds the places of an aspect that is the composite at ``path``, and connects it with them."""
+
+    def __init__(
+        self,
+        draft: Draft,
+        paths: Paths,
+        name: str,
+        path: str,
+        scope: str,
+        problems: Problems,
+        position: Position,
+        cls: type[Aspect] = CompositeAspect,
+    ) -> None:
+        super().__init__(draft, paths, name, cls, scope, problems)
+        self.path = path
+        self.position = position
+        self.inputs, self.outputs = draft.graph.borders(path)
+        self._response = ""
+        self._asked: dict[str, str] = {}  # the request port of each place
+        self._request_ports: dict[str, None] = {}  # with "" for one that is not known, which has been told
+        self._times: dict[str, FiringTime] = {}
+        self._is_misplaced = False
+
+    @property
+    def kind(self) -> str:
+        return self.graph.composites[self.path]
+
+    def check(self, woven: WovenAspect) -> None:
+        """Find the ports by which tokens come in and leave, and see whether the composite can stand where it is to."""
+        self._response = self._only(self.outputs, "response", "output", self.position)
+        if not self._request_ports:
+            self._request(PointcutText("", self.position))
+        for port in filter(None, self._request_ports):
+            for hop in self.graph.incoming(port):
+                self._problem(
+                    f"{port} is for the tokens of this aspect, and nothing else can be connected to it",
+                    hop.position,
+                    "add another input for what else the composite needs",
+                )
+            if isinstance(self.graph.ports.nodes[port]["port"], OutputPort):
+                self._problem(
+                    f"{self.path} is the model of another aspect already",
+                    self.position,
+                    "let that one stand here, too, or add another composite",
+                )
+        self._check_types()
+        self._check_directors(woven)
+
+    def connect(self, woven: WovenAspect) -> WovenAspect:
+        """Let the tokens of all places come in, and go on when they are answered."""
+        if "" in self._request_ports:
+            self.draft.leave_open(self.path)
+        for port in filter(None, self._request_ports):
+            for hop in list(self.graph.incoming(port)):  # a problem, and told as such
+                self.graph.disconnect(hop)
+            self.graph.open_requests(port)
+        if self._response:
+            self.graph.ports.nodes[self._response]["type"] = Request
+        if not self._response or self._is_misplaced:
+            return woven
+        return replace(woven, model=AspectModel(self.path, self.kind, self._response, self._asked, self._times))
+
+    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+        ports, connections, actors = super().select(pointcuts)
+        actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
+        # What was aimed at may be left out again, and of actors it is the composite around them.
+        aimed = {place: place for place in (*ports, *(_place(*ends) for ends in connections))} | actors
+        asked, times = self._asked, self._times
+        self._asked = {place: asked[unit] for place, unit in aimed.items() if unit in asked}
+        self._times = {place: times[unit] for place, unit in aimed.items() if unit in times}
+        return ports, connections, actors
+
+    def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> list[str]:
+        found = list(super()._aimed_at(pointcut, index))
+        outside = [path for path in found if path != self.path and not self._is_inside(path)]
+        self._ask(pointcut, outside, found)
+        if not pointcut.exclude:
+            self._times.update(dict.fromkeys(outside, pointcut.firing_time))
+            inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
+            for message, keys, advice in without_port(("time",), pointcut.firing_time, inside, self.graph):
+                time = pointcut.time
+                where = pointcut.position if time is None else place_of(time, keys[1:], of_key=True)
+                self._problem(message, where, advice)
+        return outside
+
+    def _of(self, pointcut: PointcutText) -> list[str]:
+        found = super()._of(pointcut)
+        outside = [port for port in found if not self._is_inside(port)]
+        self._ask(pointcut, outside, found)
+        return outside
+
+    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
+        found = super()._connections_of(pointcut)
+        outside = [ends for ends in found if not any(map(self._is_inside, ends))]
+        self._ask(pointcut, [_place(*ends) for ends in outside], [_place(*ends) for ends in found])
+        return outside
+
+    def _ask(self, pointcut: PointcutText, places: list[str], found: list[str]) -> None:
+        """Note by which port the tokens of the places come in; of several pointcuts the last counts."""
+        if pointcut.exclude:
+            return
+        if found and not places:
+            self._problem(f"it cannot stand inside of itself, at {found[0]}", pointcut)
+        if request := self._request(pointcut):
+            self._asked.update(dict.fromkeys(places, request))
+
+    def _request(self, pointcut: PointcutText) -> str:
+        """The port by which the tokens of a pointcut come in."""
+        asked = pointcut.request
+        if asked is None:
+            found = self._only(self.inputs, "request", "input", pointcut.position, BY_PLACE)
+        else:
+            found = f"{self.path}.{asked.text}"
+            if found not in self.inputs:
+                names = _names(self.inputs)
+                self._problem(
+                    f"{self.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}",
+                    asked,
+                    f"its inputs: {', '.join(names) or 'none'}",
+                )
+                found = ""
+        self._request_ports[found] = None
+        return found
+
+    def _only(self, ports: list[str], name: str, direction: str, position: Position, hint: str = "") -> str:
+        """The port of that name, or the only one of its direction."""
+        named = f"{self.path}.{name}"
+        if named in ports or len(ports) == 1:
+            return named if named in ports else ports[0]
+        if not ports:
+            self._problem(f"{self.kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {self.kind}")
+        else:
+            self._problem(
+                f"{self.kind} has {len(ports)} {direction}s, none of them called {name!r}",
+                position,
+                f"its {direction}s: {', '.join(_names(ports))}",
+                f"call one of them {name!r}" + (f", {hint}" if hint else ""),
+            )
+        return ""
+
+    def _check_types(self) -> None:
+        """Whether the ports, if they declare types, take and give requests."""
+        for port in filter(None, (*self._request_ports, self._response)):
+            node = self.graph.ports.nodes[port]
+            wanted = node.get("type")
+            if wanted is not None and not accepts(wanted, Request):
+                self._problem(
+                    f"{port.rpartition('.')[2]} of {self.kind} is for {type_name(wanted)}, but through an "
+                    "aspect go requests",
+                    node.get("declared"),
+                    "leave out its type: the actors inside get requests, which hold the tokens",
+                )
+
+    def _check_directors(self, woven: WovenAspect) -> None:
+        """Whether all places stand under the composite's own director, which has one order and one time for them."""
+        graph, own = self.graph, self.graph.director_of(self.path)
+        found = {port: graph.director_of(graph.owner(port)) for port in woven.ports}
+        found |= {actor: graph.director_of(actor) for actor in woven.actors}
+        for source, destination in woven.connections:
+            hop = next(hop for hop in graph.outgoing(source) if hop.destination == destination)
+            found[_place(source, destination)] = graph.director_over(hop)
+        for place, director in found.items():
+            if director != own:
+                self._problem(
+                    f"{place} is {'inside' if director else 'outside'} of {director or own}, which has a director of "
+                    "its own",
+                    self.position,
+                    f"declare it inside of {director}, or let it stand at the ports of {director}"
+                    if director
+                    else f"declare it outside of {own}",
+                )
+                self._is_misplaced = True
+                return
+
+    def _is_inside(self, port: str) -> bool:
+        return port.startswith(f"{self.path}.")
+
+
+def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
+    """The ways of tokens through aspects that are models, as far as they may be gone within the tag.
+
+    Where an aspect stands, tokens may also pass it by, when it is not active: its detours come beside the connections,
+    which they never replace.  So a model that is right with such an aspect is right without it.
+    """
+    at: dict[str, list[WovenAspect]] = {}
+    for woven in aspects:
+        if woven.model is not None:
+            for place in woven.model.requests:
+                at.setdefault(place, []).append(woven)
+    found: dict[tuple[str, str, str], Detour] = {}
+
+    def lead(sources: list[str], place: str) -> list[str]:
+        """Through the aspects at a place; the ports from which tokens may come then."""
+        for woven in at.get(place, ()):
+            assert woven.model is not None
+            for source in sources:
+                add(source, woven.model.requests[place], woven)
+            sources = [*sources, woven.model.response]
+        return sources
+
+    def add(source: str, destination: str, woven: WovenAspect) -> None:
+        position = graph.positions.get(f"aspect {woven.name}")
+        order = graph.next_order + len(found)
+        key = (source, destination, woven.name)
+        found.setdefault(key, Detour(source, destination, None, position, order, woven.name))
+
+    for place in list(at):
+        if place in graph.actors:  # what it asks for comes in after its turn
+            actor = graph.actors[place]
+            for woven in at[place]:
+                for port in (*actor.inputs.values(), *actor.outputs.values()):
+                    assert woven.model is not None
+                    add(port.path, woven.model.requests[place], woven)
+    responses = {woven.model.response: woven for many in at.values() for woven in many if woven.model is not None}
+    senders: dict[str, list[str]] = {}
+    for port in graph.ports.nodes if at else ():
+        if graph.direction(port) == "output" and graph.is_end(port):
+            senders[port] = lead([port], port)  # an aspect at an output stands before the send
+    for *_, hop in graph.ports.edges(data="hop") if at else ():
+        sources = senders.get(hop.source, [hop.source]) if hop.delay is None else []
+        sources = lead(sources, _place(hop.source, hop.destination))
+        if hop.destination not in senders:
+            sources = lead(sources, hop.destination)
+        for source in sources:
+            if source in responses:
+                add(source, hop.destination, responses[source])
+    return list(found.values())
+
+
+def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> bool:
+    """Whether no aspect stands in another that stands in it, or the tokens of both would never come out."""
+    models = [woven for woven in aspects if woven.model is not None]
+    inside = nx.DiGraph()
+    for woven in models:
+        for other in models:
+            assert other.model is not None
+            ends = [*woven.ports, *woven.actors, *(end for ends in woven.connections for end in ends)]
+            if woven is not other and any(end.startswith(f"{other.model.path}.") for end in ends):
+                inside.add_edge(woven.name, other.name)
+    is_sound = nx.is_directed_acyclic_graph(inside)
+    if not is_sound:
+        first, second = nx.find_cycle(inside)[0]
+        problems.add(
+            f"aspect {first}: it stands inside of {second}, and {second} inside of it",
+            graph.positions.get(f"aspect {first}"),
+            f"a token would never come out: let one of them stand elsewhere, or leave it out: '!{second}.**'",
+        )
+    return bool(is_sound)
+
+
+def _place(source: str, destination: str) -> str:
+    return f"{source} -> {destination}"
+
+
+def _names(ports: Iterable[str]) -> list[str]:
+    return [port.rpartition(".")[2] for port in ports]

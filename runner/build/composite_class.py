@@ -1,0 +1,90 @@
+"""Composite classes of YAML files, for models that are built in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from ..catalogue import Catalogue, installed
+from ..graph import WovenAspect
+from ..language import (
+    CompositeText,
+    PartText,
+    Settings,
+    inherit,
+    read_library,
+)
+from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
+from .draft import Draft
+from .settle import Settler
+from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .weave_all import weave_all
+
+
+class CompositeClass:
+    """A composite class; called with a name and values for its parameters, it gives what ``add`` takes."""
+
+    def __init__(self, name: str, composites: dict[str, CompositeText], catalogue: Catalogue) -> None:
+        self.name = name
+        self.composites = composites
+        self.catalogue = catalogue
+
+    def __call__(self, path: str, **parameters: object) -> CompositeInstance:
+        return CompositeInstance(self, path, parameters)
+
+    def __repr__(self) -> str:
+        return f"<composite class {self.name}({', '.join(self.composites[self.name].parameters)})>"
+
+
+class CompositeInstance:
+    """An instance that is yet to be added to a model."""
+
+    def __init__(self, composite: CompositeClass, path: str, parameters: dict[str, object]) -> None:
+        self.composite = composite
+        self.path = path
+        self.parameters = parameters
+
+    def unfold(self, path: str, draft: Draft, position: Position) -> tuple[Draft, list[WovenAspect]]:
+        """What it is as a part of a draft, with the aspects that come with it; raises ``ModelError``."""
+        cls, problems = self.composite, Problems()
+        part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
+        if "priority" in part.values:  # which stands beside the parameters, as in a model file
+            part = replace(part, priority=part.values.pop("priority").value)
+        limits = draft.graph.limits
+        made = Unfolded(draft.inside(draft.graph.director_of(path)), limits.actors)
+        known, settler = Known(cls.composites, cls.catalogue), Settler(Settings(limits=limits), problems)
+        _, bracket, index = path.rpartition("[")
+        names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
+        aspects: list[WovenAspect] = []
+        with suppress(TooLargeError):
+            Unfolding(known, settler, made).instances(path, path.rpartition(".")[0], part, names)
+            aspects = weave_all(made, known, settler)
+        problems.raise_if_any()
+        return made.draft, aspects
+
+    def __repr__(self) -> str:
+        return f"<{self.composite.name} {self.path}>"
+
+
+def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -> CompositeClass:
+    """Read a composite class from a YAML file (a packaged one such as ``robots/mobile_robot.yaml``, too).
+
+    ``types`` are actor and aspect classes of your own that it may name.  Raises ``ModelError``.
+
+    >>> MobileRobot = load_composite("robots/mobile_robot.yaml", "MobileRobot")
+    >>> main = model.add(MobileRobot("main", start=[30, 0], objective=ReachGoal(goal=[0, 0]), max_speed="8 m/s"))
+    """
+    problems = Problems()
+    declared = read_library(file, problems)
+    catalogue = installed().with_types(types)
+    composites, broken = inherit(declared, catalogue.actors, problems)
+    if name not in composites and name not in broken:
+        problems.add(
+            f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}",
+            call_site(),
+            f"its composites: {', '.join(composites) or 'none'}",
+        )
+    problems.raise_if_any()
+    return CompositeClass(name, composites, catalogue)

@@ -1,0 +1,283 @@
+"""Connections: from the names that stand in a composite's ``connections`` to edges between ports."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+
+from epicycle.actors import Actor, counted, declared_ports, has_own_ports
+
+from ..graph import ModelGraph
+from ..language import CompositeText, ConnectionText, Values
+from ..text import RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, within
+from .draft import Draft
+from .indices import BadIndexError, resolve
+from .settle import converted, nanoseconds
+
+_ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
+
+
+@dataclass(frozen=True)
+class End:
+    """The ports behind one end of a connection, and how they are spoken of."""
+
+    text: Text
+    ports: list[str]
+    several: bool = False  # whether it may stand for any number of ports
+    own: bool = False  # whether it is a port of the composite itself
+
+
+@dataclass
+class Child:
+    """A name inside a composite: the instances behind it; ``count`` is None if how many is not known."""
+
+    kind: str  # the name of its type
+    paths: list[str]
+    array: bool
+    count: int | None
+    inputs: list[str] = field(default_factory=list)
+    outputs: list[str] = field(default_factory=list)
+    is_known: bool = True  # whether there are no other ports: an instance that could not be made may have had some
+
+    def ports(self, direction: str) -> list[str]:
+        """The names of its ports of one direction."""
+        return self.inputs if direction == "input" else self.outputs
+
+
+def child_of_actors(
+    actor_type: type[Actor], paths: list[str], array: bool, count: int | None, graph: ModelGraph
+) -> Child:
+    """Actors of one name, some of which perhaps could not be made."""
+    child = Child(actor_type.__name__, paths, array, count)
+    if has_own_ports(actor_type):
+        actors = [graph.actors[path] for path in paths if path in graph.actors]
+        child.inputs = list(dict.fromkeys(name for actor in actors for name in actor.inputs))
+        child.outputs = list(dict.fromkeys(name for actor in actors for name in actor.outputs))
+        child.is_known = len(actors) == count != 0
+    else:
+        for name, port in declared_ports(actor_type).items():
+            child.ports(port.direction).append(name)
+    return child
+
+
+@dataclass(frozen=True)
+class Inside:
+    """The inside of a composite as its connections see it."""
+
+    path: str
+    name: str
+    inputs: Collection[str]
+    outputs: Collection[str]
+    names: Collection[str]  # of all actors
+    children: Mapping[str, Child]  # those of which anything is known
+    text: CompositeText | None = None  # as a file declares it
+
+
+@dataclass(frozen=True)
+class Link:
+    """A connection that is yet to be made."""
+
+    source: str
+    destination: str
+    delay: int | None  # ns
+    position: Position
+
+
+@dataclass(frozen=True)
+class Links:
+    """What a connection stands for; ``is_whole`` is false if a part of it could not be understood."""
+
+    found: list[Link]
+    is_whole: bool
+
+    def make(self, draft: Draft) -> None:
+        """Connect the ports."""
+        for link in self.found:
+            draft.graph.connect(link.source, link.destination, link.delay, link.position)
+        draft.is_wired = draft.is_wired and self.is_whole
+
+
+class Wiring:
+    """Finds the ports that a connection inside of one composite means."""
+
+    def __init__(self, inside: Inside, graph: ModelGraph, values: Values, problems: Problems) -> None:
+        self.inside = inside
+        self.path = inside.path
+        self.graph = graph
+        self.values = values
+        self.problems = problems
+
+    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> Links:
+        """Every source to every destination; where both stand for several, the first to the first and so on."""
+        delay = self._delay(connection, names)
+        sources = [self._endpoint(text, "output", names) for text in connection.sources]
+        targets = [self._endpoint(text, "input", names) for text in connection.destinations]
+        links: list[Link] = []
+        is_whole = None not in sources and None not in targets
+        limit = self.graph.limits.connections
+        for source, target in product(filter(None, sources), filter(None, targets)):
+            in_pairs = source.several and target.several and not connection.to_all
+            count = len(source.ports) * (1 if in_pairs else len(target.ports))
+            if self.graph.connections + len(links) + count > limit:
+                self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)
+                return Links(links, False)
+            if in_pairs and len(source.ports) != len(target.ports):
+                is_whole = False
+                self._problem(
+                    f"{self._label(source.text)} stands for {_ports(source)}, {self._label(target.text)} for "
+                    f"{_ports(target)}",
+                    target.text,
+                    "with several on both sides, '->' connects the first to the first and so on, so both need as many",
+                    "to connect all to all, write '=>'",
+                )
+                continue
+            pairs = zip(source.ports, target.ports, strict=True) if in_pairs else product(source.ports, target.ports)
+            # What all of a group say to all is not for themselves; '->' still connects each to itself.
+            spare_self = connection.to_all and not source.own and not target.own
+            for one, other in pairs:
+                if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
+                    links.append(Link(one, other, delay, source.text.position))
+        return Links(links, is_whole)
+
+    def _label(self, text: Text) -> str:
+        return f"{self.path}.{text.text}" if self.path else text.text
+
+    def _problem(self, message: str, text: Text, *hints: str) -> None:
+        self.problems.add(message, text.position, *hints, scope=self.path)
+
+    def _delay(self, connection: ConnectionText, names: dict[str, object]) -> int | None:
+        if connection.delay is None:
+            return None
+        label = f"{self._label(connection.sources[0])} -> {self._label(connection.destinations[0])}: delay"
+        delay = converted(self.values, connection.delay, names, label, self.path, nanoseconds)
+        return None if delay is self.values.missing else delay
+
+    def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | None:
+        """The port paths behind one end of a connection, as seen from inside the composite."""
+        match = _ENDPOINT.match(text.text)
+        if match is None:
+            self._problem(
+                f"{text.text!r} is not a port that can be connected here",
+                text,
+                "write 'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or the name of an own port",
+            )
+            return None
+        name, index, port = match.groups()
+        if name is None:
+            own = self._own(port, wanted, text)
+            return None if own is None else End(text, own, own=True)
+        inside = self.inside
+        child = inside.children.get(name)
+        if child is None:
+            if name not in inside.names:  # otherwise its own problem is told already
+                gone = None if inside.text is None else inside.text.removed.get(name)
+                self._problem(
+                    f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}",
+                    text,
+                    f"valid actors: {', '.join(inside.names) or 'none'}",
+                    *((f"it is removed at {gone.file}:{gone.line}:{gone.column}",) if gone is not None else ()),
+                )
+            return None
+        has_port = self._has_port(name, child, port, wanted, text)
+        found = self._instances(name, index, child, port, text, names)
+        if not has_port or found is None:
+            return None
+        paths, several = found
+        ports = [f"{instance}.{port}" for instance in paths]
+        if missing := [path for path in ports if path not in self.graph.ports]:
+            if child.is_known:  # instances of one entry may differ in the ports of their own
+                self._problem(f"{child.kind} has no {wanted} port {missing[0]}, but others of its array have", text)
+            return None
+        return End(text, ports, several)
+
+    def _own(self, port: str, wanted: str, text: Text) -> list[str] | None:
+        # Seen from inside, an own input is where tokens come from, an own output where they go.
+        inputs, outputs = self.inside.inputs, self.inside.outputs
+        own, other = (inputs, outputs) if wanted == "output" else (outputs, inputs)
+        if port in own and self.path:
+            return [f"{self.path}.{port}"]
+        where = self.inside.name
+        kind, ends = ("input", "from") if wanted == "output" else ("output", "to")
+        hints = [f"own {kind} ports: {', '.join(own) or 'none'}"]
+        if port in other:
+            message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {where}: inside of it, tokens "
+            message += "go there, none come from it" if ends == "from" else "come from it, none go there"
+        elif port in self.inside.children:
+            child = self.inside.children[port]
+            message = f"{self._label(text)} is an actor, not a port"
+            index = "[*]" if child.array else ""
+            hints = [f"{wanted} ports: {', '.join(f'{port}{index}.{each}' for each in child.ports(wanted)) or 'none'}"]
+        else:
+            message = f"{where} has no {kind} port {port!r} of its own{did_you_mean(port, list(own))}"
+            hints.append("a port of an actor is written 'actor.port'")
+        self._problem(message, text, *hints)
+        return None
+
+    def _instances(
+        self, name: str, index: str | None, child: Child, port: str, text: Text, names: dict[str, object]
+    ) -> tuple[list[str], bool] | None:
+        """The paths of the instances that an endpoint names, and whether it may name several."""
+        label = f"{self.path}.{name}" if self.path else name
+        if not child.array:
+            if index is None:
+                return child.paths, False
+            self._problem(f"{label} is a single actor, it has no [{index}]", text, f"write {name}.{port}")
+            return None
+        if child.count is None:
+            return None  # the count is wrong, and told so
+        if index == "*":
+            return child.paths, True
+        if index is None:
+            self._problem(
+                f"{label} is an array of {child.count}: say which",
+                text,
+                f"write {name}[*].{port} for all, or {name}[0].{port} for the first",
+            )
+            return None
+
+        def value(expression: str) -> object:
+            at = within(text, expression)
+            found = self.values.of(Scalar(expression, expression, True, at), names, label, self.path)
+            if found is self.values.missing:
+                raise _ToldError
+            return found
+
+        try:
+            indices, several = resolve(index, label, child.count, value)
+        except _ToldError:
+            return None
+        except BadIndexError as error:
+            forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
+            self._problem(str(error), text, *((f"valid are {forms}",) if error.is_misshapen else ()))
+            return None
+        return [child.paths[each] for each in indices], several
+
+    def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Text) -> bool:
+        """Whether the child's type has the port, in the direction that the connection needs."""
+        path = f"{self.path}.{name}" if self.path else name
+        valid = child.ports(wanted)
+        if port in valid:
+            return True
+        if not child.is_known:
+            return child.count == 0  # or else why it could not be made is told
+        if port in child.ports("input" if wanted == "output" else "output"):
+            direction, ends = ("an input", "come from it") if wanted == "output" else ("an output", "go to it")
+            message = f"{path}.{port} is {direction} of {child.kind}, nothing can {ends}"
+        else:
+            message = f"{path}: {child.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
+        hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
+        if self.inside.text is not None and self.inside.text.extends is not None:
+            at = self.inside.text.actors[name].type.position  # which may be far from the connection
+            hints.append(f"{path} is a {child.kind} since {at.file}:{at.line}:{at.column}")
+        self._problem(message, text, *hints)
+        return False
+
+
+class _ToldError(Exception):
+    """An expression that could not be evaluated, for a reason that has been told."""
+
+
+def _ports(end: End) -> str:
+    return counted(len(end.ports), "port")

@@ -1,0 +1,65 @@
+"""Disturbances that are woven around a model that is made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Mapping as AnyMapping
+from typing import TYPE_CHECKING
+
+from ..catalogue import installed
+from ..graph import WovenAspect
+from ..language import (
+    PARAMETER_THERE,
+    CompositeText,
+    ParameterText,
+    Settings,
+    inherit,
+    joined,
+    load_disturbance,
+    settings_in,
+)
+from ..text import Mapping, Position, Problems, node_of
+from .draft import Draft
+from .settle import Settler
+from .unfold import Known, Unfolded, Unfolding
+from .weave_all import weave_all
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def disturb(
+    model: Model, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
+) -> tuple[Draft, list[WovenAspect]]:
+    """The model's draft with the aspects of a disturbance, and these; raises ``ModelError``."""
+    problems = Problems()
+    disturbance = load_disturbance(name, problems)
+    problems.raise_if_any()
+    assert disturbance is not None, "what cannot be read is a problem"
+    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
+    parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
+    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
+    for setting in disturbance.settings:
+        problems.add(
+            f"{setting.path!r} cannot be set any more: the model is made",
+            setting.position,
+            f"load the model together with the disturbance: load_model(..., disturb={name!r})",
+        )
+    for key in sorted(values.keys() & model.parameters.keys() - disturbance.text.parameters.keys()):
+        problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
+    taken = {woven.name for woven in model.aspects}
+    for part in disturbance.text.aspects.values():
+        if part.name in taken:
+            problems.add(f"there is an aspect {part.name!r} already", part.position, "unweave it before")
+    problems.raise_if_any()
+    node = node_of(values, position)
+    settler = Settler(Settings(settings_in(node, problems) if isinstance(node, Mapping) else []), problems)
+    catalogue = installed().with_types(types)
+    composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
+    known = Known(composites, catalogue, broken)
+    made = Unfolded(model.draft.copy(), model.graph.limits.actors)
+    Unfolding(known, settler, made).body("", root, settler.parameters("", root, {}, {}, None))
+    found = weave_all(made, known, settler)
+    settler.check_unused(made.draft)
+    problems.raise_if_any()
+    return made.draft, found

@@ -1,0 +1,154 @@
+"""Finding and reading models: a path, or the name of a packaged model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from epicycle.actors import counted_in_si, plain
+
+from ..catalogue import installed
+from ..collection import without_collection
+from ..graph import ModelGraph, check_processors
+from ..language import (
+    COMPOSITE_THERE,
+    ModelText,
+    Setting,
+    Settings,
+    Values,
+    add_disturbances,
+    change_aspect,
+    check_usage,
+    inherit,
+    joined,
+    load_disturbances,
+    parse_setting,
+    read_model,
+    read_overrides,
+    settings_in,
+    without,
+)
+from ..text import NORMAL, Limits, Problems, call_site, node_of
+from ..text import Mapping as MappingNode
+from .checks import check
+from .draft import Draft
+from .figures import figures_of
+from .model import DeclaredFigure, Model
+from .settle import Settler
+from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .untried import try_classes
+from .watch import Watching
+from .weave_all import weave_all
+
+
+def load_model(
+    name: str | Path,
+    *,
+    set: Iterable[str | Setting] | Mapping[str, object] = (),
+    overrides: str | Path | Iterable[str | Path] = (),
+    aspects: Iterable[str] = (),
+    without_aspects: Iterable[str] = (),
+    disturb: str | Path | Iterable[str | Path] = (),
+    types: Iterable[type] = (),
+    max_actors: int = NORMAL.actors,
+) -> Model:
+    """Read, change and check a model; raises ``ModelError`` with all that is wrong.
+
+    ``set`` gives parameters their values, as texts like ``"observer[*].sensor.range=5 m"`` or as a mapping
+    ``{"observer[*].sensor.range": 5}``; ``overrides`` names a YAML file of such settings, or several; of all that fit
+    a parameter the last one wins, and ``set`` wins over files.  ``disturb`` names packaged disturbances, or files of
+    aspects, which are added to the model's one after the other; ``without_aspects`` and ``aspects`` count after that,
+    and all settings win over what a disturbance sets.  ``types`` are actor and aspect classes of your own that the
+    model may name beside the installed ones.  ``max_actors`` is how many actors and composites are not taken for a
+    mistake, and a fifth of how many connections.  What is odd but not wrong is in ``Model.warnings``.
+    """
+    problems, limits = Problems(), Limits(max_actors)
+    settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
+    settings += _settings(set, problems)
+    with without_collection():
+        # What the files say.
+        text, declared = read_model(str(name), problems)
+        catalogue = installed().with_types(types)
+        disturbances = load_disturbances(map(str, _several(disturb)), problems)
+        for disturbance in disturbances:
+            declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
+        composites, broken = inherit(declared, catalogue.actors, problems, limits)
+        check_usage(text, declared, composites, catalogue.actors, problems)
+        # What is changed from outside; what disturbances set comes first, for the last one wins.
+        text, set_by_them = add_disturbances(text, disturbances, problems)
+        settings = set_by_them + settings
+        for change in without_aspects:
+            text = without(text, change, problems)
+        for change in aspects:
+            text = change_aspect(text, change, problems)
+        # What comes of it.
+        known = Known(composites, catalogue, broken)
+        settler = Settler(Settings(settings, limits), problems)
+        model = build(text, known, settler, limits)
+        if model.figures:
+            figures_of(model, problems)
+        problems.raise_if_any()
+        model.warnings = problems.warnings
+        model.is_checked = True
+        return model
+
+
+def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Model:
+    """The model that declarations stand for, in passes; it is good only if there are no problems then."""
+    problems, values, root = settler.problems, settler.values, text.root
+    model = Model(root.name, doc=root.doc)
+    _check_names(known, problems)
+    values.of_model = root.parameters
+    names = settler.parameters("", root, {}, {}, None)
+    made = Unfolded(Draft(ModelGraph(limits)), limits.actors)
+    try:
+        Unfolding(known, settler, made).body("", root, names)
+    except TooLargeError:
+        pass
+    else:
+        woven = weave_all(made, known, settler)
+        settler.check_unused(made.draft)
+        check(made.draft, problems)
+        check_processors(woven, made.draft.graph, problems)
+        model.adopt(made.draft, woven, Watching(made.draft, values, problems).read(text, names))
+        model.parameters = {name: _shown(value, root.parameters[name].unit) for name, value in names.items()}
+        model.declared = {name: (text.unit, text.doc) for name, text in root.parameters.items()}
+        model.figures = _figures(text, values, names)
+    try_classes(known, made.classes, values, limits, problems)
+    return model
+
+
+def _check_names(known: Known, problems: Problems) -> None:
+    for name in sorted(known.composites.keys() & known.catalogue.actors.keys()):
+        problems.add(
+            f"composite {name!r} has the name of an actor type", known.composites[name].position, "give it another name"
+        )
+
+
+def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, DeclaredFigure]:
+    """The type of each figure, its values, and these as they are written."""
+    found = {}
+    for name, part in text.figures.items():
+        given = {key: values.of(entry.value, names, f"figure {name}.{key}") for key, entry in part.values.items()}
+        if values.missing not in given.values():
+            in_si = {key: counted_in_si(value) for key, value in given.items()}
+            found[name] = (part.type.text, in_si, MappingNode(part.values, part.type.position))
+    return found
+
+
+def _shown(value: object, unit: str) -> object:
+    """The value of a parameter of the model, as a plain number in the unit that it declares."""
+    return plain(value) if unit else counted_in_si(value)
+
+
+def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:
+    return [given] if isinstance(given, (str, Path)) else list(given)
+
+
+def _settings(given: Iterable[str | Setting] | Mapping[str, object], problems: Problems) -> list[Setting]:
+    if not isinstance(given, Mapping):
+        read = (parse_setting(each, problems) if isinstance(each, str) else each for each in given)
+        return [setting for setting in read if setting is not None]
+    node = node_of(given, call_site())
+    assert isinstance(node, MappingNode)
+    return settings_in(node, problems)

@@ -1,0 +1,273 @@
+"""Model: what is loaded or built, and then run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+from epicycle.actors import Stop, Tag, counted, declared_parameters
+
+from ..catalogue import take_problem
+from ..collection import without_collection
+from ..graph import Metric, ModelGraph, Watched, WovenAspect, check_processors, firing_order, is_within
+from ..language import Values
+from ..shown import short
+from ..tables import Table, as_html, as_text
+from ..text import NAME, Position, Problem, Problems, Text, call_site, within
+from ..text import Mapping as MappingNode
+from .checks import check
+from .composite_aspect import check_nesting, detours
+from .decorated import arranged
+from .draft import Draft
+from .ends import Port, raising
+from .scope import Composite, Scope
+from .settle import nanoseconds
+from .watch import Watching, checked_seed
+
+DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
+
+
+class Model(Scope):
+    """A model graph that can be run, made by ``load_model`` or built in Python.
+
+    >>> model = Model("two_clocks", stop=10.0, seed=1)
+    >>> clocks = [model.add(Clock(f"clock[{i}]", period=i + 1)) for i in range(2)]
+    >>> merge = model.add(Merge("merge"))
+    >>> model.connect("clock[*].output -> merge.input", delay="100 ms")
+    >>> model.metric("ticks", of=merge.output, take="count")
+    >>> Simulation(model).run().metrics
+    {'ticks': 15}
+
+    ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
+    A model that was loaded can be changed in the same way.  Its ``parameters`` are a record of how it was made:
+    actors took their values from them then, so they are set with ``load_model(..., set=...)``, not here.
+
+    What is run is frozen: a change makes another graph, which counts for later simulations.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        doc: str = "",
+        stop: float | str | None = None,
+        seed: int = 0,
+        parameters: Mapping[str, object] | None = None,
+    ) -> None:
+        super().__init__(self, "")
+        self.name = name
+        self.doc = doc
+        self.draft = Draft()
+        self.parameters: dict[str, object] = dict(parameters or {})
+        self.declared: dict[str, tuple[str, str]] = {}  # unit and doc of the parameters
+        self.aspects: list[WovenAspect] = []
+        self.stop_time: int | None = None  # ns
+        self.stop_ports: list[str] = []
+        self._stop_position: Position | None = None
+        self.seed = checked_seed(seed)
+        self.recorded: list[str] = []
+        self.metrics: list[Metric] = []
+        self.figures: dict[str, DeclaredFigure] = {}
+        self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
+        self.is_checked = False  # since the last change
+        self._scopes: dict[str, Composite] = {}
+        self._order: dict[str, int] | None = None  # worked out since then
+        self.stop = stop
+
+    @property
+    def graph(self) -> ModelGraph:
+        """All actors, composites, ports and connections."""
+        return self.draft.graph
+
+    @property
+    def stop(self) -> float | None:
+        """When the run ends, in seconds; None if only an empty agenda or a port ends it.  ``"500 ms"`` may be set."""
+        return None if self.stop_time is None else self.stop_time / 1e9
+
+    @stop.setter
+    def stop(self, stop: float | str | None) -> None:
+        self.stop_time = None if stop is None else nanoseconds(stop)
+
+    @property
+    def endless(self) -> str:
+        """Why a run goes on for ever unless somebody ends it, in words; empty if that is not known."""
+        if self.stop_time is not None or self.stop_ports:
+            return ""
+        actors = self.graph.actors.values()
+        clock = next((actor.path for actor in actors if actor.is_endless), "")
+        if not clock or any(isinstance(actor, Stop) for actor in actors):
+            return ""
+        return f"{self.name} has no end: {clock} ticks for ever, and the model says neither stop nor stop_when"
+
+    def local_tag(self, actor: str, tag: Tag) -> Tag:
+        """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
+        return self.graph.clocks[self.graph.director_of(actor)].tag(tag)
+
+    def position_of(self, path: str) -> Position | None:
+        """Where an actor, a composite, ``aspect NAME`` or ``stop_when`` is declared, if that is known."""
+        return self._stop_position if path == "stop_when" else self.graph.positions.get(path)
+
+    # -- what disturbs it -----------------------------------------------------------------------------------------
+
+    def disturb(
+        self, disturbance: str | Path, *, set: Mapping[str, object] | None = None, types: Iterable[type] = ()
+    ) -> list[WovenAspect]:
+        """Weave the aspects of a packaged disturbance, or of a YAML file, around the model.
+
+        ``set`` gives the disturbance's own parameters their values; ``types`` are aspect classes of your own that it
+        may name.  A disturbance that sets parameters of the model must be loaded together with it:
+        ``load_model(..., disturb=...)``.  Raises ``ModelError``.
+        """
+        from .disturbance import disturb
+
+        draft, found = disturb(self, str(disturbance), set or {}, types, call_site())
+        self.adopt(draft, found)
+        return found
+
+    # -- what is watched ------------------------------------------------------------------------------------------
+
+    def record(self, *ports: str | Port) -> None:
+        """Keep what output ports send, given as such or as patterns over the ports that are there now."""
+        self._watch(ports, lambda watching, text: watching.record(text))
+
+    def stop_when(self, *ports: str | Port) -> None:
+        """End the run, after the tag in question, when one of these output ports sends something true."""
+        self._watch(ports, lambda watching, text: watching.stop_when(text))
+
+    def metric(self, name: str, *, of: str | Port, take: str = "last", **options: object) -> None:
+        """A number in the results; what can be taken, and with which options, is in docs/language.md.
+
+        >>> model.metric("in_queue", of="server.size", take="time_mean", initial=0, after="100 s", interval=0.95)
+        """
+        position = call_site()
+        problems = Problems()
+        if not NAME.match(name):
+            problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+        if any(metric.name == name for metric in self.metrics):
+            problems.add(f"there is a metric {name!r} already", position, "give this another name")
+        if problem := take_problem(name, take):
+            problems.add(problem[0], position, problem[1])
+        problems.raise_if_any()
+        values = {"take": take, **options}
+        self._watch([of], lambda watching, text: watching.metric(name, text, values, position))
+
+    def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
+        """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
+        return Watching(self.draft, Values(problems), problems).select(Text(pattern, position), what)
+
+    def _watch(self, ports: Iterable[str | Port], ask: Callable[[Watching, Text], None]) -> None:
+        """Find out what is to be watched as for a model file."""
+        position = call_site()
+        with raising() as problems:
+            watching = Watching(self.draft, Values(problems), problems, self.recorded)
+            for port in ports:
+                path = port if isinstance(port, str) else port.path
+                ask(watching, Text(path, within(Text(path, position), path)))
+        self._add(watching.found)
+
+    # -- the whole ------------------------------------------------------------------------------------------------
+
+    def check(self) -> None:
+        """Check the model as a whole; raises ``ModelError`` with all that is wrong.  A ``Simulation`` does so first."""
+        if not self.is_checked:
+            problems = Problems()
+            if check_nesting(self.aspects, self.graph, problems):
+                self.edit().graph.detours = detours(self.graph, self.aspects)
+            check(self.draft, problems)
+            check_processors(self.aspects, self.graph, problems)
+            problems.raise_if_any()
+            self.warnings = problems.warnings
+            self.is_checked = True
+        self.graph.freeze()
+
+    def order(self) -> dict[str, int]:
+        """Engine: the firing order of a model that has been checked; the same for all its runs."""
+        if self._order is None:
+            with without_collection():
+                self._order = firing_order(self.graph)
+        return self._order
+
+    # -- changes: what is called here has been found to be right --------------------------------------------------
+
+    def edit(self) -> Draft:
+        """The draft, which is then changed: what was checked before may no longer hold."""
+        if self.graph.is_frozen:
+            self.draft = self.draft.copy()
+        self.is_checked = False
+        self._order = None
+        return self.draft
+
+    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect], watched: Watched | None = None) -> None:
+        """Go on with a draft that came of the present one, with further aspects."""
+        self.draft = draft
+        self.edit()
+        self.enlist(aspects)
+        if watched is not None:
+            self.stop_time, self.seed = watched.stop_time, watched.seed
+            self._add(watched)
+
+    def enlist(self, aspects: Iterable[WovenAspect]) -> None:
+        """These aspects stand in the model from now on."""
+        self.aspects = arranged([*self.aspects, *aspects], self.graph)
+
+    def _add(self, watched: Watched) -> None:
+        self._stop_position = watched.stop_position or self._stop_position
+        self.recorded = [*self.recorded, *watched.recorded]
+        self.stop_ports = [*self.stop_ports, *watched.stop_ports]
+        self.metrics = [*self.metrics, *watched.metrics]
+
+    def scope(self, path: str) -> Composite:
+        """The composite at a path."""
+        return self._scopes.setdefault(path, Composite(self, path))
+
+    def forget(self, path: str) -> None:
+        """Take out an actor or composite, and whatever stands at it or watches it."""
+        self.edit().graph.remove(path)
+        self.aspects = [
+            woven.without(path)
+            for woven in self.aspects
+            if not is_within(woven.name, path) and not (woven.model and is_within(woven.model.path, path))
+        ]
+        self.recorded = [port for port in self.recorded if not is_within(port, path)]
+        self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
+        self.metrics = [metric.without(path) for metric in self.metrics]
+
+    # -- for people -----------------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        return f"<Model {self._caption()}>"
+
+    def __str__(self) -> str:
+        return as_text(self._caption(), self._tables())
+
+    def _repr_html_(self) -> str:
+        return as_html(self._caption(), self._tables())
+
+    @property
+    def extent(self) -> str:
+        """How large it is, in words."""
+        graph = self.graph
+        parts = [(len(graph.actors), "actor"), (graph.connections, "connection"), (len(self.aspects), "aspect")]
+        return ", ".join(counted(number, noun) for number, noun in parts)
+
+    def _caption(self) -> str:
+        return f"{self.name}: {self.extent}" + ("" if self.stop is None else f", stops at {self.stop:g} s")
+
+    def _tables(self) -> list[Table]:
+        actors = []
+        for path, actor in self.graph.actors.items():
+            values = {name: getattr(actor, name) for name in declared_parameters(type(actor))}
+            given = (f"{name}={short(value)}" for name, value in values.items() if value is not None)
+            actors.append((path, type(actor).__name__, ", ".join(given)))
+        connections = [
+            (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")
+            for hop in self.graph.hops
+        ]
+        aspects = [(woven.name, repr(woven.aspect), ", ".join(woven.places)) for woven in self.aspects]
+        parameters = [(name, short(value)) for name, value in self.parameters.items()]
+        return [
+            Table(("parameter", "value"), parameters),
+            Table(("actor", "type", "parameters"), actors),
+            Table(("from", "to", "delay"), connections),
+            Table(("aspect", "", "at"), aspects),
+        ]

@@ -1,0 +1,526 @@
+"""Building a model in Python: what can be done inside of a model or a composite.
+
+A program makes and changes the same graph as a model file does, through the same rules: names, connections, pointcuts
+and metrics go to the classes that read them from YAML, and a mistake raises ``ModelError`` that points at the line of
+the program.  Each call first finds out what it comes to, which raises or changes nothing, and then does it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar, overload
+
+from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
+from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
+
+from ..graph import ModelGraph, WovenAspect
+from ..language import ConnectionText, DeclarationReader, PointcutText, Values
+from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
+from .composite_aspect import ModelWeaving, check_nesting
+from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
+from .decorated import weave_decorations
+from .draft import Draft
+from .ends import (
+    CompositePort,
+    Ends,
+    Instance,
+    Places,
+    check_aspect,
+    clock_of,
+    each_of,
+    firing_time_of,
+    mistake,
+    raising,
+)
+from .weave import Paths, Weaving
+
+if TYPE_CHECKING:
+    from .model import Model
+
+_INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
+
+OF_NO_CLASS = "Composite"  # what stands for the class of a composite that Python builds
+
+A = TypeVar("A", bound=Actor)
+
+
+class _Children(Mapping[str, Child]):
+    """What is inside of a composite of a graph, looked up when it is asked for: a program connects in many calls."""
+
+    def __init__(self, graph: ModelGraph, path: str) -> None:
+        self._graph = graph
+        self._parts = graph.parts(path)
+
+    def __getitem__(self, name: str) -> Child:
+        graph, paths = self._graph, self._parts[name]
+        first, is_array = paths[0], paths[0].endswith("]")
+        if first in graph.actors:
+            return child_of_actors(type(graph.actors[first]), paths, is_array, len(paths), graph)
+        inputs, outputs = graph.borders(first)
+        return Child(_label(graph, first), paths, is_array, len(paths), _names(inputs), _names(outputs))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._parts)
+
+    def __len__(self) -> int:
+        return len(self._parts)
+
+
+class Scope:
+    """The inside of a model or of a composite: where actors are added and connected."""
+
+    def __init__(self, model: Model, path: str) -> None:
+        self.path = path
+        self._model = model
+
+    @property
+    def model(self) -> Model:
+        """The model that it is, or is in."""
+        return self._model
+
+    @property
+    def _inside(self) -> Inside:
+        graph = self._model.graph
+        inputs, outputs = graph.borders(self.path)
+        children = _Children(graph, self.path)
+        label = _label(graph, self.path) if self.path else self._model.name
+        return Inside(self.path, label, _names(inputs), _names(outputs), children.keys(), children)
+
+    # -- parts ----------------------------------------------------------------------------------------------------
+
+    @overload
+    def add(self, part: A, *, priority: int | None = None) -> A: ...
+    @overload
+    def add(self, part: Instance) -> Composite: ...
+    def add(self, part: Actor | Instance, *, priority: int | None = None) -> Actor | Composite:
+        """Add an actor, or an instance of a composite class, and return it.
+
+        Elements of an array are called ``robot[0]``, ``robot[1]`` and so on, in this order.  Of actors of one depth,
+        those of lower ``priority`` fire first, then those that were added first.  Raises ``ModelError``.
+        """
+        position = call_site()
+        if isinstance(part, Actor) and part.home is not None:
+            raise mistake(
+                f"{part.path} is part of a model already, and an actor belongs to one model",
+                position,
+                f"make another one: {type(part).__name__}(...)",
+            )
+        with raising() as problems:
+            full = self._free(part.path, position, problems)
+        made, aspects = self._made(part, full, position)
+        if priority:
+            made.graph.priorities[full] = priority
+        draft = self._model.edit()
+        draft.merge(made, draft.graph.director_of(full))
+        self._model.enlist(aspects)
+        return part if isinstance(part, Actor) else self._model.scope(full)
+
+    def _made(self, part: Actor | Instance, full: str, position: Position) -> tuple[Draft, list[WovenAspect]]:
+        """A part that is yet to be merged, and the aspects that come with it."""
+        draft = self._model.draft
+        if not isinstance(part, Actor):
+            return part.unfold(full, draft, position)
+        made, name = draft.inside(draft.graph.director_of(full)), part.path
+        part.move(full)
+        made.graph.add_actor(part, position)
+        try:
+            with raising() as problems:
+                return made, weave_decorations(part, made, problems, position)
+        except Exception:
+            part.move(name)  # it may be added elsewhere
+            part.home = None
+            raise
+
+    def composite(
+        self,
+        name: str,
+        *,
+        inputs: Iterable[str] = (),
+        outputs: Iterable[str] = (),
+        director: bool = False,
+        start: float | str | None = None,
+        drift: float = 1.0,
+    ) -> Composite:
+        """Add an empty composite, a scope for actors of its own, with ports through which it is connected.
+
+        With ``director`` it has a director of its own and fires as one actor; local time then begins at ``start`` s
+        (default: as around it) and goes ``drift`` times as fast.  Raises ``ModelError``.
+        """
+        position = call_site()
+        made, ports = Composite(self._model, self._full(name)), [("input", each) for each in inputs]
+        ports += [("output", each) for each in outputs]
+        with raising() as problems:
+            full = self._free(name, position, problems)
+            begin, speed = clock_of(full, start, drift, position, problems)
+        for number, (_, port) in enumerate(ports):
+            made.check_port(port, [each for _, each in ports[:number]], position)
+        graph = self._model.edit().graph
+        graph.add_composite(full, OF_NO_CLASS)
+        if director:
+            graph.add_director(full, begin, speed)
+        graph.positions.setdefault(full, position)
+        for direction, port in ports:
+            graph.add_composite_port(f"{full}.{port}", direction, position)
+        return self._model.scope(full)
+
+    def remove(self, name: str) -> None:
+        """Take out an actor or a composite with all that is connected to it, stands at it and watches it."""
+        position = call_site()
+        full, parts = self._full(name), self._model.graph.parts(self.path)
+        instances = parts.get(name.partition("[")[0], [])
+        with raising() as problems:
+            if full not in instances:
+                known = [path[len(self._full("")) :] for each in parts.values() for path in each]
+                problems.add(
+                    f"{self._inside.name} has no actor {name!r}{did_you_mean(name, known)}",
+                    position,
+                    f"valid actors: {', '.join(known) or 'none'}",
+                )
+            elif full != instances[-1]:
+                problems.add(f"{full} is not the last of its array", position, f"only {instances[-1]} can be removed")
+        self._model.forget(full)
+
+    def __getitem__(self, name: str) -> Any:
+        """The actor, composite or port at a dotted path within."""
+        full = self._full(name)
+        graph = self._model.graph
+        if full in graph.actors:
+            return graph.actors[full]
+        if full in graph.composites:
+            return self._model.scope(full)
+        if full in graph.ports:
+            port = graph.ports.nodes[full]["port"]
+            return CompositePort(full, graph.direction(full)) if port is None else port
+        known = [*graph.actors, *graph.composites, *graph.ports]
+        raise mistake(f"there is no {full!r}{did_you_mean(full, known)}", call_site())
+
+    def _free(self, name: str, position: Position, problems: Problems) -> str:
+        """The full path of a new part, if its name can be taken."""
+        match = _INSTANCE.match(name)
+        full = self._full(name)
+        if match is None:
+            problems.add(
+                f"{name!r} is not a name",
+                position,
+                "use letters, digits and _, no digit first; an element of an array is called 'name[0]'",
+                *(("what is inside of a composite is added to the composite",) if "." in name else ()),
+            )
+            return full
+        base, index = match.groups()
+        graph = self._model.graph
+        instances = graph.parts(self.path).get(base, [])
+        if self._full(base) in graph.ports:
+            problems.add(f"{self.path}.{base} is a port already", position, "give the actor another name")
+        elif not instances:
+            if index is not None and int(index) != 0:
+                problems.add(f"{full} cannot be the first of its array", position, f"begin with {base}[0]")
+        elif full in instances:
+            at = graph.positions.get(full)
+            where = (f"the first was added at {at.file}:{at.line}",) if at is not None else ()
+            problems.add(f"there is a {full} already", position, *where, "give it another name")
+        elif (is_array := instances[0].endswith("]")) != (index is not None):
+            kind = "an array" if is_array else "a single actor"
+            problems.add(f"{self._full(base)} is {kind} already", position, "give it another name")
+        elif index is not None and int(index) != len(instances):
+            problems.add(
+                f"{full} is not the next of its array", position, f"the next is {self._full(base)}[{len(instances)}]"
+            )
+        return full
+
+    def _full(self, name: str) -> str:
+        return f"{self.path}.{name}" if self.path else name
+
+    # -- connections ----------------------------------------------------------------------------------------------
+
+    def connect(self, source: Ends, destination: Ends | None = None, *, delay: float | str | None = None) -> None:
+        """Connect ports, given as such or as text: ``connect(a.output, b.input)``, ``connect("a.output -> b.input")``.
+
+        Every source is connected to every destination; in texts, ``[*]`` stands for all of an array, and on both
+        sides connects equal indices.  ``delay`` is in seconds or a text with a unit; without it, tokens arrive
+        within the tag in which they are sent.  Raises ``ModelError``.
+        """
+        position = call_site()
+        with raising() as problems:
+            links = self._links(source, destination, delay, position, problems)
+            self._judge(links, problems)
+        links.make(self._model.edit())
+
+    def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
+        """Take out the connections between ports, which are given as to ``connect``; there must be some."""
+        position, graph = call_site(), self._model.graph
+        with raising() as problems:
+            links = self._links(source, destination, None, position, problems)
+        pairs = dict.fromkeys((link.source, link.destination) for link in links.found)
+        found = [hop for one, other in pairs for hop in graph.outgoing(one) if hop.destination == other]
+        if not found:
+            with raising() as problems:
+                for one, other in pairs:
+                    here = ", ".join(hop.destination for hop in graph.outgoing(one))
+                    problems.add(
+                        f"{one} is not connected to {other}", position, f"{one} is connected to: {here or 'nothing'}"
+                    )
+        graph = self._model.edit().graph
+        for hop in found:
+            graph.disconnect(hop)
+
+    def _links(
+        self,
+        source: Ends,
+        destination: Ends | None,
+        delay: float | str | None,
+        position: Position,
+        problems: Problems,
+    ) -> Links:
+        """The connections that are meant."""
+        connection = self._connection(source, destination, delay, position, problems)
+        if connection is None:
+            return Links([], True)
+        return Wiring(self._inside, self._model.graph, Values(problems), problems).resolve(connection, {})
+
+    def _connection(
+        self,
+        source: Ends,
+        destination: Ends | None,
+        delay: float | str | None,
+        position: Position,
+        problems: Problems,
+    ) -> ConnectionText | None:
+        """A connection as a model file would declare it."""
+        if destination is None:
+            if not isinstance(source, str):
+                problems.add("the connection has no destination", position, "write connect(a.output, b.input)")
+                return None
+            connection = DeclarationReader(problems).connection(Scalar(source, source, False, position))
+        else:
+            sources = self._ends(source, position, problems)
+            destinations = self._ends(destination, position, problems)
+            connection = ConnectionText(tuple(sources), tuple(destinations), position)
+        if connection is not None and delay is not None:
+            connection = replace(connection, delay=node_of(delay, position))
+        # A list that is empty connects nothing: there may be no robots.
+        return connection if connection is not None and connection.sources and connection.destinations else None
+
+    def _ends(self, ends: Ends, position: Position, problems: Problems) -> list[Text]:
+        found = []
+        for end in each_of(ends):
+            name = end if isinstance(end, str) else self._name_of(end, position, problems)
+            if name is not None:
+                found.append(Text(name, within(Text(name, position), name)))
+        return found
+
+    def _known(self, port: Any, graph: ModelGraph, position: Position, problems: Problems) -> str | None:
+        """The path of a port of the graph."""
+        if isinstance(port, (Actor, Composite)):
+            kind = "an actor" if isinstance(port, Actor) else "a composite"
+            ports = [each for each in graph.ports if graph.owner(each) == port.path]
+            problems.add(
+                f"{port.path} is {kind}, not a port", position, f"name one of its ports: {', '.join(ports) or 'none'}"
+            )
+            return None
+        if not isinstance(port, (InputPort, OutputPort, CompositePort)):
+            problems.add(f"{port!r} is not a port", position, "give a port such as clock.output, or its path as text")
+            return None
+        path: str = port.path
+        if not path:
+            problems.add(
+                f"{port!r} is declared in a class",
+                position,
+                "give the port of an actor that was added to the model",
+            )
+            return None
+        if path not in graph.ports or graph.ports.nodes[path]["port"] not in (port, None):
+            problems.add(f"the actor of {path} is not part of this model", position, "add it to the model first")
+            return None
+        return path
+
+    def _name_of(self, port: object, position: Position, problems: Problems) -> str | None:
+        """The name of a port as seen from inside this scope."""
+        path = self._known(port, self._model.graph, position, problems)
+        if path is None:
+            return None
+        owner = path.rpartition(".")[0]
+        if owner == self.path:
+            return path.rpartition(".")[2]
+        scope = owner.rpartition(".")[0]
+        if scope != self.path:
+            there = f"in {scope}" if scope else "at the top of the model"
+            problems.add(
+                f"{path} cannot be connected in {self._inside.name}",
+                position,
+                f"connect it {there}, where {owner} is; ports of composites lead in and out",
+            )
+            return None
+        return path[len(self._full("")) :]
+
+    def _judge(self, links: Links, problems: Problems) -> None:
+        """What can be said of new connections at once; the rest is said when the model is whole."""
+        graph, new = self._model.graph, dict[str, Link]()
+        for link in links.found:
+            source, target = (graph.ports.nodes[path]["port"] for path in (link.source, link.destination))
+            if source is not None and target is not None and not accepts(target.type, source.type):
+                problems.add(
+                    f"{source.path} sends {type_name(source.type)}, but {target.path} takes {type_name(target.type)}",
+                    link.position,
+                )
+            if target is None or target.multi:
+                continue
+            before = next(iter(graph.incoming(link.destination)), None) or new.get(link.destination)
+            if before is not None:
+                at = before.position
+                where = f", at {at.file}:{at.line}" if at is not None else ""
+                problems.add(
+                    f"{target.path} takes one connection, and {before.source} is connected to it already{where}",
+                    link.position,
+                    "disconnect that one, or send through an actor that merges them",
+                )
+            new.setdefault(link.destination, link)
+
+    # -- aspects --------------------------------------------------------------------------------------------------
+
+    def weave(
+        self,
+        name: str,
+        aspect: Aspect | Composite | Instance,
+        *,
+        at: Places | Mapping[str, Places],
+        time: FiringTime | str | None = None,
+    ) -> WovenAspect:
+        """Let an aspect stand at ports or actors, given as such or as patterns over those that are there now.
+
+        Aspects at one port or actor apply in the order in which they are woven.  An aspect may be a model: a composite
+        of this model, or an instance of a composite class, which is added.  If it has several request ports, ``at``
+        says what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  With a ``time`` (s, a text with a
+        unit, a distribution, or these by input port) such an aspect stands at actors, whose firings take so long.
+        Raises ``ModelError``.
+        """
+        position = call_site()
+        full = self._full(name)
+        with raising() as problems:
+            if not NAME.match(name):
+                problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+            if any(woven.name == full for woven in self._model.aspects):
+                problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
+            check_aspect(aspect, (Aspect, Composite, Instance), position, problems)
+            firing_time = firing_time_of(time, aspect, position, problems)
+        model = self._model
+        if isinstance(aspect, Aspect):
+            with raising() as problems:
+                pointcuts = self._pointcuts(at, type(aspect), model.graph, position, problems)
+                weaving = Weaving(model.draft, Paths(model.draft), full, type(aspect), self.path, problems)
+                woven = weaving.weave(aspect, pointcuts, lambda *_: position)
+            model.enlist([woven])
+            return woven
+        draft, others = model.draft.copy(), list[WovenAspect]()
+        if isinstance(aspect, Composite):
+            path = aspect.path
+        else:
+            with raising() as problems:
+                path = self._free(aspect.path, position, problems)
+            made, others = aspect.unfold(path, draft, position)
+            draft.merge(made, draft.graph.director_of(path))
+        kind = CompositeAspect if firing_time is None else CompositeExecutionAspect
+        with raising() as problems:
+            pointcuts = self._pointcuts(at, kind, draft.graph, position, problems)
+            pointcuts = [replace(each, firing_time=firing_time or 0.0) for each in pointcuts]
+            detour = ModelWeaving(draft, Paths(draft), full, path, self.path, problems, position, kind)
+            woven = detour.weave(kind(), pointcuts, lambda *_: position)
+            detour.check(woven)
+            woven = detour.connect(woven)
+            check_nesting([*model.aspects, woven], draft.graph, problems)
+        draft.graph.positions.setdefault(f"aspect {full}", position)
+        model.adopt(draft, [*others, woven])
+        return woven
+
+    def _pointcuts(
+        self,
+        at: Places | Mapping[str, Places],
+        cls: type[Aspect],
+        graph: ModelGraph,
+        position: Position,
+        problems: Problems,
+    ) -> list[PointcutText]:
+        """Pointcuts as a model file would declare them."""
+        found = []
+        for request, ends in at.items() if isinstance(at, Mapping) else ((None, at),):
+            for end in each_of(ends):
+                path = end if isinstance(end, str) else self._place(end, cls, graph, position, problems)
+                if path is not None:
+                    here = path if path is end else path.removeprefix(self._full(""))
+                    pointcut = PointcutText.of(Text(here, within(Text(here, position), here)))
+                    found.append(replace(pointcut, request=None if request is None else Text(request, position)))
+        return found
+
+    def _place(
+        self, place: object, cls: type[Aspect], graph: ModelGraph, position: Position, problems: Problems
+    ) -> str | None:
+        """The path of a port, or of an actor or composite for an aspect that stands at such."""
+        if cls.at_ports or not isinstance(place, (Actor, Composite)):
+            return self._known(place, graph, position, problems)
+        if isinstance(place, Actor) and graph.actors.get(place.path) is not place:
+            problems.add(f"{place.path} is not part of this model", position, "add it to the model first")
+            return None
+        return place.path
+
+    def unweave(self, name: str) -> None:
+        """Take an aspect out, with its composite if it is a model."""
+        full, model = self._full(name), self._model
+        known = [woven.name for woven in model.aspects]
+        if full not in known:
+            raise mistake(
+                f"the model has no aspect {full!r}{did_you_mean(full, known)}",
+                call_site(),
+                f"its aspects: {', '.join(known) or 'none'}",
+            )
+        woven = model.aspects[known.index(full)]
+        if woven.model is not None:  # its composite is of no use without it
+            model.forget(woven.model.path)
+        model.aspects = [each for each in model.aspects if each.name != full]
+
+
+class Composite(Scope):
+    """A composite of a model: a scope for actors of its own, and ports through which it is connected.
+
+    Inside, ``connect`` takes its own ports by their names alone: ``connect("trigger -> sensor.trigger")``.
+    """
+
+    def input(self, name: str) -> CompositePort:
+        """Add an input port."""
+        return self._port(name, "input")
+
+    def output(self, name: str) -> CompositePort:
+        """Add an output port."""
+        return self._port(name, "output")
+
+    def _port(self, name: str, direction: str) -> CompositePort:
+        position = call_site()
+        self.check_port(name, (), position)
+        full = self._full(name)
+        self._model.edit().graph.add_composite_port(full, direction, position)
+        return CompositePort(full, direction)
+
+    def check_port(self, name: str, others: Collection[str], position: Position) -> None:
+        """Raise ``ModelError`` if there can be no such port, beside what there is and some others."""
+        full, graph = self._full(name), self._model.graph
+        with raising() as problems:
+            if not NAME.match(name):
+                problems.add(f"{name!r} is not a port name", position)
+            elif full in graph.ports or name in others:
+                problems.add(f"port {full!r} is declared twice", position)
+            elif name in graph.parts(self.path):
+                problems.add(f"{full!r} is the name of an actor and of a port", position, "rename one")
+
+    def __repr__(self) -> str:
+        inputs, outputs = (", ".join(_names(ports)) or "none" for ports in self._model.graph.borders(self.path))
+        return f"<Composite {self.path}: inputs {inputs}; outputs {outputs}>"
+
+
+def _label(graph: ModelGraph, composite: str) -> str:
+    """How messages call a composite: by its class, if it has one."""
+    kind = graph.composites[composite]
+    return composite if kind == OF_NO_CLASS else kind
+
+
+def _names(paths: Iterable[str]) -> list[str]:
+    return [path.rpartition(".")[2] for path in paths]

@@ -1,0 +1,278 @@
+"""Settling parameters: what is set from outside goes before what is given, and this before the default."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import (
+    Configurable,
+    EpicycleError,
+    Parameter,
+    ParameterError,
+    declared_parameters,
+    to_nanoseconds,
+    unknown_parameter,
+)
+
+from ..language import CompositeText, PartText, Setting, Settings, Values
+from ..text import (
+    RAISE_IT,
+    Entry,
+    Mapping,
+    Node,
+    Position,
+    Problems,
+    TooManyError,
+    data_file,
+    describe,
+    did_you_mean,
+    nearest,
+    raised_at,
+)
+from .draft import Draft
+
+_INDEX = re.compile(r"\[(\d+|\*)\]")
+# What people may try to set, and how it is done.
+_NO_PARAMETERS = {
+    "seed": "the seed of a run is the option --seed",
+    "stop": "the time at which a run ends is the option --until",
+    "count": "let the model have a parameter for it: 'count: ${n}'",
+    "priority": "let the model have a parameter for it: 'priority: ${p}'",
+    "enabled": "an aspect is taken out by --without, or let the model have a parameter for it: 'enabled: ${on}'",
+    "at": "an aspect is aimed anew by --aspect name=Type,at=...",
+}
+
+
+class Settler:
+    """Finds the values of all parameters of a model, and what is wrong with them."""
+
+    def __init__(self, settings: Settings, problems: Problems, values: Values | None = None) -> None:
+        self.settings = settings
+        self.problems = problems
+        self.values = values or Values(problems)
+        self._settable: dict[str, None] = {}
+
+    def parameters(
+        self,
+        path: str,
+        composite: CompositeText,
+        given: dict[str, Entry],
+        outer: dict[str, object],
+        position: Position | None,
+    ) -> dict[str, object]:
+        """The values of a composite's parameters: set from outside, else given, else the default."""
+        names: dict[str, object] = {}
+        label = path or composite.name
+        above = path.rpartition(".")[0]  # the composite whose fault a wrong value is
+        for key, entry in given.items():
+            if key not in composite.parameters:
+                self.problems.add(
+                    f"{label}: {composite.name} has no parameter {key!r}"
+                    f"{did_you_mean(key, list(composite.parameters))}",
+                    entry.key.position,
+                    f"valid parameters: {', '.join(composite.parameters) or 'none'}",
+                    scope=above,
+                )
+        given = _as_meant(given, composite.parameters)
+        for name, declared in composite.parameters.items():
+            full = f"{path}.{name}" if path else name
+            node, scope, instance = declared.value, names, path
+            later: Collection[str] = composite.parameters.keys()
+            if name in given:
+                node, scope, instance, later = given[name].value, outer, above, ()
+            if (setting := self._setting(full)) is not None:
+                node, scope, instance, later = setting.node, self.values.outside, "", ()
+            if node is None:
+                needs = f"{label}: {composite.name} needs" if path else f"{label} needs"
+                self.problems.add(
+                    f"{needs} a value for {name!r}",
+                    position or declared.position,
+                    *((f"{name}: {declared.doc}",) if declared.doc else ()),
+                    scope=above,
+                )
+                names[name] = self.values.missing
+                continue
+            value = self.values.of(node, scope, full, instance, later)
+            names[name] = self.values.declared(full, declared, value, node.position, instance)
+        return names
+
+    def _setting(self, full: str) -> Setting | None:
+        """The setting for a parameter, if there is one."""
+        self._settable[full] = None
+        try:
+            return self.settings.find(full)
+        except TooManyError as error:
+            self.problems.add(f"{full}: {error}", self.settings.position, RAISE_IT)
+            self.problems.raise_if_any()
+            raise AssertionError("too many paths are a problem") from None
+
+    def set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
+        """The parameters of something that is made already which are set from outside, with their new values."""
+        changed: dict[str, object] = {}
+        for name, parameter in declared_parameters(type(part)).items():
+            setting = self._setting(f"{path}.{name}")
+            if setting is not None:
+                label = f"{path}.{name}"
+                value = converted(self.values, setting.node, self.values.outside, label, "", parameter.convert)
+                changed |= {} if value is self.values.missing else {name: value}
+        return changed
+
+    def configuration(
+        self,
+        label: str,
+        cls: type,
+        given: dict[str, Entry],
+        names: dict[str, object],
+        position: Position,
+        path: str,
+        composite: str,
+    ) -> dict[str, object] | None:
+        """Converted values for a Configurable class; None if some are wrong."""
+        declared = declared_parameters(cls)
+        before, complete = len(self.problems), True
+        result: dict[str, object] = {}
+        for key, entry in given.items():
+            if key not in declared:
+                self.problems.add(
+                    f"{label}: {unknown_parameter(cls, key)}",
+                    entry.key.position,
+                    f"valid parameters: {', '.join(declared) or 'none'}",
+                    scope=composite,
+                )
+        given = _as_meant(given, declared)
+        for name, parameter in declared.items():
+            node = given[name].value if name in given else None
+            scope = names
+            if (setting := self._setting(f"{path}.{name}")) is not None:
+                node, scope = setting.node, self.values.outside
+            if node is None:
+                if parameter.required:
+                    self.problems.add(
+                        f"{label}: {cls.__name__} needs a value for {name!r}",
+                        position,
+                        *((f"{name}: {parameter.doc}",) if parameter.doc else ()),
+                        scope=composite,
+                    )
+                continue
+            value = self.values.of(node, scope, f"{label}.{name}", composite)
+            if value is self.values.missing:
+                complete = False
+                continue
+            try:
+                result[name] = parameter.convert(value)
+                if parameter.type is Path and result[name] is not None:
+                    result[name] = data_file(Path(value), node.position)
+            except ParameterError as error:
+                self.problems.add(
+                    f"{label}.{name}: {error}", place_of(node, error.keys, of_key=error.of_key), scope=composite
+                )
+            except Exception as error:  # of a class of a user's
+                self.blame(f"{label}.{name}", error, node.position, composite)
+        return result if complete and len(self.problems) == before else None
+
+    def is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
+        """Whether an aspect is to act; one of which that is not known is."""
+        if part.enabled is None:
+            return True
+        convert = Parameter(bool).convert
+        found = converted(self.values, part.enabled, names, f"aspect {name}.enabled", scope, convert)
+        return found is self.values.missing or bool(found)
+
+    def blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
+        """Tell what the code of a class has against its values, or how it failed."""
+        if isinstance(error, EpicycleError):
+            self.problems.add(f"{label}: {error}", position, scope=scope)
+            return
+        told = str(error) if isinstance(error, ValueError) else ""
+        self.problems.add(
+            f"{label}: {told or describe(error)}", position, scope=scope, raised=raised_at(error), cause=error
+        )
+
+    def check_unused(self, draft: Draft) -> None:
+        """Add a problem for every setting that no parameter took, unless it is meant for an array that is empty now."""
+        for setting in self.settings.unused():
+            if not draft.excuses(setting.path):
+                self._add_unused(setting)
+
+    def _add_unused(self, setting: Setting) -> None:
+        known = list(dict.fromkeys(_in_terms_of(setting.path, path) for path in self._settable))
+        owner, _, last = setting.path.rpartition(".")
+        beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
+        if last in _NO_PARAMETERS and last not in beside:
+            self.problems.add(f"{setting.path!r} sets no parameter", setting.position, _NO_PARAMETERS[last])
+            return
+        # One that differs in indices alone, or the nearest one of the same owner, or else the nearest of all.
+        alike = [path for path in known if _INDEX.sub("", path) == _INDEX.sub("", setting.path)]
+        meant, name = nearest(setting.path, alike), nearest(last, beside)
+        if meant is None and name is not None:
+            meant = f"{owner}.{name}" if owner else name
+        meant = meant or nearest(setting.path, known)
+        near = "" if meant is None else f", did you mean {meant!r}?"
+        valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
+        self.problems.add(f"{setting.path!r} sets no parameter{near}", setting.position, *(() if near else valid))
+
+
+def _in_terms_of(pattern: str, path: str) -> str:
+    """The path with ``[*]`` where the pattern has it, or leaves an index out: ``a[*].b[0]`` for ``a[2].b[0]``."""
+    asked, parts = pattern.split("."), path.split(".")
+    for place, (wanted, part) in enumerate(zip(asked, parts, strict=False)):
+        name, bracket, _ = part.partition("[")
+        if bracket and (wanted == name or wanted.endswith("[*]")):
+            parts[place] = f"{name}[*]"
+    return ".".join(parts)
+
+
+def nanoseconds(duration: object) -> int:
+    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
+    seconds: Any = Parameter(float, unit="s", min=0.0).convert(duration)
+    return to_nanoseconds(seconds or 0.0)
+
+
+def local_nanoseconds(start: object) -> int:
+    """The same for the start of a composite's local time, which may be negative."""
+    return to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
+
+
+def drift(value: object) -> float:
+    """How fast local time goes; raises ``ParameterError``."""
+    found: Any = Parameter(float, unit="1", min=1e-6, max=1e6).convert(value)
+    return 1.0 if found is None else float(found)
+
+
+def converted(
+    values: Values, node: Node, names: dict[str, object], label: str, scope: str, convert: Callable[[Any], Any]
+) -> Any:
+    """A value as ``convert`` makes it; ``missing``, and a problem, if that cannot be."""
+    value = values.of(node, names, label, scope)
+    if value is not values.missing:
+        try:
+            return convert(value)
+        except ParameterError as error:
+            place = place_of(node, error.keys, of_key=error.of_key)
+            values.problems.add(f"{label}: {error}", place, scope=scope)
+        except ValueError as error:
+            values.problems.add(f"{label}: {error}", node.position, scope=scope)
+    return values.missing
+
+
+def place_of(node: Node, keys: tuple[str, ...], *, of_key: bool) -> Position:
+    """Where in a value, as far as it is written out, ``keys`` lead; ``of_key``: to the last of them itself."""
+    for number, key in enumerate(keys, start=1):
+        if not isinstance(node, Mapping) or key not in node.entries:
+            break
+        if of_key and number == len(keys):
+            return node.entries[key].key.position
+        node = node.entries[key].value
+    return node.position
+
+
+def _as_meant(given: dict[str, Entry], valid: Collection[str]) -> dict[str, Entry]:
+    """The values with misspelled names put right, or else they would seem to be missing as well."""
+    result = {name: entry for name, entry in given.items() if name in valid}
+    for name, entry in given.items():
+        if name not in valid and (meant := nearest(name, valid)) is not None:
+            result.setdefault(meant, entry)
+    return result

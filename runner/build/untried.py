@@ -1,0 +1,80 @@
+"""Composite classes that a model does not use: unfolded for trial, with parameters whose values are not known."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from epicycle.actors import counted
+
+from ..graph import ModelGraph
+from ..language import CompositeText, Settings, Values
+from ..text import RAISE_IT, Limits, Problems
+from .checks import check
+from .draft import Draft
+from .settle import Settler
+from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .weave_all import weave_all
+
+_OVERHEAD = 3  # what a class takes beside what is in it, as many actors
+
+
+def try_classes(known: Known, used: Collection[str], values: Values, limits: Limits, problems: Problems) -> None:
+    """Check what can be checked of every class of which the model has no instance.
+
+    All trials together may cost as much as a model of half the largest size; a warning tells what is left over.
+    """
+    tried = set(used)
+    inner = {
+        part.type.text
+        for composite in known.composites.values()
+        for part in (*composite.actors.values(), *composite.aspects.values())
+    }
+    most = left = limits.actors // 2
+    untried: list[str] = []
+    # Those that stand in no other come first, for the others are then tried as their parts.
+    for name in sorted(known.composites, key=lambda name: name in inner):
+        if name in tried:
+            continue
+        is_whole = False
+        if left > 0:
+            made = Unfolded(Draft(ModelGraph(limits)), left)
+            is_whole = _try(
+                known.composites[name], made, known, Settler(Settings(), problems, Values(problems, values.budget))
+            )
+            left -= _OVERHEAD + made.cost + (made.draft.graph.connections + made.places) // 5
+            tried |= made.classes
+        if not is_whole:
+            untried.append(name)
+    if untried:
+        names = (
+            f"{untried[0]} is" if len(untried) == 1 else f"{untried[0]} and {counted(len(untried) - 1, 'other')} are"
+        )
+        problems.warn(
+            f"{names} not checked in full: the model has no instance of such a class, and to try all that it has none "
+            f"of takes more than {most:,} actors and composites",
+            known.composites[untried[0]].position,
+            RAISE_IT,
+        )
+
+
+def _try(composite: CompositeText, made: Unfolded, known: Known, settler: Settler) -> bool:
+    """Unfold one instance of a class, called as it is, with nothing around it; whether all of it was looked at."""
+    path, values, draft = composite.name, settler.values, made.draft
+    names: dict[str, object] = {}
+    for name, declared in composite.parameters.items():
+        if declared.value is not None:
+            so_far = {**names, "index": values.missing}
+            value = values.of(declared.value, so_far, f"{path}.{name}", path, list(composite.parameters))
+            values.declared(f"{path}.{name}", declared, value, declared.value.position, path)
+        # The default is one value of many: what is computed from it is not judged.
+        names[name] = values.missing
+    names.setdefault("index", values.missing)
+    try:
+        Unfolding(known, settler, made, "").composite(path, composite, names, None)
+    except TooLargeError:
+        return False
+    inputs, outputs = draft.graph.borders(path)
+    draft.open.update(inputs, outputs)  # anything may be connected to them
+    weave_all(made, known, settler)
+    check(draft, settler.problems, whole=False)
+    return True

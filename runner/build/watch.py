@@ -1,0 +1,191 @@
+"""What is watched of a model: how long it runs, what it records, and its metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, type_name
+
+from ..catalogue import Measure
+from ..graph import Metric, Watched
+from ..language import DeclarationReader, MetricText, ModelText, Values
+from ..text import (
+    MAX_SEED,
+    RAISE_IT,
+    Node,
+    PathIndex,
+    PatternError,
+    Position,
+    Problems,
+    Scalar,
+    Text,
+    TooManyError,
+    did_you_mean,
+    plain,
+)
+from .draft import Draft
+from .settle import converted, nanoseconds
+
+# Larger seeds could not be told apart in the int64 columns of result files.
+
+
+class Watching:
+    """Finds what is to be watched: ``read`` what a file says, the others what a program asks for."""
+
+    def __init__(self, draft: Draft, values: Values, problems: Problems, recorded: Collection[str] = ()) -> None:
+        self.found = Watched()
+        self.draft = draft
+        self.graph = draft.graph
+        self.values = values
+        self.problems = problems
+        ports = self.graph.ports.nodes(data="direction")
+        outputs = (path for path, direction in ports if direction == "output")
+        self._outputs = PathIndex(outputs, self.graph.limits)
+        self._recorded = set(recorded)
+        self._watched = 0
+
+    def read(self, text: ModelText, names: dict[str, object]) -> Watched:
+        """Everything that the model file says about it."""
+        reader = DeclarationReader(self.problems)
+        for key, entry in text.run.items():
+            if key in ("record", "stop_when"):
+                watch = self.record if key == "record" else self.stop_when
+                seen: set[str] = set()  # each once: a pattern may select all of a model
+                for each in reader.texts(entry.value, key):
+                    if each.text not in seen:
+                        seen.add(each.text)
+                        watch(each)
+                continue
+            convert = nanoseconds if key == "stop" else checked_seed
+            value = converted(self.values, entry.value, names, key, "", convert)
+            if value is not self.values.missing:
+                setattr(self.found, "stop_time" if key == "stop" else "seed", value)
+        for metric in text.metrics:
+            self._read_metric(metric, names)
+        return self.found
+
+    def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
+        """A metric as the file gives it."""
+        values: dict[str, object] = {}
+        for key, entry in text.values.items():
+            # What is only read by people holds no expressions.
+            if key in ("take", "unit", "to", "doc"):
+                values[key] = _words(entry.value)
+            else:
+                values[key] = self.values.of(entry.value, names, f"metric {text.name}, {key}")
+        places = {key: entry.value.position for key, entry in text.values.items()}
+        if self.values.missing not in values.values():
+            self.metric(text.name, text.port, values, text.position, places)
+
+    def record(self, text: Text) -> None:
+        """Keep what the ports behind a pattern send."""
+        found = [path for path in self.select(text, "record") if path not in self._recorded]
+        self._recorded.update(found)
+        self.found.recorded += found
+
+    def stop_when(self, text: Text) -> None:
+        """End the run when a port behind the pattern sends something true."""
+        self.found.stop_position = text.position
+        for path in self.select(text, "stop_when"):
+            self.found.stop_ports.append(path)
+            for port in self.graph.source_of(path):
+                if not accepts(float | bool, port.type):
+                    self.problems.add(
+                        f"stop_when: {path} sends {type_name(port.type)}, which is neither true nor false",
+                        text.position,
+                        "name a port that sends bool or numbers; the run ends when it sends true, or not 0",
+                    )
+                    return
+
+    def metric(
+        self,
+        name: str,
+        of: Text,
+        options: Mapping[str, object],
+        position: Position,
+        places: Mapping[str, Position] | None = None,
+    ) -> None:
+        """Take one number from what the ports behind a pattern send; ``places``: where its options stand."""
+        what = f"metric {name}"
+        measure = self._measure(what, options, position, places or {})
+        if measure is None:
+            return
+        paths = self.select(of, what)
+        self._watched += len(paths)
+        limit = self.graph.limits.watched
+        if self._watched > limit:
+            self.problems.add(f"{what}: metrics are taken from more than {limit:,} ports", position, RAISE_IT)
+            self.problems.raise_if_any()
+        self.found.metrics.append(Metric(name, paths, measure))
+        if measure.kind.of == "any":
+            return
+        wanted: Any = float | bool if measure.kind.of == "numbers" else float | bool | str
+        for path in paths:
+            for port in self.graph.source_of(path):
+                if port.type in (Any, object) or not accepts(wanted, port.type):
+                    self.problems.add(
+                        f"{what}: {path} sends {type_name(port.type)}, of which there is no {measure.take!r}",
+                        of.position,
+                        "name a port that sends numbers, or take 'count'",
+                    )
+                    return
+
+    def _measure(
+        self, what: str, options: Mapping[str, object], position: Position, places: Mapping[str, Position]
+    ) -> Measure | None:
+        """What is taken; None, and problems, if that cannot be."""
+        before = len(self.problems)
+        values: dict[str, object] = {}
+        declared = declared_parameters(Measure)
+        for key, value in options.items():
+            if key not in declared:
+                self.problems.add(f"{what}: there is no option {key!r}{did_you_mean(key, declared)}", position)
+                continue
+            try:
+                values[key] = declared[key].convert(value)
+            except ParameterError as error:
+                self.problems.add(f"{what}, {key}: {error}", places.get(key, position))
+        if len(self.problems) > before:
+            return None
+        measure = Measure(**values)
+        for option, problem, advice in measure.misfits():
+            self.problems.add(f"{what}: {problem}", places.get(option, position), *([advice] if advice else []))
+        return measure
+
+    def select(self, text: Text, what: str) -> list[str]:
+        """The output ports that a pattern selects, composites' included."""
+        try:
+            found = self._outputs.select(text.text)
+        except PatternError as error:
+            self.problems.add(f"{what}: {text.text!r} is no pattern: {error}", text.position)
+            return []
+        except TooManyError as error:
+            self.problems.add(f"{what}: {error}", text.position, RAISE_IT)
+            self.problems.raise_if_any()
+            raise AssertionError("too many paths are a problem") from None
+        if found or self.draft.excuses(text.text):
+            return found
+        guess = self._outputs.did_you_mean(text.text)
+        if text.text in self.graph.ports.nodes:
+            self.problems.add(
+                f"{what}: {text.text} is an input port, but an output port is needed{guess}", text.position
+            )
+        else:
+            self.problems.add(
+                f"{what}: {text.text!r} matches no output port{guess}",
+                text.position,
+                *self._outputs.advice(text.text),
+            )
+        return []
+
+
+def _words(node: Node) -> object:
+    """A text, which may look like something else: ``unit: 1``."""
+    return node.text if isinstance(node, Scalar) and node.value is not None else plain(node)
+
+
+def checked_seed(value: object) -> int:
+    """A seed as a whole number; raises ``ParameterError``."""
+    seed: Any = Parameter(int, min=0, max=MAX_SEED).convert(value)
+    return int(seed)

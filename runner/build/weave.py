@@ -1,0 +1,498 @@
+"""From aspect declarations to aspects that stand at ports and connections.
+
+A pointcut is a pattern of ports (``observer[*].plan_in``), of a connection (``a.out -> b.in``), or a choice by the
+type of an actor or composite, or by a tag that the model's author put on it, with the name of a port.  What a pattern
+with a ``!`` before it selects is left out again.  An aspect that stands at actors is aimed at these by their paths, or
+at a composite for all the actors in it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
+from typing import Any
+
+from epicycle.actors import declared_parameters
+from epicycle.actors.expression import PortFormula
+from epicycle.aspects import (
+    Aspect,
+    JoinPointAspect,
+    PortsParameter,
+    Reading,
+    Selection,
+    SelectionParameter,
+)
+
+from ..graph import WovenAspect
+from ..language import PointcutText
+from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, in_general, nearest
+from .draft import Draft
+from .firing_times import unknown_inputs
+
+
+class Paths:
+    """What the pointcuts of a model's aspects choose from, found out once for all of them; of ``ports``, or of all."""
+
+    def __init__(self, draft: Draft, ports: Iterable[str] | None = None) -> None:
+        self._draft, self._graph = draft, draft.graph
+        graph = draft.graph
+        self.ports = PathIndex(graph.ports.nodes if ports is None else ports, graph.limits)
+
+    @cached_property
+    def actors(self) -> PathIndex:
+        """All actors."""
+        return PathIndex(self._graph.actors, self._graph.limits)
+
+    @cached_property
+    def holders(self) -> PathIndex:
+        """All actors and composites."""
+        return PathIndex([*self._graph.actors, *self._graph.composites], self._graph.limits)
+
+    @cached_property
+    def owners(self) -> PathIndex:
+        """All composites and actors, those that could not be made included."""
+        graph = self._graph
+        unmade = sorted(set(map(graph.owner, self._draft.open)))
+        return PathIndex(dict.fromkeys((*graph.composites, *graph.actors, *unmade)), graph.limits)
+
+    @cached_property
+    def kinds(self) -> dict[str, str]:
+        """The types of all actors and composites."""
+        return {path: type(actor).__name__ for path, actor in self._graph.actors.items()} | self._graph.composites
+
+
+class Weaving:
+    """Finds the places of one aspect; ``scope`` is the composite that declares it, to which its names are relative."""
+
+    def __init__(
+        self, draft: Draft, paths: Paths, name: str, cls: type[Aspect], scope: str, problems: Problems
+    ) -> None:
+        self.draft = draft
+        self.graph = draft.graph
+        self.paths = paths
+        self.ports = paths.ports
+        self.name = name
+        self.cls = cls
+        self.scope = scope
+        self.problems = problems
+        self._parameters: dict[str, bool] = {}  # those that pointcuts select, and whether they are left out again
+        self._left_out: set[str] = set()  # ports, which counts for the connections to them, too
+        self._is_excused = False  # whether a pointcut selects nothing because there is nothing now
+
+    @property
+    def kind(self) -> str:
+        """The name of its type."""
+        return self.cls.__name__
+
+    def weave(
+        self, aspect: Aspect, pointcuts: Sequence[PointcutText], position_of: Callable[..., Position | None]
+    ) -> WovenAspect:
+        """The aspect with its places and all that it looks at; a pointcut that selects nothing is a problem.
+
+        ``position_of`` tells where a parameter, or a key in it, is set in the model file.
+        """
+        before = len(self.problems)
+        ports, connections, actors = self.select(pointcuts)
+        parameters = [path for path, is_left_out in self._parameters.items() if not is_left_out]
+        is_somewhere = ports or connections or actors or parameters
+        if pointcuts and not is_somewhere and not self._is_excused and len(self.problems) == before:
+            only_out = all(pointcut.exclude for pointcut in pointcuts)
+            nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
+            self._problem(nowhere, pointcuts[0])
+        readings: dict[PortFormula, list[Reading]] = {}
+        selections: dict[str, Selection] = {}
+        reads: list[str] = []
+        for name, parameter in declared_parameters(type(aspect)).items():
+            value, position = getattr(aspect, name), position_of(name)
+            if isinstance(parameter, SelectionParameter):
+                patterns = parameter.patterns(value)
+                found = selections[name] = {each: self._selected(name, each, parameter, position) for each in patterns}
+                if isinstance(parameter, PortsParameter):
+                    reads += [port for ports_found in found.values() for port in ports_found]
+            elif isinstance(value, PortFormula):
+                readings[value] = [self._reading(name, each, position) for each in value.references]
+                for reference, fields in value.given_fields:
+                    self._check_given(name, reference, fields, ports, position)
+        asked = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
+        chosen = (port for pattern in asked for port in self.ports.select(self._full(pattern)))
+        reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
+        woven = WovenAspect(
+            self.name, aspect, ports, connections, actors, readings, selections, reads, parameters=parameters
+        )
+        self.check_times(woven, position_of)
+        return woven
+
+    def check_times(self, woven: WovenAspect, position_of: Callable[..., Position | None]) -> None:
+        """See that execution times by input port name ports that the actors have."""
+        for message, keys, advice in unknown_inputs(woven, self.graph):
+            self._problem(message, position_of(*keys), advice)
+
+    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
+        """The ports, connections and actors that the pointcuts select."""
+        if not self.cls.at_ports:
+            return [], [], self._select_actors(pointcuts)
+        return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
+
+    def _select_ports(self, pointcuts: Sequence[PointcutText]) -> list[str]:
+        """The ports that the pointcuts select."""
+        of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
+        chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
+        self._left_out = {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
+        return self.ports.in_order(chosen - self._left_out)
+
+    def _of(self, pointcut: PointcutText) -> list[str]:
+        """The ports at which the aspect can stand, of those that one pointcut selects."""
+        if self._stands_at_parameters(pointcut):
+            return []
+        found: list[str] | None = None
+        if pointcut.text:
+            found = self._matching(pointcut)
+        elif pointcut.type is not None or pointcut.tag is not None:
+            found = self._chosen(pointcut)
+        else:
+            self._is_excused = self._is_excused or not pointcut.exclude  # it is misshapen, and has been told so
+        if found is None:
+            return []
+        fitting = [port for port in found if self._fits(port)]
+        if found and not fitting:
+            self._problem(
+                f"{self.kind} stands at {' or '.join(sorted(self.cls.stands_at))} ports, "
+                f"but {found[0]} is an {self.graph.direction(found[0])} port",
+                pointcut,
+            )
+        return fitting
+
+    def _stands_at_parameters(self, pointcut: PointcutText) -> bool:
+        """Whether a pointcut is aimed at parameters of actors: it says so, or fits no port where it could stand.
+
+        A pattern must name the parameter in full: ``sensor.*`` are ports.
+        """
+        said, pattern = pointcut.parameter, self._full(pointcut.text)
+        owner, _, name = pattern.rpartition(".")
+        if said is None and (not pointcut.text or not owner or "*" in name):
+            return False
+        if not self.cls.alters_parameters:
+            if said is not None:
+                self._problem(f"{self.kind} alters no parameters", said, "leave 'parameter' out")
+            return said is not None
+        if said is not None:
+            chosen, name = self._chosen_owners(pointcut), said.text
+            actors = None if chosen is None else [path for path in self.graph.actors if path in chosen]
+        else:
+            try:
+                if any(self._fits(port) for port in self.ports.select(pattern)):
+                    return False
+                actors = self.paths.actors.select(owner)
+            except PatternError:
+                return False  # which is told of it as a pattern of ports
+        having = [path for path in actors or () if name in declared_parameters(type(self.graph.actors[path]))]
+        if said is not None and actors is not None and not having:
+            names = sorted({each for path in actors for each in declared_parameters(type(self.graph.actors[path]))})
+            self._problem(
+                f"no {_asked(pointcut)} has a parameter {name!r}{did_you_mean(name, names)}",
+                said,
+                f"their parameters: {', '.join(names) or 'none'}",
+            )
+        for path in having:
+            self._enter_parameter(path, name, pointcut)
+        return bool(having) or said is not None
+
+    def _parameter_meant(self, pattern: str) -> tuple[str, ...]:
+        """The parameter of an actor that a pattern nearly names, as advice."""
+        owner, _, name = pattern.rpartition(".")
+        if not self.cls.alters_parameters or owner not in self.graph.actors:
+            return ()
+        meant = nearest(name, declared_parameters(type(self.graph.actors[owner])))
+        return () if meant is None else (f"{owner} has a parameter {meant!r}",)
+
+    def _enter_parameter(self, actor: str, name: str, pointcut: PointcutText) -> None:
+        """Take a parameter of an actor, if it holds numbers that nothing else changes."""
+        path, parameter = f"{actor}.{name}", declared_parameters(type(self.graph.actors[actor]))[name]
+        about = ("altered", in_general(path))
+        if pointcut.exclude:
+            self._parameters[path] = True
+        elif parameter.type not in (int, float, int | float):
+            self._problem(
+                f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut, about=about
+            )
+        elif vars(self.graph.actors[actor])[name] is None:
+            self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
+        elif path in self.graph.ports and self.graph.incoming(path):
+            sender = self.graph.incoming(path)[0].source
+            self._problem(
+                f"{path} gets its values over a connection",
+                pointcut,
+                f"let the aspect stand at {sender!r}, where they come from",
+                about=about,
+            )
+        else:
+            self._parameters.setdefault(path, False)
+
+    def _matching(self, pointcut: PointcutText) -> list[str] | None:
+        """What a pattern selects."""
+        full = self._full(pointcut.text)
+        try:
+            found = self.ports.select(full)
+        except PatternError as error:
+            several = ("for several pointcuts, write a list: [a.in, b.in]",) if "," in pointcut.text else ()
+            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut, *several)
+            return None
+        if not found and not self._excuses(full):
+            near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
+            advice = self.ports.advice(pointcut.text, self.scope, self._fits)
+            self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, *advice, *self._parameter_meant(full))
+        return found
+
+    def _chosen(self, pointcut: PointcutText) -> list[str] | None:
+        """The ports of the actors and composites of a type, or with a tag."""
+        graph, owners = self.graph, self._chosen_owners(pointcut)
+        if owners is None:
+            return None
+        of_owners = dict.fromkeys(path for owner in owners for path in self.ports.inside(owner))
+        ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
+        if pointcut.port is None:
+            found = [path for path in ports if self._fits(path)]
+            if not found and not any(path in self.draft.unknown for path in owners):
+                wanting = " or ".join(sorted(self.cls.stands_at))
+                where = pointcut.type or pointcut.tag
+                self._problem(f"{self.kind} stands at {wanting} ports, but no {_asked(pointcut)} has one", where)
+            return found
+        found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
+        if not found:
+            names = sorted({path.rpartition(".")[2] for path in ports})
+            self._problem(
+                f"no {_asked(pointcut)} has a port {pointcut.port.text!r}{did_you_mean(pointcut.port.text, names)}",
+                pointcut.port,
+                f"their ports: {', '.join(names) or 'none'}",
+            )
+            return None
+        return found
+
+    def _chosen_owners(self, pointcut: PointcutText) -> set[str] | None:
+        """The actors and composites of a type, or with a tag."""
+        graph = self.graph
+        kinds = self.paths.kinds
+        inside = self.paths.holders.inside(self.scope)
+        self.paths.holders.spend(len(inside))
+        inside = [path for path in inside if path in kinds]
+        if pointcut.type is not None:
+            owners = {path for path in inside if kinds[path] == pointcut.type.text}
+            wanted, known = pointcut.type, {kinds[path] for path in inside}
+        else:
+            assert pointcut.tag is not None
+            wanted = pointcut.tag
+            owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
+            known = {tag for path in inside for tag in graph.tags.get(path, ())}
+        unknown = [path for path in self.draft.unknown if not self.scope or path.startswith(f"{self.scope}.")]
+        if not owners and (unknown or wanted.text in self.draft.kinds):
+            self._is_excused = True
+            return None
+        if not owners:
+            what = "types" if pointcut.type is not None else "tags"
+            self._problem(
+                f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}",
+                wanted,
+                f"{what} in it: {', '.join(sorted(known)) or 'none'}",
+            )
+            return None
+        return owners
+
+    def _select_actors(self, pointcuts: Sequence[PointcutText]) -> dict[str, str]:
+        """The actors that the pointcuts select, as such or with a composite around them, and what was aimed at."""
+        index = self.paths.owners
+        aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
+        spared = {path for pointcut in pointcuts if pointcut.exclude for path in self._aimed_at(pointcut, index)}
+        known = self.paths.holders.paths
+        if any(each not in known for unit in aimed for each in (unit, *index.inside(unit))):
+            self._is_excused = True  # there is an actor that could not be made, which has been told
+        found = {}
+        actors = self.paths.actors
+        for actor in actors.in_order({each for unit in aimed for each in (unit, *actors.inside(unit))} & actors.paths):
+            parts = actor.split(".")
+            around = [".".join(parts[:length]) for length in range(1, len(parts) + 1)]
+            unit = next((path for path in around if path in aimed), None)
+            if unit is not None and not spared.intersection(around):
+                found[actor] = unit
+        return found
+
+    def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> Iterable[str]:
+        """The actors and composites that one pointcut selects."""
+        name, text = self.kind, pointcut.text
+        if pointcut.port is not None:
+            self._problem(f"{name} stands at actors, not at their ports", pointcut.port, "leave 'port' out")
+        if not text:
+            if pointcut.type is None and pointcut.tag is None:
+                self._is_excused = self._is_excused or not pointcut.exclude  # it is misshapen, and has been told so
+                return ()
+            return self._chosen_owners(pointcut) or ()
+        if "->" in text:
+            receiver = text.rpartition("->")[2].strip().rpartition(".")[0]
+            self._problem(
+                f"{name} stands at actors, not on connections",
+                pointcut,
+                f"write {receiver!r} for the one that receives",
+            )
+            return ()
+        full = self._full(text)
+        try:
+            found, ports = index.select(full), self.ports.select(full)
+        except PatternError as error:
+            several = ("for several pointcuts, write a list: [a, b]",) if "," in text else ()
+            self._problem(f"{text!r} is no pointcut: {error}", pointcut, *several)
+            return ()
+        if not found and not self._excuses(f"{full}.*"):
+            if ports and "." in text:
+                owner = text.rpartition(".")[0]
+                self._problem(
+                    f"{name} stands at actors, but {ports[0]} is a port",
+                    pointcut,
+                    f"write {owner!r}, without the port",
+                )
+            else:
+                inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
+                known = sorted(path for path in inside if path.count(".") == text.count("."))
+                self._problem(
+                    f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}",
+                    pointcut,
+                    f"actors and composites at this depth: {', '.join(known) or 'none'}",
+                )
+        return found
+
+    def _select_connections(self, pointcuts: Sequence[PointcutText]) -> list[tuple[str, str]]:
+        """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
+        chosen: dict[tuple[str, str], None] = {}
+        for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
+            if "->" not in pointcut.text:
+                continue
+            found = self._connections_of(pointcut)
+            if not pointcut.exclude:
+                chosen |= dict.fromkeys(found)
+            elif found and not chosen.keys() & found:
+                self._problem(
+                    f"'!{pointcut.text}' leaves out no connection that is selected",
+                    pointcut,
+                    "ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'",
+                )
+            else:
+                chosen = {each: None for each in chosen if each not in found}
+        return [each for each in chosen if each[1] not in self._left_out]
+
+    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
+        """The connections that one pointcut selects."""
+        if "input" not in self.cls.stands_at:
+            self._problem(f"{self.kind} stands at output ports, not on connections", pointcut)
+            return []
+        left, _, right = (part.strip() for part in pointcut.text.partition("->"))
+        try:
+            ends = set(self.ports.select(self._full(right)))
+            found = [
+                (hop.source, hop.destination)
+                for source in self.ports.select(self._full(left))
+                for hop in self.graph.outgoing(source)
+                if hop.destination in ends
+            ]
+        except PatternError as error:
+            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
+            return []
+        if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
+            known = [f"{hop.source} -> {hop.destination}" for *_, hop in self.graph.ports.edges(data="hop")]
+            self._problem(
+                f"{pointcut.text!r} matches no connection"
+                f"{did_you_mean(f'{self._full(left)} -> {self._full(right)}', known)}",
+                pointcut,
+            )
+        return found
+
+    def _excuses(self, pattern: str) -> bool:
+        """Whether a pattern that matches nothing is right."""
+        is_excused = self.draft.excuses(pattern)
+        self._is_excused = self._is_excused or is_excused
+        return is_excused
+
+    def _selected(
+        self, name: str, pattern: str, parameter: SelectionParameter[Any], position: Position | None
+    ) -> list[str]:
+        """What a pattern in the parameter ``name`` selects."""
+        of_ports = isinstance(parameter, PortsParameter)
+        paths = self.ports if of_ports else self.paths.holders
+        try:
+            found = paths.select(self._full(pattern))
+        except PatternError as error:
+            self._problem(f"{name}: {pattern!r} is no pattern: {error}", position)
+            return []
+        fitting = [path for path in found if not of_ports or self._sends(path)]
+        if found and not fitting:
+            self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
+        elif not found and not self.draft.excuses(self._full(pattern) + ("" if of_ports else ".*")):
+            near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
+            self._problem(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
+        elif len(fitting) > 1 and parameter.is_single:
+            self._problem(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
+        return fitting
+
+    def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
+        """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
+        parts = self._full(reference).split(".")
+        for length in range(len(parts), 1, -1):
+            port = ".".join(parts[:length])
+            if port in self.ports and self.graph.direction(port) == "output":
+                fields = tuple(parts[length:])
+                self._check_fields(name, reference, port, fields, position)
+                return port, fields
+        if self.draft.excuses(self._full(reference)):
+            return reference, ()  # nothing can send there now, and the condition never holds
+        if self._full(reference) in self.ports:
+            self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
+        else:
+            near = self.ports.did_you_mean(reference, self.scope, self._sends)
+            self._problem(f"{name}: {reference!r} names no output port{near}", position)
+        return reference, ()
+
+    def _check_given(
+        self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position | None
+    ) -> None:
+        """Whether the tokens that pass the aspect have the field; of ports that lack it, the first is told."""
+        for port in ports:
+            if not self._check_fields(name, f"{reference} at {port}", port, fields, position):
+                return
+
+    def _check_fields(
+        self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position | None
+    ) -> bool:
+        """Whether the tokens of a port have the field, where their type tells; if not, that is a problem."""
+        for source in self.graph.source_of(port) if fields else ():
+            if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
+                names = [each.name for each in dataclasses.fields(source.type)]
+                if fields[0] not in names:
+                    self._problem(
+                        f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}"
+                        f"{did_you_mean(fields[0], names)}",
+                        position,
+                        f"its fields: {', '.join(names)}",
+                    )
+                    return False
+        return True
+
+    def _fits(self, port: str) -> bool:
+        """Whether the aspect can stand there."""
+        return self.graph.direction(port) in self.cls.stands_at
+
+    def _sends(self, port: str) -> bool:
+        return self.graph.direction(port) == "output"
+
+    def _full(self, text: str) -> str:
+        return f"{self.scope}.{text}" if self.scope else text
+
+    def _problem(
+        self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
+    ) -> None:
+        position = where.position if isinstance(where, (PointcutText, Text)) else where
+        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope, about=about)
+
+
+def _asked(pointcut: PointcutText) -> str:
+    """What a pointcut asks for that chooses by type or tag."""
+    if pointcut.type is not None:
+        return f"actor of type {pointcut.type.text!r}"
+    return f"actor with the tag {pointcut.tag.text if pointcut.tag is not None else ''!r}"

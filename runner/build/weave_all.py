@@ -1,0 +1,170 @@
+"""From the declarations of aspects to aspects that stand in a model: those of the model, its classes and its actors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from epicycle.aspects import (
+    Aspect,
+    CompositeAspect,
+    CompositeExecutionAspect,
+    FiringTimeParameter,
+    class_decorations,
+)
+
+from ..catalogue import CatalogueError
+from ..graph import WovenAspect
+from ..language import PartText, PointcutText
+from ..text import RAISE_IT, Position, TooManyError, did_you_mean
+from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
+from .decorated import arranged, weave_decorations
+from .settle import Settler, converted, place_of
+from .unfold import AspectToWeave, Known, Unfolded
+from .weave import Paths, Weaving
+
+
+def weave_all(made: Unfolded, known: Known, settler: Settler) -> list[WovenAspect]:
+    """Let all aspects stand where they are to, now that all ports exist, in the order in which tokens meet them."""
+    weaver, graph, problems = _Weaver(made, known, settler), made.draft.graph, settler.problems
+    for each in made.aspects:
+        try:
+            weaver.weave(each)
+        except TooManyError as error:
+            problems.add(f"aspect {each.name}: {error}", each.part.position, RAISE_IT)
+            problems.raise_if_any()
+    found = weaver.found
+    decorated = {cls for cls in set(map(type, made.actors)) if class_decorations(cls)}
+    for actor in made.actors:
+        if type(actor) in decorated:
+            position = graph.positions[actor.path]
+            found += weave_decorations(actor, made.draft, problems, position, settler.set_from_outside)
+    found = arranged(found, graph)
+    if check_nesting(found, graph, problems):
+        graph.detours = detours(graph, found)
+    return found
+
+
+class _Weaver:
+    """Weaves what is declared, one after the other."""
+
+    def __init__(self, made: Unfolded, known: Known, settler: Settler) -> None:
+        self.made = made
+        self.draft = made.draft
+        self.graph = made.draft.graph
+        self.known = known
+        self.settler = settler
+        self.problems = settler.problems
+        self.paths = Paths(made.draft)
+        self.found: list[WovenAspect] = []
+
+    def weave(self, declared: AspectToWeave) -> None:
+        """Let one aspect stand where its declaration says."""
+        name, scope, part, names = declared.name, declared.scope, declared.part, declared.names
+        cls = self._type(name, scope, part)
+        if cls is None:
+            return
+        is_model = cls in (CompositeAspect, CompositeExecutionAspect)
+        given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
+        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name, scope)
+        if not part.at:
+            self.problems.add(
+                f"aspect {name} does not say where it stands",
+                part.position,
+                "add 'at:' with ports or patterns",
+                scope=scope,
+            )
+        self.graph.positions[f"aspect {name}"] = part.position
+        weaving = Weaving(self.draft, self.paths, name, cls, scope, self.problems)
+        if is_model and name in self.graph.composites:
+            weaving = ModelWeaving(self.draft, self.paths, name, name, scope, self.problems, part.position, cls)
+            part = replace(part, at=tuple(self._timed(pointcut, name, scope, names) for pointcut in part.at))
+        is_enabled = name in self.graph.composites if is_model else self.settler.is_enabled(name, scope, part, names)
+        try:
+            aspect = None if values is None else cls(**values)
+        except Exception as error:  # whatever an aspect's own __init__ does
+            self.settler.blame(f"aspect {name}", error, part.position, scope)
+            aspect = None
+        if aspect is None:
+            weaving.select(part.at)  # for what is wrong with it
+            if isinstance(weaving, ModelWeaving):
+                self.draft.leave_open(name)
+            return
+        woven = weaving.weave(aspect, part.at, partial(_position, part))
+        if isinstance(weaving, ModelWeaving):
+            weaving.check(woven)
+            woven = weaving.connect(woven)
+        self.made.places += len(woven.places)
+        limit = self.graph.limits.places
+        if self.made.places > limit:
+            self.problems.add(f"aspect {name}: aspects stand at more than {limit:,} places", part.position, RAISE_IT)
+            self.problems.raise_if_any()
+        if is_enabled:
+            self.found.append(woven)
+
+    def _type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
+        """What an aspect is; None, and told, if it cannot be that."""
+        known, wanted = self.known, part.type.text
+        if wanted in known.broken:
+            return None
+        try:
+            cls = known.catalogue.aspects.get(wanted)
+        except CatalogueError as error:
+            self.problems.add(f"aspect {name}: {error.message}", part.type.position, *error.help, scope=scope)
+            return None
+        if wanted in known.composites:
+            return self._model_type(name, scope, part, cls)
+        if cls is None:
+            near = did_you_mean(wanted, [*known.catalogue.aspects, *known.composites])
+            self.problems.add(
+                f"aspect {name}: there is no aspect type {wanted!r}{near}",
+                part.type.position,
+                *known.valid_types("aspect", wanted),
+                scope=scope,
+            )
+            return None
+        for pointcut in part.at:
+            for key, said in (("request", pointcut.request), ("time", pointcut.time)):
+                if said is not None:
+                    self.problems.add(
+                        f"aspect {name}: {wanted} is no composite, so a pointcut of it has no {key!r}",
+                        said.position,
+                        scope=scope,
+                    )
+        return cls
+
+    def _model_type(self, name: str, scope: str, part: PartText, namesake: type[Aspect] | None) -> type[Aspect] | None:
+        """Whether an aspect that is a composite stands at ports or at actors."""
+        if namesake is not None:
+            self.problems.add(
+                f"aspect {name}: {part.type.text} is an aspect type and a composite",
+                part.type.position,
+                "give the composite another name",
+                scope=scope,
+            )
+            return None
+        aimed = [pointcut for pointcut in part.at if not pointcut.exclude]
+        at_ports = [pointcut for pointcut in aimed if pointcut.time is None]
+        if at_ports and len(at_ports) < len(aimed):
+            self.problems.add(
+                f"aspect {name}: it stands at ports here, and elsewhere at actors",
+                at_ports[0].position,
+                "give every place a time, or none: actors have one, the execution time of their firings",
+                scope=scope,
+            )
+            self.draft.leave_open(name)
+            return None
+        return CompositeExecutionAspect if aimed and not at_ports else CompositeAspect
+
+    def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
+        """The pointcut with its execution time."""
+        if pointcut.time is None:
+            return pointcut
+        values, convert = self.settler.values, FiringTimeParameter().convert
+        time = converted(values, pointcut.time, names, f"aspect {name}: time", scope, convert)
+        return replace(pointcut, firing_time=0.0 if time is values.missing else time or 0.0)
+
+
+def _position(part: PartText, name: str, *keys: str) -> Position | None:
+    """Where a declaration sets a parameter, or a key in it."""
+    return place_of(part.values[name].value, keys, of_key=True) if name in part.values else None

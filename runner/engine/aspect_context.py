@@ -1,0 +1,64 @@
+"""What aspects get from the engine at the places where they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from epicycle.actors import Tag
+
+from ..results import EventLog, Signal
+from .director import ActorError, CrowdError, Director, LoopError
+from .local_time import Deliver, LocalDirector
+
+
+class EngineContext:
+    """What the engine offers to a join point: the time of the director that it stands under, the log and signals."""
+
+    def __init__(
+        self,
+        local: Director | LocalDirector,
+        director: Director,
+        log: EventLog,
+        latest: dict[str, Any],
+        signals: dict[str, Signal],
+        blame: Callable[[Exception], ActorError],
+    ) -> None:
+        self.seed = director.seed
+        self.latest = latest.get
+        self.stop = director.stop
+        self.hold = director.hold
+        self._blame = blame
+        self._local = local
+        self._director = director
+        self._log = log
+        self._signals = signals
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag."""
+        return self._local.tag
+
+    def later(self, delay: int, deliver: Deliver, token: Any) -> None:
+        """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
+        try:
+            self._local.later(delay, partial(self._deliver, deliver), token)
+        except CrowdError as error:
+            raise error.of(self._blame(error).path) from None
+
+    def _deliver(self, deliver: Deliver, token: Any) -> None:
+        try:
+            deliver(token)
+        except (ActorError, LoopError):  # of what comes behind it
+            raise
+        except Exception as error:
+            raise self._blame(error) from error
+
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        """Write an act of an aspect into the log."""
+        self._log.add(self._director.tag, event, owner, port, None, aspect, token)
+
+    def record(self, signal: str, token: Any) -> None:
+        """Append a token to a signal of the results."""
+        self._signals.setdefault(signal, Signal(signal)).add(self._director.tag, token)

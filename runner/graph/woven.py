@@ -1,0 +1,110 @@
+"""Woven aspects: what stands where in a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from epicycle.actors import counted
+from epicycle.actors.expression import PortFormula
+from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
+
+from ..text import Problems
+from .model_graph import ModelGraph, is_within
+
+
+@dataclass(frozen=True)
+class AspectModel:
+    """The composite that an aspect is, the port from which it answers, and the port by which each place asks it."""
+
+    path: str
+    kind: str
+    response: str
+    requests: dict[str, str]
+    times: dict[str, FiringTime] = field(default_factory=dict)  # how long the firings of an actor take
+
+    def at(self, place: str) -> dict[str, object]:
+        """What a model file would say of a place: the request port, if there are several, and the time."""
+        said: dict[str, object] = {}
+        if len(set(self.requests.values())) > 1:
+            said["request"] = self.requests[place].rpartition(".")[2]
+        if place in self.times:
+            said["time"] = self.times[place]
+        return said
+
+
+@dataclass(frozen=True, eq=False)
+class WovenAspect:
+    """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
+
+    ``actors`` are those at which it stands, and what was aimed at: the actor, or a composite around it; ``parameters``
+    those of actors that it alters.  ``model`` is its composite if it is a model itself, ``comes_with_actor`` tells that
+    the actor's class or instance was decorated.  ``readings`` are what its expressions over ports ask for,
+    ``selections`` what its parameters with patterns select, ``reads`` the ports that it looks at otherwise.
+    """
+
+    name: str
+    aspect: Aspect
+    ports: list[str]
+    connections: list[tuple[str, str]] = field(default_factory=list)
+    actors: dict[str, str] = field(default_factory=dict)
+    readings: dict[PortFormula, list[Reading]] = field(default_factory=dict)
+    selections: dict[str, Selection] = field(default_factory=dict)
+    reads: list[str] = field(default_factory=list)
+    model: AspectModel | None = None
+    comes_with_actor: bool = False
+    parameters: list[str] = field(default_factory=list)
+
+    @property
+    def kind(self) -> str:
+        """The name of its type."""
+        return type(self.aspect).__name__ if self.model is None else self.model.kind
+
+    @property
+    def places(self) -> list[str]:
+        """Where it stands, in words."""
+        connections = (f"{source} -> {destination}" for source, destination in self.connections)
+        return [*self.ports, *connections, *self.actors, *self.parameters]
+
+    def without(self, path: str) -> WovenAspect:
+        """The aspect when a part of the model is taken out at which it stood, too."""
+        return replace(
+            self,
+            ports=[port for port in self.ports if not is_within(port, path)],
+            actors={actor: unit for actor, unit in self.actors.items() if not is_within(actor, path)},
+            parameters=[each for each in self.parameters if not is_within(each, path)],
+            connections=[ends for ends in self.connections if not any(is_within(end, path) for end in ends)],
+        )
+
+    @property
+    def looks_at(self) -> list[str]:
+        """All ports whose latest tokens it needs to know."""
+        return [*self.reads, *(port for readings in self.readings.values() for port, _ in readings)]
+
+
+def extent(aspects: Iterable[WovenAspect]) -> str:
+    """At how many ports and actors some aspects stand, in words."""
+    kinds = [
+        "parameter" if place in woven.parameters else "actor" if place in woven.actors else "port"
+        for woven in aspects
+        for place in woven.places
+    ]
+    numbers = [(kinds.count(word), word) for word in ("port", "actor", "parameter")]
+    said = [counted(number, noun) for number, noun in numbers if number]
+    return " and ".join(said) or "no place"
+
+
+def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> None:
+    """An actor runs on one processor at most."""
+    taken: dict[str, str] = {}
+    for woven in aspects:
+        aspect = woven.aspect
+        if not (isinstance(aspect, ExecutionAspect) and aspect.is_processor):
+            continue
+        if twice := [actor for actor in woven.actors if actor in taken]:
+            problems.add(
+                f"aspect {woven.name}: {twice[0]} runs on the processor {taken[twice[0]]!r} already",
+                graph.positions.get(f"aspect {woven.name}"),
+                f"an actor has one processor: leave it out here, with '!{twice[0]}', or there",
+            )
+        taken.update(dict.fromkeys(woven.actors, woven.name))

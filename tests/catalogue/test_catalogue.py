@@ -1,0 +1,218 @@
+"""Types of other packages: found by their entry points, imported when a model names them, never a traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from epicycle.runner.build import load_model
+from epicycle.runner.catalogue import CatalogueError, Types, installed
+from epicycle.runner.text import ModelError
+
+THIRD_PARTY = Path(__file__).parents[1] / "third_party"
+GOOD = """
+from epicycle.actors import Actor
+class Lidar(Actor):
+    '''Looks.'''
+    def fire(self): pass
+"""
+MODEL = """\
+model: weather
+actors:
+  clock: {type: Clock, period: 1}
+  outside: {type: Thermometer, start: 270 K, rise: 1 K/s}
+connections: [clock.output -> outside.trigger]
+aspects: {icing: {type: Icing, at: outside.temperature}}
+run: {stop: 5, record: outside.temperature}
+metrics: {coldest: {of: outside.temperature, take: min}, last: {of: outside.temperature}}
+"""
+
+
+def install(folder: Path, name: str, source: str, **groups: str) -> None:
+    """Put a package where it looks installed: a module ``name`` and entry points ``Name = module:Class`` by group."""
+    (folder / f"{name}.py").write_text(source, encoding="utf-8")
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name.replace('_', '-')}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("".join(f"[epicycle.{g}]\n{lines}\n" for g, lines in groups.items()))
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder whose packages are installed while the test runs."""
+    folder = tmp_path / "site"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.chdir(tmp_path)
+    installed.cache_clear()
+    yield folder
+    installed.cache_clear()
+    for name in [name for name in sys.modules if name.startswith("acme_")]:
+        del sys.modules[name]
+
+
+def error_of(actor: str = "", aspect: str = "") -> str:
+    """What is said about a model with such an actor or aspect."""
+    lines = ["model: m", *([f"actors: {{a: {{type: {actor}}}}}"] if actor else [])]
+    lines += [f"aspects: {{x: {{type: {aspect}, at: a.b}}}}"] if aspect else []
+    Path("m.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(ModelError) as caught:
+        load_model("./m.yaml")
+    return str(caught.value)
+
+
+def test_type_is_imported_when_a_model_names_it(site: Path) -> None:
+    install(site, "acme_lidar", GOOD, actors="Lidar = acme_lidar:Lidar")
+    install(site, "acme_bomb", "raise SystemExit('boom')", actors="Bomb = acme_bomb:Bomb")
+    assert {"Lidar", "Bomb", "Clock"} <= set(installed().actors)
+    assert "acme_lidar" not in sys.modules
+    Path("m.yaml").write_text("model: m\nactors: {a: {type: Lidar}, b: {type: acme_lidar.Lidar}}\n", encoding="utf-8")
+    actors = load_model("./m.yaml").graph.actors
+    assert [type(actor).__name__ for actor in actors.values()] == ["Lidar", "Lidar"]
+    assert "acme_bomb" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    ("source", "entry", "reason"),
+    [
+        ("import no_such_module", "acme_a:Lidar", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("def broken(:", "acme_a:Lidar", "SyntaxError: invalid syntax (acme_a.py, line 1)"),
+        ("raise SystemExit('boom')", "acme_a:Lidar", "SystemExit: boom"),
+        ("", "acme_a:Lidar", "AttributeError: module 'acme_a' has no attribute 'Lidar'"),
+        ("Lidar = 3", "acme_a:Lidar", "acme_a:Lidar is not a complete subclass of Actor"),
+        ("class Lidar: pass", "acme_a:Lidar", "acme_a:Lidar is not a complete subclass of Actor"),
+        (GOOD, "acme_a", "its entry point is not of the form package.module:Class"),
+        (
+            GOOD.replace("Lidar", "Radar"),
+            "acme_a:Radar",
+            "the class is called Radar, and its entry point must be, too",
+        ),
+    ],
+)
+def test_broken_package_is_named(source: str, entry: str, reason: str, site: Path) -> None:
+    install(site, "acme_a", source, actors=f"Lidar = {entry}")
+    assert error_of("Lidar") == (
+        f"m.yaml:2:20: error: a: actor 'Lidar' of the package 'acme-a' cannot be loaded: {reason}\n"
+        "    2 | actors: {a: {type: Lidar}}\n"
+        "      |                    ^^^^^\n"
+        f"   help: its entry point in the group epicycle.actors is Lidar = {entry}\n"
+        "   help: mend or uninstall 'acme-a'"
+    )
+    catalogue, errors = installed().loaded()
+    assert "Lidar" not in catalogue.actors
+    assert "Clock" in catalogue.actors
+    assert [error.message for error in errors] == [f"actor 'Lidar' of the package 'acme-a' cannot be loaded: {reason}"]
+
+
+def test_broken_aspect_is_named(site: Path) -> None:
+    install(site, "acme_a", "1 / 0", aspects="Fog = acme_a:Fog")
+    assert error_of(aspect="Fog") == (
+        "m.yaml:2:21: error: aspect x: aspect 'Fog' of the package 'acme-a' cannot be loaded: "
+        "ZeroDivisionError: division by zero\n"
+        "    2 | aspects: {x: {type: Fog, at: a.b}}\n"
+        "      |                     ^^^\n"
+        "   help: its entry point in the group epicycle.aspects is Fog = acme_a:Fog\n"
+        "   help: mend or uninstall 'acme-a'"
+    )
+
+
+def test_name_of_two_packages_must_be_qualified(site: Path) -> None:
+    install(site, "acme_a", GOOD, actors="Lidar = acme_a:Lidar")
+    install(site, "acme_b", GOOD, actors="Lidar = acme_b:Lidar")
+    assert error_of("Lidar") == (
+        "m.yaml:2:20: error: a: actor type 'Lidar' is offered by the packages 'acme-a' and 'acme-b'\n"
+        "    2 | actors: {a: {type: Lidar}}\n"
+        "      |                    ^^^^^\n"
+        "   help: write acme_a.Lidar or acme_b.Lidar"
+    )
+    Path("m.yaml").write_text("model: m\nactors: {a: {type: acme_b.Lidar}}\n", encoding="utf-8")
+    assert type(load_model("./m.yaml").graph.actors["a"]).__module__ == "acme_b"
+    names = set(installed().actors)
+    assert {"acme_a.Lidar", "acme_b.Lidar"} <= names
+    assert "Lidar" not in names
+
+
+def test_own_name_means_the_own_type(site: Path) -> None:
+    install(site, "acme_a", GOOD.replace("Lidar", "Clock"), actors="Clock = acme_a:Clock")
+    types = installed().actors
+    assert types["Clock"].__module__ == "epicycle.actors.sources"
+    assert types["acme_a.Clock"].__module__ == "acme_a"
+    assert len(types) == len(set(types)) == len(dict(types))
+
+
+def test_unknown_name_is_no_type() -> None:
+    types = installed().actors
+    assert isinstance(types, Types)
+    assert types.get("Clok") is None
+    assert "acme_a.Clock" not in types
+    with pytest.raises(KeyError):
+        types["Clok"]
+
+
+def test_errors_can_be_copied() -> None:
+    error = CatalogueError("what", "help", "more")
+    assert str(error) == "what\n   help: help\n   help: more"
+    assert str(CatalogueError(*error.args)) == str(error)
+
+
+# -- the package in third_party, installed --------------------------------------------------------------------------
+
+
+def epicycle(site: Path, *arguments: str) -> str:
+    """What the command line prints when the packages in a folder are installed."""
+    path = os.pathsep.join([str(site), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, "-m", "epicycle.runner.cli", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=site,
+        env={**os.environ, "PYTHONPATH": path},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def check_installed(site: Path) -> None:
+    """The package shows up in the reference, in the schema and in a run."""
+    assert "acme_sensing  Weather: a thermometer, and ice on it" in epicycle(site, "actors")
+    (icing,) = [each for each in json.loads(epicycle(site, "aspects", "--json")) if each["name"] == "Icing"]
+    assert (icing["stands_at"], icing["events"], icing["parameters"][0]["default"]) == (["output"], ["frozen"], 273.15)
+    schema = json.loads(epicycle(site, "schema"))
+    assert schema["$defs"]["actor.Thermometer"]["properties"]["start"]["minimum"] == 0
+    assert "Icing" in schema["$defs"]["aspect"]["properties"]["type"]["anyOf"][0]["enum"]
+    (site / "weather.yaml").write_text(MODEL, encoding="utf-8")
+    results = json.loads(epicycle(site, "run", "weather.yaml", "--json"))
+    assert results["metrics"] == {"coldest": 273.15, "last": 275.0}
+    assert results["aspects"] == {"icing": {"frozen": 4}}
+    (site / "icy.yaml").write_text("study: icy\nmodel: ./weather.yaml\n", encoding="utf-8")
+    epicycle(site, "study", "icy.yaml", "--out", "icy", "--jobs", "1")
+    manifest = json.loads((site / "icy" / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["sources"]["package acme-sensing"] == "1.0"  # another version, other runs
+
+
+def test_third_party_package_shows_up(tmp_path: Path) -> None:
+    project = tomllib.loads((THIRD_PARTY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    groups = {
+        group.removeprefix("epicycle."): "\n".join(f"{name} = {value}" for name, value in entries.items())
+        for group, entries in project["entry-points"].items()
+    }
+    install(tmp_path, "acme_sensing", (THIRD_PARTY / "acme_sensing.py").read_text(encoding="utf-8"), **groups)
+    check_installed(tmp_path)
+
+
+@pytest.mark.slow
+def test_third_party_package_installs_with_pip(tmp_path: Path) -> None:
+    source, site = tmp_path / "source", tmp_path / "site"
+    shutil.copytree(THIRD_PARTY, source, ignore=shutil.ignore_patterns("__pycache__"))
+    options = ("--quiet", "--no-deps", "--no-build-isolation", "--disable-pip-version-check")
+    subprocess.run([sys.executable, "-m", "pip", "install", *options, "--target", site, source], check=True)
+    check_installed(site)
