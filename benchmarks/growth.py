@@ -49,7 +49,7 @@ run: {{stop: {stop} ms, record: [clock.output]}}
 """
 
 CACHES = (
-    "a hop takes the same bytecodes in every pipeline, but an actor with all that belongs to it takes 8 kB, so that in "
+    "a hop takes the same bytecodes in every pipeline, but an actor with all that belongs to it takes 6 kB, so that in "
     "large ones a token finds none of the actors in the processor's caches"
 )
 

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast
+from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
 from .parameter import Configurable, ParameterError
@@ -142,14 +142,6 @@ class Actor(Configurable):
         for name, port in self.own_ports().items():
             self._add_own(name, port)
         self.check()
-
-    if not TYPE_CHECKING:  # or else every name would be there
-
-        def __getattr__(self, name: str) -> Any:
-            missing = f"{type(self).__name__!r} object has no attribute {name!r}"
-            if vars(self).get("home") is not None and isinstance(vars(self).get("context"), _NoContext):
-                missing += f": {self.path} is the model's, and each run has its own, simulation[{self.path!r}]"
-            raise AttributeError(missing, name=name, obj=self)
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         """Ports that this instance has beside those of its class, by name; they follow from its parameters.

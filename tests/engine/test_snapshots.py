@@ -393,15 +393,6 @@ def test_actors_and_aspects_of_ones_own() -> None:
     assert simulation[gatherer] is simulation["gatherer"]
     assert len(simulation[gatherer].kept) == simulation[echo].passed == 7
     assert (gatherer.kept, echo.passed) == ([], 0)
-    with pytest.raises(AttributeError) as caught:
-        gatherer.add(1.0)
-    assert str(caught.value) == (
-        "'Gatherer' object has no attribute 'add': gatherer is the model's, and each run has its own, "
-        "simulation['gatherer']"
-    )
-    with pytest.raises(AttributeError) as caught:
-        simulation[gatherer].added  # type: ignore[attr-defined]  # noqa: B018
-    assert str(caught.value) == "'Gatherer' object has no attribute 'added'"
 
 
 def test_all_kinds_of_state() -> None:
