@@ -23,7 +23,7 @@ import weakref
 from array import array
 from collections import deque
 from collections.abc import Callable, Iterable
-from functools import cache, partial
+from functools import partial
 from pathlib import PurePath
 from typing import Any, TypeVar
 
@@ -249,7 +249,19 @@ class Copies:
             made[self._copy(key)] = self._copy(value)
 
 
-@cache
+def _of_class(find: Callable[[Any], T]) -> Callable[[Any], T]:
+    """Find something out for each class once, and forget it with the class: users load theirs again and again."""
+    known: weakref.WeakKeyDictionary[Any, T] = weakref.WeakKeyDictionary()
+
+    def found(cls: Any) -> T:
+        if (answer := known.get(cls)) is None:
+            answer = known[cls] = find(cls)
+        return answer
+
+    return found
+
+
+@_of_class
 def _made_of(cls: Any) -> Callable[[Copies, Any], Any]:
     """What copies the things of a class."""
     if issubclass(cls, _UNCHANGING):
@@ -283,7 +295,7 @@ def _attributes(thing: Any) -> Iterable[tuple[str, Any]]:
     return named.items()
 
 
-@cache
+@_of_class
 def _slots(cls: Any) -> tuple[str, ...]:
     """The names of the slots that a class has."""
     return tuple(
@@ -291,7 +303,7 @@ def _slots(cls: Any) -> tuple[str, ...]:
     )
 
 
-@cache
+@_of_class
 def _descriptors(cls: Any) -> frozenset[str]:
     """The names that set something else than the attribute."""
     return frozenset(

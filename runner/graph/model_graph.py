@@ -91,6 +91,10 @@ class ModelGraph:
         nx.freeze(self.ports)
         self.is_frozen = True
 
+    def _check_open(self) -> None:
+        if self.is_frozen:
+            raise RuntimeError("a graph that is frozen is not changed: change a copy")
+
     def copy(self) -> ModelGraph:
         """One that can be changed, of the same actors."""
         made = ModelGraph(self.limits)
@@ -107,6 +111,7 @@ class ModelGraph:
 
     def merge(self, part: ModelGraph, director: str) -> None:
         """Take in a part that was made for this graph."""
+        self._check_open()
         self.ports.add_nodes_from(part.ports.nodes(data=True))
         self.members[director] += part.members.pop("")
         del part.clocks[""]
@@ -122,6 +127,7 @@ class ModelGraph:
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         """Add an actor and its ports."""
+        self._check_open()
         actor.home = self
         self.actors[actor.path] = actor
         self._enrol(actor.path)
@@ -133,6 +139,7 @@ class ModelGraph:
 
     def add_composite(self, path: str, kind: str) -> None:
         """Add a composite, of that class."""
+        self._check_open()
         self.composites[path] = kind
         self._enrol(path)
 
@@ -146,6 +153,7 @@ class ModelGraph:
 
     def add_director(self, path: str, start: int | None, drift: float) -> None:
         """Give a composite a director of its own; ``start`` (ns) and ``drift`` are those of its clock."""
+        self._check_open()
         outer = self.director_of(path)
         self.members[outer].append(path)
         self.members[path] = []
@@ -155,6 +163,7 @@ class ModelGraph:
         self, path: str, direction: str, position: Position | None, type: Any = None, declared: Position | None = None
     ) -> None:
         """Add a port of a composite; tokens only pass through it, which are of the ``type`` if there is one."""
+        self._check_open()
         self.ports.add_node(path, port=None, direction=direction, type=type, declared=declared)
         self._borders.setdefault(self.owner(path), ([], []))[direction == "output"].append(path)
         if position is not None:
@@ -162,12 +171,14 @@ class ModelGraph:
 
     def open_requests(self, path: str) -> None:
         """Make an input of a composite the place where an aspect's requests come in: tokens begin their way there."""
+        self._check_open()
         port = OutputPort(Request, multi=True)
         port.name, port.path = path.rpartition(".")[2], path
         self.ports.nodes[path]["port"] = port
 
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
         """Add one connection between two ports."""
+        self._check_open()
         self._enter(Hop(source, destination, delay, position, self._order))
 
     def _enter(self, hop: Hop) -> None:
@@ -184,6 +195,7 @@ class ModelGraph:
 
     def disconnect(self, hop: Hop) -> None:
         """Take a connection out."""
+        self._check_open()
         del self._hops[hop.order]
         self.ports.remove_edge(hop.source, hop.destination, key=hop.order)
         self._outgoing[hop.source].remove(hop)
@@ -208,6 +220,7 @@ class ModelGraph:
 
     def remove(self, path: str) -> None:
         """Take out an actor, or a composite and all within, with their connections."""
+        self._check_open()
         for port in [each for each in self.ports if is_within(each, path)]:
             for hop in {*self.incoming(port), *self.outgoing(port)}:
                 self.disconnect(hop)

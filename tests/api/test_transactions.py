@@ -248,3 +248,38 @@ def test_a_model_whose_run_failed_is_run_again() -> None:
         Simulation(model).run()
     model.unweave(woven.name)
     assert Simulation(model).run().end == 3
+
+
+def test_a_graph_that_is_run_is_frozen() -> None:
+    """A change goes to a copy: the graph of a run, and the run itself, stay as they are."""
+    model = Model("m", stop=3)
+    clock, scale = model.add(Clock("clock", period=1)), model.add(Scale("scale"))
+    model.connect(clock.output, scale.input)
+    simulation, graph = Simulation(model), model.graph
+    before = state(model)
+    for change in (
+        lambda: graph.connect("clock.output", "scale.input", None, None),
+        lambda: graph.remove("scale"),
+        lambda: graph.add_actor(Clock("other", period=1), None),
+        lambda: graph.add_composite("c", "C"),
+        lambda: graph.disconnect(next(iter(graph.hops))),
+    ):
+        with pytest.raises(RuntimeError) as caught:
+            change()
+        assert str(caught.value) == "a graph that is frozen is not changed: change a copy"
+    assert state(model) == before
+    model.remove("scale")
+    model.add(Recorder("recorder"))
+    model.connect(clock.output, "recorder.input")
+    assert model.graph is not graph
+    assert list(graph.actors) == ["clock", "scale"]
+    assert simulation.run().digest == Simulation(_same(Scale("scale"))).run().digest
+    assert Simulation(model).run().digest != simulation.log.digest
+
+
+def _same(receiver: Scale) -> Model:
+    model = Model("m", stop=3)
+    clock = model.add(Clock("clock", period=1))
+    model.add(receiver)
+    model.connect(clock.output, "scale.input")
+    return model
