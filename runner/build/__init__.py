@@ -1,10 +1,10 @@
 """From declarations, or a program, to a model that is checked and frozen."""
 
 from .composite_class import CompositeClass, load_composite
-from .ends import CompositePort, Instance
 from .figures import Complaint, figures_of, made_figure, place_in_figure, tell_of_figure
 from .load import load_model
 from .model import Model
+from .named import CompositePort, Instance
 from .scope import Composite
 
 __all__ = [

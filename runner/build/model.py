@@ -19,7 +19,7 @@ from .checks import check
 from .composite_aspect import check_nesting, detours
 from .decorated import arranged
 from .draft import Draft
-from .ends import Port, raising
+from .named import Port, raising
 from .scope import Composite, Scope
 from .settle import nanoseconds
 from .watch import Watching, checked_seed

@@ -10,26 +10,26 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Protocol, TypeAlias, TypeVar, overload
+from typing import Any, Protocol, TypeVar, overload
 
-from epicycle.actors import Actor, InputPort, OutputPort, accepts, type_name
+from epicycle.actors import Actor, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
 from ..graph import ModelGraph, WovenAspect
-from ..language import ConnectionText, DeclarationReader, PointcutText, Values
-from ..text import NAME, Position, Problems, Scalar, Text, call_site, did_you_mean, node_of, within
+from ..language import Values
+from ..text import NAME, Position, Problems, call_site, did_you_mean
 from .composite_aspect import ModelWeaving, check_nesting
 from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
 from .decorated import weave_decorations
 from .draft import Draft
-from .ends import (
+from .named import (
     CompositePort,
     Ends,
     Instance,
-    Port,
+    Named,
+    Places,
     check_aspect,
     clock_of,
-    each_of,
     firing_time_of,
     mistake,
     raising,
@@ -63,10 +63,6 @@ class _Children(Mapping[str, Child]):
 
     def __len__(self) -> int:
         return len(self._parts)
-
-
-Place: TypeAlias = "str | Port | Actor | Composite"
-Places: TypeAlias = "Place | Iterable[Place]"
 
 
 class Building(Protocol):
@@ -298,85 +294,13 @@ class Scope:
         problems: Problems,
     ) -> Links:
         """The connections that are meant."""
-        connection = self._connection(source, destination, delay, position, problems)
+        inside = self._inside
+        connection = Named(self._model.graph, self.path, position, problems).connection(
+            source, destination, delay, inside.name
+        )
         if connection is None:
             return Links([], True)
-        return Wiring(self._inside, self._model.graph, Values(problems), problems).resolve(connection, {})
-
-    def _connection(
-        self,
-        source: Ends,
-        destination: Ends | None,
-        delay: float | str | None,
-        position: Position,
-        problems: Problems,
-    ) -> ConnectionText | None:
-        """A connection as a model file would declare it."""
-        if destination is None:
-            if not isinstance(source, str):
-                problems.add("the connection has no destination", position, "write connect(a.output, b.input)")
-                return None
-            connection = DeclarationReader(problems).connection(Scalar(source, source, False, position))
-        else:
-            sources = self._ends(source, position, problems)
-            destinations = self._ends(destination, position, problems)
-            connection = ConnectionText(tuple(sources), tuple(destinations), position)
-        if connection is not None and delay is not None:
-            connection = replace(connection, delay=node_of(delay, position))
-        # A list that is empty connects nothing: there may be no robots.
-        return connection if connection is not None and connection.sources and connection.destinations else None
-
-    def _ends(self, ends: Ends, position: Position, problems: Problems) -> list[Text]:
-        found = []
-        for end in each_of(ends):
-            name = end if isinstance(end, str) else self._name_of(end, position, problems)
-            if name is not None:
-                found.append(Text(name, within(Text(name, position), name)))
-        return found
-
-    def _known(self, port: Any, graph: ModelGraph, position: Position, problems: Problems) -> str | None:
-        """The path of a port of the graph."""
-        if isinstance(port, (Actor, Composite)):
-            kind = "an actor" if isinstance(port, Actor) else "a composite"
-            ports = [each for each in graph.ports if graph.owner(each) == port.path]
-            problems.add(
-                f"{port.path} is {kind}, not a port", position, f"name one of its ports: {', '.join(ports) or 'none'}"
-            )
-            return None
-        if not isinstance(port, (InputPort, OutputPort, CompositePort)):
-            problems.add(f"{port!r} is not a port", position, "give a port such as clock.output, or its path as text")
-            return None
-        path: str = port.path
-        if not path:
-            problems.add(
-                f"{port!r} is declared in a class",
-                position,
-                "give the port of an actor that was added to the model",
-            )
-            return None
-        if path not in graph.ports or graph.ports.nodes[path]["port"] not in (port, None):
-            problems.add(f"the actor of {path} is not part of this model", position, "add it to the model first")
-            return None
-        return path
-
-    def _name_of(self, port: object, position: Position, problems: Problems) -> str | None:
-        """The name of a port as seen from inside this scope."""
-        path = self._known(port, self._model.graph, position, problems)
-        if path is None:
-            return None
-        owner = path.rpartition(".")[0]
-        if owner == self.path:
-            return path.rpartition(".")[2]
-        scope = owner.rpartition(".")[0]
-        if scope != self.path:
-            there = f"in {scope}" if scope else "at the top of the model"
-            problems.add(
-                f"{path} cannot be connected in {self._inside.name}",
-                position,
-                f"connect it {there}, where {owner} is; ports of composites lead in and out",
-            )
-            return None
-        return path[len(self._full("")) :]
+        return Wiring(inside, self._model.graph, Values(problems), problems).resolve(connection, {})
 
     def _judge(self, links: Links, problems: Problems) -> None:
         """What can be said of new connections at once; the rest is said when the model is whole."""
@@ -431,7 +355,7 @@ class Scope:
         model = self._model
         if isinstance(aspect, Aspect):
             with raising() as problems:
-                pointcuts = self._pointcuts(at, type(aspect), model.graph, position, problems)
+                pointcuts = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
                 weaving = Weaving(model.draft, Paths(model.draft), full, type(aspect), self.path, problems)
                 woven = weaving.weave(aspect, pointcuts, lambda *_: position)
             model.enlist([woven])
@@ -446,7 +370,7 @@ class Scope:
             draft.merge(made, draft.graph.director_of(path))
         kind = CompositeAspect if firing_time is None else CompositeExecutionAspect
         with raising() as problems:
-            pointcuts = self._pointcuts(at, kind, draft.graph, position, problems)
+            pointcuts = Named(draft.graph, self.path, position, problems).pointcuts(at, kind)
             pointcuts = [replace(each, firing_time=firing_time or 0.0) for each in pointcuts]
             detour = ModelWeaving(draft, Paths(draft), full, path, self.path, problems, position, kind)
             woven = detour.weave(kind(), pointcuts, lambda *_: position)
@@ -456,36 +380,6 @@ class Scope:
         draft.graph.positions.setdefault(f"aspect {full}", position)
         model.adopt(draft, [*others, woven])
         return woven
-
-    def _pointcuts(
-        self,
-        at: Places | Mapping[str, Places],
-        cls: type[Aspect],
-        graph: ModelGraph,
-        position: Position,
-        problems: Problems,
-    ) -> list[PointcutText]:
-        """Pointcuts as a model file would declare them."""
-        found = []
-        for request, ends in at.items() if isinstance(at, Mapping) else ((None, at),):
-            for end in each_of(ends):
-                path = end if isinstance(end, str) else self._place(end, cls, graph, position, problems)
-                if path is not None:
-                    here = path if path is end else path.removeprefix(self._full(""))
-                    pointcut = PointcutText.of(Text(here, within(Text(here, position), here)))
-                    found.append(replace(pointcut, request=None if request is None else Text(request, position)))
-        return found
-
-    def _place(
-        self, place: object, cls: type[Aspect], graph: ModelGraph, position: Position, problems: Problems
-    ) -> str | None:
-        """The path of a port, or of an actor or composite for an aspect that stands at such."""
-        if cls.at_ports or not isinstance(place, (Actor, Composite)):
-            return self._known(place, graph, position, problems)
-        if isinstance(place, Actor) and graph.actors.get(place.path) is not place:
-            problems.add(f"{place.path} is not part of this model", position, "add it to the model first")
-            return None
-        return place.path
 
     def unweave(self, name: str) -> None:
         """Take an aspect out, with its composite if it is a model."""

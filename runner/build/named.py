@@ -1,0 +1,200 @@
+"""What a program names when it builds a model, given as objects or as text, turned into what a file would say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias, runtime_checkable
+
+from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
+from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
+
+from ..graph import ModelGraph, WovenAspect
+from ..language import ConnectionText, DeclarationReader, PointcutText
+from ..text import ModelError, Position, Problem, Problems, Scalar, Text, node_of, within
+from .draft import Draft
+from .settle import drift, local_nanoseconds
+
+
+@dataclass(frozen=True)
+class CompositePort:
+    """A port of a composite, through which tokens pass."""
+
+    path: str
+    direction: str
+
+    def __repr__(self) -> str:
+        return f"<{self.direction} port {self.path} of a composite>"
+
+
+Port: TypeAlias = "InputPort[Any] | OutputPort[Any] | CompositePort"
+Ends: TypeAlias = "str | Port | Iterable[str | Port]"
+Place: TypeAlias = "str | Port | Actor | Holder"
+Places: TypeAlias = "Place | Iterable[Place]"
+
+
+@runtime_checkable
+class Holder(Protocol):
+    """A composite: there are parts in it."""
+
+    path: str
+
+    def remove(self, name: str) -> None:
+        """Take out a part."""
+
+
+@runtime_checkable
+class Instance(Protocol):
+    """An instance of a composite class that can be added to a model; see ``load_composite``."""
+
+    path: str
+
+    def unfold(self, path: str, draft: Draft, position: Position) -> tuple[Draft, list[WovenAspect]]:
+        """What it is as a part of a draft, at its full path, with the aspects that come with it."""
+
+
+@contextmanager
+def raising() -> Iterator[Problems]:
+    """Collects problems and raises them at the end, if there are any."""
+    problems = Problems()
+    yield problems
+    problems.raise_if_any()
+
+
+def clock_of(
+    path: str, start: object, speed: object, position: Position, problems: Problems
+) -> tuple[int | None, float]:
+    """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""
+    found: list[Any] = [None, 1.0]
+    for number, (key, value, convert) in enumerate((("start", start, local_nanoseconds), ("drift", speed, drift))):
+        try:
+            found[number] = found[number] if value is None else convert(value)
+        except (ParameterError, ValueError) as error:
+            problems.add(f"{path}: director.{key}: {error}", position)
+    return found[0], found[1]
+
+
+def check_aspect(aspect: object, kinds: tuple[type, ...], position: Position, problems: Problems) -> None:
+    """See that what is to be woven is an object of one of the kinds."""
+    if isinstance(aspect, type) or not isinstance(aspect, kinds):
+        shown = aspect.__name__ if isinstance(aspect, type) else repr(aspect)
+        problems.add(f"{shown} is no aspect", position, "give an object, such as PacketLoss(probability=0.1)")
+
+
+def firing_time_of(time: object, aspect: object, position: Position, problems: Problems) -> FiringTime | None:
+    """How long firings take; None: the aspect does not stand at actors, or not as a model."""
+    if time is not None and isinstance(aspect, Aspect):
+        problems.add(f"{type(aspect).__name__} is no composite, so 'time' is not for weave() to say", position)
+    try:
+        return None if time is None else FiringTimeParameter().convert(time)
+    except ParameterError as error:
+        problems.add(f"time: {error}", position)
+        return None
+
+
+def each_of(ends: object) -> list[Any]:
+    """One or several ends as a list; what is no end is found out later."""
+    return list(ends) if isinstance(ends, Iterable) and not isinstance(ends, str) else [ends]
+
+
+def mistake(message: str, position: Position, *hints: str) -> ModelError:
+    return ModelError([Problem(message, position, hints)])
+
+
+class Named:
+    """Finds in a graph what a program names inside of a scope; what is wrong is told at the program's line."""
+
+    def __init__(self, graph: ModelGraph, scope: str, position: Position, problems: Problems) -> None:
+        self._graph = graph
+        self._scope = scope
+        self._start = f"{scope}." if scope else ""
+        self._position = position
+        self._problems = problems
+
+    def connection(
+        self, source: Ends, destination: Ends | None, delay: float | str | None, inside: str
+    ) -> ConnectionText | None:
+        """A connection as a model file would declare it; ``inside`` is what the scope is called."""
+        if destination is not None:
+            sources, destinations = self._ends(source, inside), self._ends(destination, inside)
+            connection: ConnectionText | None = ConnectionText(sources, destinations, self._position)
+        elif isinstance(source, str):
+            written = Scalar(source, source, False, self._position)
+            connection = DeclarationReader(self._problems).connection(written)
+        else:
+            self._tell("the connection has no destination", "write connect(a.output, b.input)")
+            return None
+        # A list that is empty connects nothing: there may be no robots.
+        if connection is None or not (connection.sources and connection.destinations):
+            return None
+        return connection if delay is None else replace(connection, delay=node_of(delay, self._position))
+
+    def pointcuts(self, at: Places | Mapping[str, Places], cls: type[Aspect]) -> list[PointcutText]:
+        """Pointcuts as a model file would declare them."""
+        found = []
+        for request, ends in at.items() if isinstance(at, Mapping) else ((None, at),):
+            asked = None if request is None else Text(request, self._position)
+            for end in each_of(ends):
+                path = end if isinstance(end, str) else self._place(end, cls)
+                if path is not None:
+                    here = path if path is end else path.removeprefix(self._start)
+                    found.append(replace(PointcutText.of(self._text(here)), request=asked))
+        return found
+
+    def _text(self, name: str) -> Text:
+        return Text(name, within(Text(name, self._position), name))
+
+    def _tell(self, message: str, *hints: str) -> None:
+        self._problems.add(message, self._position, *hints)
+
+    def _ends(self, ends: Ends, inside: str) -> tuple[Text, ...]:
+        names = [end if isinstance(end, str) else self._seen_from_inside(end, inside) for end in each_of(ends)]
+        return tuple(self._text(name) for name in names if name is not None)
+
+    def _seen_from_inside(self, port: object, inside: str) -> str | None:
+        """The name of a port inside of the scope."""
+        path = self._port(port)
+        if path is None:
+            return None
+        owner, _, name = path.rpartition(".")
+        if owner == self._scope:
+            return name
+        scope = owner.rpartition(".")[0]
+        if scope == self._scope:
+            return path[len(self._start) :]
+        there = f"in {scope}" if scope else "at the top of the model"
+        self._tell(
+            f"{path} cannot be connected in {inside}",
+            f"connect it {there}, where {owner} is; ports of composites lead in and out",
+        )
+        return None
+
+    def _place(self, place: object, cls: type[Aspect]) -> str | None:
+        """The path of a port, or of an actor or composite for an aspect that stands at such."""
+        if cls.at_ports or not isinstance(place, (Actor, Holder)):
+            return self._port(place)
+        if isinstance(place, Actor) and self._graph.actors.get(place.path) is not place:
+            self._tell(f"{place.path} is not part of this model", "add it to the model first")
+            return None
+        return place.path
+
+    def _port(self, port: Any) -> str | None:
+        """The path of a port of the graph."""
+        graph = self._graph
+        if isinstance(port, (Actor, Holder)):
+            kind = "an actor" if isinstance(port, Actor) else "a composite"
+            ports = [each for each in graph.ports if graph.owner(each) == port.path]
+            self._tell(f"{port.path} is {kind}, not a port", f"name one of its ports: {', '.join(ports) or 'none'}")
+            return None
+        if not isinstance(port, (InputPort, OutputPort, CompositePort)):
+            self._tell(f"{port!r} is not a port", "give a port such as clock.output, or its path as text")
+            return None
+        path: str = port.path
+        if not path:
+            self._tell(f"{port!r} is declared in a class", "give the port of an actor that was added to the model")
+        elif path not in graph.ports or graph.ports.nodes[path]["port"] not in (port, None):
+            self._tell(f"the actor of {path} is not part of this model", "add it to the model first")
+        else:
+            return path
+        return None
