@@ -20,8 +20,9 @@ from ..language import PartText, PointcutText
 from ..text import PathIndex, Position, Problems, did_you_mean
 from .draft import Draft
 from .firing_times import without_port
+from .paths import Paths
 from .settle import place_of
-from .weave import Paths, Weaving
+from .weave import Weaving
 
 BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
 OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: not the composite's matter

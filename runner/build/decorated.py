@@ -12,7 +12,8 @@ from ..graph import ModelGraph, WovenAspect
 from ..language import PointcutText
 from ..text import Position, Problems, Text
 from .draft import Draft
-from .weave import Paths, Weaving
+from .paths import Paths
+from .weave import Weaving
 
 Change = Callable[[str, Aspect], Mapping[str, object]]
 

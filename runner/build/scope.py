@@ -34,7 +34,8 @@ from .named import (
     mistake,
     raising,
 )
-from .weave import Paths, Weaving
+from .paths import Paths
+from .weave import Weaving
 
 _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
 

@@ -8,20 +8,11 @@ at a composite for all the actors in it.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
-from typing import Any
 
 from epicycle.actors import declared_parameters
-from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
-    JoinPointAspect,
-    PortsParameter,
-    Reading,
-    Selection,
-    SelectionParameter,
 )
 
 from ..graph import WovenAspect
@@ -29,37 +20,8 @@ from ..language import PointcutText
 from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, in_general, nearest
 from .draft import Draft
 from .firing_times import unknown_inputs
-
-
-class Paths:
-    """What the pointcuts of a model's aspects choose from, found out once for all of them; of ``ports``, or of all."""
-
-    def __init__(self, draft: Draft, ports: Iterable[str] | None = None) -> None:
-        self._draft, self._graph = draft, draft.graph
-        graph = draft.graph
-        self.ports = PathIndex(graph.ports.nodes if ports is None else ports, graph.limits)
-
-    @cached_property
-    def actors(self) -> PathIndex:
-        """All actors."""
-        return PathIndex(self._graph.actors, self._graph.limits)
-
-    @cached_property
-    def holders(self) -> PathIndex:
-        """All actors and composites."""
-        return PathIndex([*self._graph.actors, *self._graph.composites], self._graph.limits)
-
-    @cached_property
-    def owners(self) -> PathIndex:
-        """All composites and actors, those that could not be made included."""
-        graph = self._graph
-        unmade = sorted(set(map(graph.owner, self._draft.open)))
-        return PathIndex(dict.fromkeys((*graph.composites, *graph.actors, *unmade)), graph.limits)
-
-    @cached_property
-    def kinds(self) -> dict[str, str]:
-        """The types of all actors and composites."""
-        return {path: type(actor).__name__ for path, actor in self._graph.actors.items()} | self._graph.composites
+from .looks import Looks
+from .paths import Paths
 
 
 class Weaving:
@@ -100,23 +62,8 @@ class Weaving:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
             self._problem(nowhere, pointcuts[0])
-        readings: dict[PortFormula, list[Reading]] = {}
-        selections: dict[str, Selection] = {}
-        reads: list[str] = []
-        for name, parameter in declared_parameters(type(aspect)).items():
-            value, position = getattr(aspect, name), position_of(name)
-            if isinstance(parameter, SelectionParameter):
-                patterns = parameter.patterns(value)
-                found = selections[name] = {each: self._selected(name, each, parameter, position) for each in patterns}
-                if isinstance(parameter, PortsParameter):
-                    reads += [port for ports_found in found.values() for port in ports_found]
-            elif isinstance(value, PortFormula):
-                readings[value] = [self._reading(name, each, position) for each in value.references]
-                for reference, fields in value.given_fields:
-                    self._check_given(name, reference, fields, ports, position)
-        asked = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
-        chosen = (port for pattern in asked for port in self.ports.select(self._full(pattern)))
-        reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
+        looks = Looks(self.draft, self.paths, self.name, self.scope, self.problems)
+        readings, selections, reads = looks.of(aspect, ports, position_of)
         woven = WovenAspect(
             self.name, aspect, ports, connections, actors, readings, selections, reads, parameters=parameters
         )
@@ -410,76 +357,9 @@ class Weaving:
         self._is_excused = self._is_excused or is_excused
         return is_excused
 
-    def _selected(
-        self, name: str, pattern: str, parameter: SelectionParameter[Any], position: Position | None
-    ) -> list[str]:
-        """What a pattern in the parameter ``name`` selects."""
-        of_ports = isinstance(parameter, PortsParameter)
-        paths = self.ports if of_ports else self.paths.holders
-        try:
-            found = paths.select(self._full(pattern))
-        except PatternError as error:
-            self._problem(f"{name}: {pattern!r} is no pattern: {error}", position)
-            return []
-        fitting = [path for path in found if not of_ports or self._sends(path)]
-        if found and not fitting:
-            self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
-        elif not found and not self.draft.excuses(self._full(pattern) + ("" if of_ports else ".*")):
-            near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
-            self._problem(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
-        elif len(fitting) > 1 and parameter.is_single:
-            self._problem(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
-        return fitting
-
-    def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
-        """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
-        parts = self._full(reference).split(".")
-        for length in range(len(parts), 1, -1):
-            port = ".".join(parts[:length])
-            if port in self.ports and self.graph.direction(port) == "output":
-                fields = tuple(parts[length:])
-                self._check_fields(name, reference, port, fields, position)
-                return port, fields
-        if self.draft.excuses(self._full(reference)):
-            return reference, ()  # nothing can send there now, and the condition never holds
-        if self._full(reference) in self.ports:
-            self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
-        else:
-            near = self.ports.did_you_mean(reference, self.scope, self._sends)
-            self._problem(f"{name}: {reference!r} names no output port{near}", position)
-        return reference, ()
-
-    def _check_given(
-        self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position | None
-    ) -> None:
-        """Whether the tokens that pass the aspect have the field; of ports that lack it, the first is told."""
-        for port in ports:
-            if not self._check_fields(name, f"{reference} at {port}", port, fields, position):
-                return
-
-    def _check_fields(
-        self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position | None
-    ) -> bool:
-        """Whether the tokens of a port have the field, where their type tells; if not, that is a problem."""
-        for source in self.graph.source_of(port) if fields else ():
-            if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
-                names = [each.name for each in dataclasses.fields(source.type)]
-                if fields[0] not in names:
-                    self._problem(
-                        f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}"
-                        f"{did_you_mean(fields[0], names)}",
-                        position,
-                        f"its fields: {', '.join(names)}",
-                    )
-                    return False
-        return True
-
     def _fits(self, port: str) -> bool:
         """Whether the aspect can stand there."""
         return self.graph.direction(port) in self.cls.stands_at
-
-    def _sends(self, port: str) -> bool:
-        return self.graph.direction(port) == "output"
 
     def _full(self, text: str) -> str:
         return f"{self.scope}.{text}" if self.scope else text

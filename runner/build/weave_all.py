@@ -19,9 +19,10 @@ from ..language import PartText, PointcutText
 from ..text import RAISE_IT, Position, TooManyError, did_you_mean
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .decorated import arranged, weave_decorations
+from .paths import Paths
 from .settle import Settler, converted, place_of
 from .unfold import AspectToWeave, Known, Unfolded
-from .weave import Paths, Weaving
+from .weave import Weaving
 
 
 def weave_all(made: Unfolded, known: Known, settler: Settler) -> list[WovenAspect]:

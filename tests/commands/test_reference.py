@@ -105,6 +105,7 @@ def test_one_aspect_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
         "optional": False,
         "default": None,
         "min": 0,
+        "above": None,
         "max": 1,
         "choices": [],
         "doc": "probability that a message is lost",

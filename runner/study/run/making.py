@@ -7,7 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from .backlog import Backlog, Task
-from .cluster import Cluster, distributed_module
 from .keeper import Keeper
 from .processes import Outcome, Processes
 from .runner import Runner
@@ -35,6 +34,10 @@ def make_runs(
     """
     with Keeper(store, backlog, timeout) as keeper:
         if executor == DASK:
+            # Here, and not with this package, which several threads of a Dask worker may import at once: whoever asks
+            # for `parcel` or `host` first must not find that the package waits for it.
+            from .cluster import Cluster
+
             Cluster(keeper, jobs, scheduler).run(tell)
         else:
             _make_here(keeper, jobs, tell)
@@ -43,6 +46,8 @@ def make_runs(
 def check_executor(name: str) -> None:
     """Raise ``EpicycleError`` if what an executor needs is not installed."""
     if name == DASK:
+        from .cluster import distributed_module
+
         distributed_module()
 
 

@@ -1,0 +1,127 @@
+"""What an aspect looks at: the ports and fields that its expressions name, and what its patterns select."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+from epicycle.actors import declared_parameters
+from epicycle.actors.expression import PortFormula
+from epicycle.aspects import Aspect, JoinPointAspect, PortsParameter, Reading, Selection, SelectionParameter
+
+from ..text import PatternError, Position, Problems, did_you_mean
+from .draft import Draft
+from .paths import Paths
+
+Found = tuple[dict[PortFormula, list[Reading]], dict[str, Selection], list[str]]
+
+
+class Looks:
+    """Finds what one aspect looks at; ``scope`` is the composite that declares it, to which its names are relative."""
+
+    def __init__(self, draft: Draft, paths: Paths, name: str, scope: str, problems: Problems) -> None:
+        self.draft = draft
+        self.graph = draft.graph
+        self.paths = paths
+        self.ports = paths.ports
+        self.name = name
+        self.scope = scope
+        self.problems = problems
+
+    def of(self, aspect: Aspect, ports: list[str], position_of: Callable[..., Position | None]) -> Found:
+        """What its expressions ask for, what its patterns select, and the ports that it looks at otherwise.
+
+        ``ports`` are those at which it stands; ``position_of`` tells where a parameter is set in the model file.
+        """
+        readings: dict[PortFormula, list[Reading]] = {}
+        selections: dict[str, Selection] = {}
+        reads: list[str] = []
+        for name, parameter in declared_parameters(type(aspect)).items():
+            value, position = getattr(aspect, name), position_of(name)
+            if isinstance(parameter, SelectionParameter):
+                patterns = parameter.patterns(value)
+                found = selections[name] = {each: self._selected(name, each, parameter, position) for each in patterns}
+                if isinstance(parameter, PortsParameter):
+                    reads += [port for ports_found in found.values() for port in ports_found]
+            elif isinstance(value, PortFormula):
+                readings[value] = [self._reading(name, each, position) for each in value.references]
+                for reference, fields in value.given_fields:
+                    self._check_given(name, reference, fields, ports, position)
+        asked = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
+        chosen = (port for pattern in asked for port in self.ports.select(self._full(pattern)))
+        reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
+        return readings, selections, reads
+
+    def _selected(
+        self, name: str, pattern: str, parameter: SelectionParameter[Any], position: Position | None
+    ) -> list[str]:
+        """What a pattern in the parameter ``name`` selects."""
+        of_ports = isinstance(parameter, PortsParameter)
+        paths = self.ports if of_ports else self.paths.holders
+        try:
+            found = paths.select(self._full(pattern))
+        except PatternError as error:
+            self._problem(f"{name}: {pattern!r} is no pattern: {error}", position)
+            return []
+        fitting = [path for path in found if not of_ports or self._sends(path)]
+        if found and not fitting:
+            self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
+        elif not found and not self.draft.excuses(self._full(pattern) + ("" if of_ports else ".*")):
+            near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
+            self._problem(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
+        elif len(fitting) > 1 and parameter.is_single:
+            self._problem(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
+        return fitting
+
+    def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
+        """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
+        parts = self._full(reference).split(".")
+        for length in range(len(parts), 1, -1):
+            port = ".".join(parts[:length])
+            if port in self.ports and self.graph.direction(port) == "output":
+                fields = tuple(parts[length:])
+                self._check_fields(name, reference, port, fields, position)
+                return port, fields
+        if self.draft.excuses(self._full(reference)):
+            return reference, ()  # nothing can send there now, and the condition never holds
+        if self._full(reference) in self.ports:
+            self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
+        else:
+            near = self.ports.did_you_mean(reference, self.scope, self._sends)
+            self._problem(f"{name}: {reference!r} names no output port{near}", position)
+        return reference, ()
+
+    def _check_given(
+        self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position | None
+    ) -> None:
+        """Whether the tokens that pass the aspect have the field; of ports that lack it, the first is told."""
+        for port in ports:
+            if not self._check_fields(name, f"{reference} at {port}", port, fields, position):
+                return
+
+    def _check_fields(
+        self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position | None
+    ) -> bool:
+        """Whether the tokens of a port have the field, where their type tells; if not, that is a problem."""
+        for source in self.graph.source_of(port) if fields else ():
+            if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
+                names = [each.name for each in dataclasses.fields(source.type)]
+                if fields[0] not in names:
+                    self._problem(
+                        f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}"
+                        f"{did_you_mean(fields[0], names)}",
+                        position,
+                        f"its fields: {', '.join(names)}",
+                    )
+                    return False
+        return True
+
+    def _sends(self, port: str) -> bool:
+        return self.graph.direction(port) == "output"
+
+    def _full(self, text: str) -> str:
+        return f"{self.scope}.{text}" if self.scope else text
+
+    def _problem(self, message: str, position: Position | None, *hints: str) -> None:
+        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
