@@ -126,7 +126,7 @@ class Actor(Configurable):
         except ParameterError as error:
             raise ParameterError(f"{path}: {error}") from None
         self.path = path
-        self.home: object | None = None  # the graph that it is part of
+        self.is_part = False  # of a model
         self.context: Context = _NoContext(self)  # the run that the actor is part of
         self._streams: dict[str, Stream] = {}
         self.inputs: dict[str, InputPort[Any]] = {}

@@ -90,7 +90,7 @@ class Decoration:
         Raises ``EpicycleError`` if it cannot stand there.
         """
         if isinstance(target, Actor):
-            if target.home is not None:
+            if target.is_part:
                 raise EpicycleError(
                     f"{target.path} is part of a model: weave it there, with model.weave({self.name!r}, ..., at=...)"
                 )

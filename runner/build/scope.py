@@ -122,7 +122,7 @@ class Scope:
         those of lower ``priority`` fire first, then those that were added first.  Raises ``ModelError``.
         """
         position = call_site()
-        if isinstance(part, Actor) and part.home is not None:
+        if isinstance(part, Actor) and part.is_part:
             raise mistake(
                 f"{part.path} is part of a model already, and an actor belongs to one model",
                 position,
@@ -151,7 +151,7 @@ class Scope:
                 return made, weave_decorations(part, made, problems, position)
         except Exception:
             part.move(name)  # it may be added elsewhere
-            part.home = None
+            part.is_part = False
             raise
 
     def composite(

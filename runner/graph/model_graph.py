@@ -128,7 +128,7 @@ class ModelGraph:
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         """Add an actor and its ports."""
         self._check_open()
-        actor.home = self
+        actor.is_part = True
         self.actors[actor.path] = actor
         self._enrol(actor.path)
         self.members[self.director_of(actor.path)].append(actor.path)
@@ -226,7 +226,7 @@ class ModelGraph:
                 self.disconnect(hop)
             self.ports.remove_node(port)
         for actor in [each for each in self.actors if is_within(each, path)]:
-            self.actors[actor].home = None
+            self.actors[actor].is_part = False
         for known in self._by_path():
             for each in [each for each in known if is_within(each, path)]:
                 del known[each]

@@ -78,7 +78,7 @@ def state(model: Model) -> Any:
         "edges": list(graph.ports.edges(keys=True)),
         "hops": [(str(hop), hop.order, hop.delay) for hop in graph.hops],
         "ways": [[str(hop) for hop in (*graph.incoming(port), *graph.outgoing(port))] for port in graph.ports],
-        "actors": [(path, id(actor), actor.path, actor.home is not None) for path, actor in graph.actors.items()],
+        "actors": [(path, id(actor), actor.path, actor.is_part) for path, actor in graph.actors.items()],
         "by path": [deepcopy(list(each.items())) for each in by_path],
         "borders": [deepcopy(graph.borders(path)) for path in graph.composites],
         "clocks": list(graph.clocks),
@@ -180,7 +180,7 @@ def test_an_actor_that_was_refused_can_be_added_elsewhere() -> None:
     for _ in range(2):
         with pytest.raises(ModelError, match="misfit has no port 'nowhere'"):
             inner.add(actor)
-        assert (actor.path, actor.home, actor.input.path) == ("misfit", None, "misfit.input")
+        assert (actor.path, actor.is_part, actor.input.path) == ("misfit", False, "misfit.input")
     clock = Clock("clock", period=1)
     inner.add(clock)
     with pytest.raises(ModelError, match="is part of a model already"):
