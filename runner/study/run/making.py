@@ -7,8 +7,8 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from .backlog import Backlog, Task
-from .keeper import Keeper
-from .processes import Outcome, Processes
+from .keeper import ATTEMPTS, Keeper
+from .processes import DEAD, Outcome, Processes
 from .runner import Runner
 from .store import Store
 
@@ -51,6 +51,13 @@ def check_executor(name: str) -> None:
         distributed_module()
 
 
+def _make(processes: Processes, task: Task, timeout: float | None) -> Outcome:
+    """Make a run, and at once again if its process dies: who kills processes when rows come would hit it each time."""
+    while (outcome := processes.make(task, timeout))[0] == DEAD and task.attempt < ATTEMPTS:
+        task.attempt += 1
+    return outcome
+
+
 def _make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
     """Make the runs in processes of this machine."""
     backlog, tasks = keeper.backlog, dict[Future[Outcome], Task]()
@@ -59,7 +66,7 @@ def _make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
         while True:
             # More than there are processes: who has made one begins with the next before this one is written.
             while len(tasks) < 2 * jobs and (task := backlog.next()) is not None:
-                future = threads.submit(processes.make, task, keeper.timeout)
+                future = threads.submit(_make, processes, task, keeper.timeout)
                 tasks[future] = task
                 future.add_done_callback(over.put)
             if not tasks:
