@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from typing import Any
 
 from epicycle.actors import Actor, declared_parameters
 from epicycle.actors.expression import ExpressionError, names_in
@@ -91,20 +91,22 @@ def _parameters(
 def _nodes(part: object) -> Iterator[Node]:
     """Every node in which an expression may stand, of what has been declared."""
     waiting = [part]
-    while waiting:
-        match waiting.pop():
-            case Scalar() | Sequence() | MappingNode() as node:
-                yield node
-            case Text(text, position) if "${" in text:
-                yield Scalar(text, text, True, position)
-            case Entry(_, value):
-                yield value
-            case Mapping() as parts:
-                waiting += parts.values()
-            case tuple() as parts:
-                waiting += parts
-            case declared if is_dataclass(declared) and not isinstance(declared, (Position, Text)):
-                waiting += (getattr(declared, each.name) for each in fields(declared))
+    while waiting:  # by class, not by pattern: a model may have a hundred thousand parts
+        each: Any = waiting.pop()
+        kind = type(each)
+        if kind in (Scalar, Sequence, MappingNode):
+            yield each
+        elif kind is Text:
+            if "${" in each.text:
+                yield Scalar(each.text, each.text, True, each.position)
+        elif kind is Entry:
+            yield each.value
+        elif kind is tuple:
+            waiting += each
+        elif kind is dict:
+            waiting += each.values()
+        elif kind is not Position:
+            waiting += (getattr(each, name) for name in getattr(kind, "__dataclass_fields__", ()))
 
 
 def _names(nodes: Iterable[Node]) -> frozenset[str]:
