@@ -41,9 +41,7 @@ class Draft:
 
     def copy(self) -> Draft:
         """One that can be changed while this one stays as it is."""
-        return Draft(
-            self.graph.copy(), {*self.empty}, {*self.unknown}, {*self.open}, {*self.kinds}, self.is_wired
-        )  # fmt: skip
+        return Draft(self.graph.copy(), {*self.empty}, {*self.unknown}, {*self.open}, {*self.kinds}, self.is_wired)
 
     def leave_out(self, path: str, actor_type: type[Actor]) -> None:
         """Put the ports of an actor in its place that could not be made, so that what names them is not wrong, too."""

@@ -74,7 +74,7 @@ class ModelGraph:
         self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
         self.priorities: dict[str, int] = {}
-        self.positions: dict[str, Position] = {}  # also of "aspect NAME", "metric NAME" and "stop_when"
+        self.positions: dict[str, Position] = {}  # also of "aspect NAME"
         self.tags: dict[str, tuple[str, ...]] = {}  # what the model's author put on actors and composites
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
         self.limits: Limits = limits if inside is None else inside.limits
