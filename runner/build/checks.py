@@ -105,13 +105,13 @@ def _who(graph: ModelGraph, port: str) -> str:
         what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.positions.get(owner)
     else:
         what, at = f"{port} is a port of {graph.composites.get(owner, owner)}", graph.ports.nodes[port].get("declared")
-    return f"{what}, declared at {at.file}:{at.line}:{at.column}" if at is not None else ""
+    return f"{what}, declared at {at}" if at is not None else ""
 
 
 def _other_position(first: Position | None, last: Position | None) -> tuple[str, ...]:
     if first is None or last is None or first == last:
         return ()
-    return (f"connected onward at {last.file}:{last.line}:{last.column}",)
+    return (f"connected onward at {last}",)
 
 
 def check_connections(draft: Draft, problems: Problems) -> None:
@@ -152,7 +152,7 @@ def _may_be_connected(draft: Draft, path: str) -> bool:
 
 def _first_connection(wires: list[Wire]) -> tuple[str, ...]:
     at = wires[0].hops[-1].position
-    return (f"the first connection is at {at.file}:{at.line}:{at.column}",) if at is not None else ()
+    return (f"the first connection is at {at}",) if at is not None else ()
 
 
 def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:

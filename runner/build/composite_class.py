@@ -9,13 +9,7 @@ from pathlib import Path
 
 from ..catalogue import Catalogue, installed
 from ..graph import WovenAspect
-from ..language import (
-    CompositeText,
-    PartText,
-    Settings,
-    inherit,
-    read_library,
-)
+from ..language import CompositeText, PartText, Settings, inherit, read_library
 from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
 from .draft import Draft
 from .settle import Settler

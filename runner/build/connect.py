@@ -177,7 +177,7 @@ class Wiring:
                     f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}",
                     text,
                     f"valid actors: {', '.join(inside.names) or 'none'}",
-                    *((f"it is removed at {gone.file}:{gone.line}:{gone.column}",) if gone is not None else ()),
+                    *((f"it is removed at {gone}",) if gone is not None else ()),
                 )
             return None
         has_port = self._has_port(name, child, port, wanted, text)
@@ -270,7 +270,7 @@ class Wiring:
         hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
         if self.inside.text is not None and self.inside.text.extends is not None:
             at = self.inside.text.actors[name].type.position  # which may be far from the connection
-            hints.append(f"{path} is a {child.kind} since {at.file}:{at.line}:{at.column}")
+            hints.append(f"{path} is a {child.kind} since {at}")
         self._problem(message, text, *hints)
         return False
 

@@ -34,12 +34,7 @@ def weave_decorations(
 
 
 def _weave(
-    actor: Actor,
-    decoration: Decoration,
-    draft: Draft,
-    problems: Problems,
-    position: Position,
-    change: Change | None,
+    actor: Actor, decoration: Decoration, draft: Draft, problems: Problems, position: Position, change: Change | None
 ) -> WovenAspect | None:
     name, aspect = f"{actor.path}.{decoration.name}", decoration.aspect
     own = {**actor.inputs, **actor.outputs}

@@ -50,12 +50,7 @@ def place_in_figure(complaint: Complaint, written: Mapping) -> Position:
 
 
 def made_figure(
-    name: str,
-    known: AnyMapping[str, type[T]],
-    declared: DeclaredFigure,
-    problems: Problems,
-    *,
-    of_study: bool = False,
+    name: str, known: AnyMapping[str, type[T]], declared: DeclaredFigure, problems: Problems, *, of_study: bool = False
 ) -> T | None:
     """The figure that is declared by a type, values, and the same as written; None, and problems, if it cannot be."""
     type_name, values, written = declared

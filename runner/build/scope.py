@@ -287,12 +287,7 @@ class Scope:
             graph.disconnect(hop)
 
     def _links(
-        self,
-        source: Ends,
-        destination: Ends | None,
-        delay: float | str | None,
-        position: Position,
-        problems: Problems,
+        self, source: Ends, destination: Ends | None, delay: float | str | None, position: Position, problems: Problems
     ) -> Links:
         """The connections that are meant."""
         inside = self._inside

@@ -66,7 +66,6 @@ class Settler:
         """The values of a composite's parameters: set from outside, else given, else the default."""
         names: dict[str, object] = {}
         label = path or composite.name
-        above = path.rpartition(".")[0]  # the composite whose fault a wrong value is
         for key, entry in given.items():
             if key not in composite.parameters:
                 self.problems.add(
@@ -74,29 +73,29 @@ class Settler:
                     f"{did_you_mean(key, list(composite.parameters))}",
                     entry.key.position,
                     f"valid parameters: {', '.join(composite.parameters) or 'none'}",
-                    scope=above,
+                    scope=path,
                 )
         given = _as_meant(given, composite.parameters)
         for name, declared in composite.parameters.items():
             full = f"{path}.{name}" if path else name
-            node, scope, instance = declared.value, names, path
+            node, known = declared.value, names
             later: Collection[str] = composite.parameters.keys()
             if name in given:
-                node, scope, instance, later = given[name].value, outer, above, ()
+                node, known, later = given[name].value, outer, ()
             if (setting := self._setting(full)) is not None:
-                node, scope, instance, later = setting.node, self.values.outside, "", ()
+                node, known, later = setting.node, self.values.outside, ()
             if node is None:
                 needs = f"{label}: {composite.name} needs" if path else f"{label} needs"
                 self.problems.add(
                     f"{needs} a value for {name!r}",
                     position or declared.position,
                     *((f"{name}: {declared.doc}",) if declared.doc else ()),
-                    scope=above,
+                    scope=path,
                 )
                 names[name] = self.values.missing
                 continue
-            value = self.values.of(node, scope, full, instance, later)
-            names[name] = self.values.declared(full, declared, value, node.position, instance)
+            value = self.values.of(node, known, full, path, later)
+            names[name] = self.values.declared(full, declared, value, node.position, path)
         return names
 
     def _setting(self, full: str) -> Setting | None:
@@ -128,7 +127,6 @@ class Settler:
         names: dict[str, object],
         position: Position,
         path: str,
-        composite: str,
     ) -> dict[str, object] | None:
         """Converted values for a Configurable class; None if some are wrong."""
         declared = declared_parameters(cls)
@@ -140,24 +138,24 @@ class Settler:
                     f"{label}: {unknown_parameter(cls, key)}",
                     entry.key.position,
                     f"valid parameters: {', '.join(declared) or 'none'}",
-                    scope=composite,
+                    scope=path,
                 )
         given = _as_meant(given, declared)
         for name, parameter in declared.items():
             node = given[name].value if name in given else None
-            scope = names
+            known = names
             if (setting := self._setting(f"{path}.{name}")) is not None:
-                node, scope = setting.node, self.values.outside
+                node, known = setting.node, self.values.outside
             if node is None:
                 if parameter.required:
                     self.problems.add(
                         f"{label}: {cls.__name__} needs a value for {name!r}",
                         position,
                         *((f"{name}: {parameter.doc}",) if parameter.doc else ()),
-                        scope=composite,
+                        scope=path,
                     )
                 continue
-            value = self.values.of(node, scope, f"{label}.{name}", composite)
+            value = self.values.of(node, known, f"{label}.{name}", path)
             if value is self.values.missing:
                 complete = False
                 continue
@@ -167,10 +165,10 @@ class Settler:
                     result[name] = data_file(Path(value), node.position)
             except ParameterError as error:
                 self.problems.add(
-                    f"{label}.{name}: {error}", place_of(node, error.keys, of_key=error.of_key), scope=composite
+                    f"{label}.{name}: {error}", place_of(node, error.keys, of_key=error.of_key), scope=path
                 )
             except Exception as error:  # of a class of a user's
-                self.blame(f"{label}.{name}", error, node.position, composite)
+                self.blame(f"{label}.{name}", error, node.position, path)
         return result if complete and len(self.problems) == before else None
 
     def is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:

@@ -132,11 +132,10 @@ class Unfolding:
             self.draft.empty.add(path)
             self.draft.kinds |= self._kinds(part)
         paths = [f"{path}[{index}]" if is_array else path for index in range(count or 0)]
-        before, was_muted = len(self.problems), self.problems.muted
         for index, instance in enumerate(paths):
             self._count_one(path, part)
             scope = {**names, "index": index} if is_array else names
-            self._prioritise(instance, composite, kind, part, scope)
+            self._prioritise(instance, kind, part, scope)
             if part.tags:
                 self.draft.graph.tags[instance] = tuple(tag.text for tag in part.tags)
             if isinstance(kind, CompositeText):
@@ -145,10 +144,7 @@ class Unfolding:
                     inside.setdefault("index", scope["index"])
                 self.composite(instance, kind, inside, part.position, within)
             else:
-                self._actor(instance, composite, kind, part, scope)
-            if len(self.problems) > before:
-                self.problems.muted = True  # the other instances would only repeat it
-        self.problems.muted = was_muted
+                self._actor(instance, kind, part, scope)
         if isinstance(kind, CompositeText):
             return Child(kind.name, paths, is_array, count, list(kind.inputs), list(kind.outputs))
         return child_of_actors(kind, paths, is_array, count, self.draft.graph)
@@ -196,7 +192,6 @@ class Unfolding:
         """Count one more instance; raises ``TooLargeError`` if there are too many."""
         self.made.cost += 1
         if self.made.cost > self.made.most:
-            self.problems.muted = False
             if self._advice:
                 most = f"{self.made.most:,} actors and composites"
                 self._tell(f"{path}: the model has more than {most}", part.position, "", self._advice)
@@ -214,7 +209,7 @@ class Unfolding:
                 waiting += inner.actors.values()
         return found
 
-    def _prioritise(self, path: str, composite: str, kind: object, part: PartText, names: Names) -> None:
+    def _prioritise(self, path: str, kind: object, part: PartText, names: Names) -> None:
         """Note the priority of an actor, or of a composite that fires as one."""
         if part.priority is None:
             return
@@ -222,17 +217,16 @@ class Unfolding:
             self._tell(
                 f"{path}: {kind.name} has no priority, for its actors fire one by one",
                 part.priority.position,
-                composite,
+                path,
                 f"give the actors inside a priority, or give {kind.name} a director of its own: 'director: {{}}'",
             )
             return
-        label = f"{path}: priority"
-        found = converted(self.values, part.priority, names, label, composite, Parameter(int).convert)
+        found = converted(self.values, part.priority, names, f"{path}: priority", path, Parameter(int).convert)
         if found is not self.values.missing:
             self.draft.graph.priorities[path] = found or 0
 
-    def _actor(self, path: str, composite: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
-        values = self.settler.configuration(path, actor_type, part.values, names, part.position, path, composite)
+    def _actor(self, path: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
+        values = self.settler.configuration(path, actor_type, part.values, names, part.position, path)
         if values is not None:
             try:
                 actor = actor_type(path, **values)
@@ -240,7 +234,7 @@ class Unfolding:
                 self.made.actors.append(actor)
                 return
             except Exception as error:  # whatever an actor's own __init__ does
-                self.settler.blame(path, error, part.position, composite)
+                self.settler.blame(path, error, part.position, path)
         self.draft.leave_out(path, actor_type)
 
     # -- composites -----------------------------------------------------------------------------------------------

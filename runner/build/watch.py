@@ -173,9 +173,7 @@ class Watching:
             )
         else:
             self.problems.add(
-                f"{what}: {text.text!r} matches no output port{guess}",
-                text.position,
-                *self._outputs.advice(text.text),
+                f"{what}: {text.text!r} matches no output port{guess}", text.position, *self._outputs.advice(text.text)
             )
         return []
 

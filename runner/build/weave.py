@@ -11,9 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 from epicycle.actors import declared_parameters
-from epicycle.aspects import (
-    Aspect,
-)
+from epicycle.aspects import Aspect
 
 from ..graph import WovenAspect
 from ..language import PointcutText
@@ -292,9 +290,7 @@ class Weaving:
             if ports and "." in text:
                 owner = text.rpartition(".")[0]
                 self._problem(
-                    f"{name} stands at actors, but {ports[0]} is a port",
-                    pointcut,
-                    f"write {owner!r}, without the port",
+                    f"{name} stands at actors, but {ports[0]} is a port", pointcut, f"write {owner!r}, without the port"
                 )
             else:
                 inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))

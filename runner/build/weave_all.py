@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from epicycle.aspects import (
-    Aspect,
-    CompositeAspect,
-    CompositeExecutionAspect,
-    FiringTimeParameter,
-    class_decorations,
-)
+from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTimeParameter, class_decorations
 
 from ..catalogue import CatalogueError
 from ..graph import WovenAspect
@@ -67,7 +61,7 @@ class _Weaver:
             return
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
         given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name, scope)
+        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name)
         if not part.at:
             self.problems.add(
                 f"aspect {name} does not say where it stands",

@@ -36,10 +36,7 @@ DISTURBANCE = Construct(
             NAMED,
             "The name of the disturbance.",
             "the disturbance's name",
-            missing=(
-                "the disturbance has no name",
-                "begin the file with a line like 'disturbance: my_disturbance'",
-            ),
+            missing=("the disturbance has no name", "begin the file with a line like 'disturbance: my_disturbance'"),
             name="name",
         ),
         "doc": DOC,

@@ -21,12 +21,7 @@ def find_model(name: str, problems: Problems) -> Path | None:
 
 
 def named_file(
-    said: Text,
-    folder: Path,
-    kind: str,
-    packaged: Callable[[], dict[str, Path]],
-    problems: Problems,
-    who: str = "",
+    said: Text, folder: Path, kind: str, packaged: Callable[[], dict[str, Path]], problems: Problems, who: str = ""
 ) -> Path | None:
     """The file that a name in a file means: as seen from its folder, or packaged; None, and a problem, if it cannot be.
 

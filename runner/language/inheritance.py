@@ -21,10 +21,7 @@ MAX_BASES = 50
 
 
 def inherit(
-    composites: dict[str, CompositeText],
-    actor_types: Collection[str],
-    problems: Problems,
-    limits: Limits = NORMAL,
+    composites: dict[str, CompositeText], actor_types: Collection[str], problems: Problems, limits: Limits = NORMAL
 ) -> tuple[dict[str, CompositeText], set[str]]:
     """The classes with what they inherit, and the names of those that cannot be made for lack of a base."""
     whole = {name: text for name, text in composites.items() if text.extends is None}

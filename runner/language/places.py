@@ -43,8 +43,7 @@ PORTS_SCHEMA: Schema = {"anyOf": [ref("port"), {"type": "array", "items": ref("p
 PATTERN_SCHEMA: Schema = {
     "type": "string",
     **looks_like(
-        PATTERN,
-        "expected a port as a dotted path; * is one segment, name[*] all of an array, ** any segments",
+        PATTERN, "expected a port as a dotted path; * is one segment, name[*] all of an array, ** any segments"
     ),
 }
 _POINTCUT_SCHEMA: Schema = {

@@ -319,11 +319,7 @@ class QuestionReader(NodeReader):
 
 _METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})
 _LEVELS = node_as(
-    {
-        "type": "object",
-        "minProperties": 1,
-        "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]},
-    }
+    {"type": "object", "minProperties": 1, "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]}}
 )
 _FACTOR = node_as({"type": "string"})
 _TREND = "Metrics whose mean, or slope per unit of another factor, {} over the levels of a factor."
@@ -360,9 +356,7 @@ GUIDELINE = Construct(
         "least": Key(AT.described(ref("name")), "The metric that is to be least."),
         "greatest": Key(AT.described(ref("name")), "The metric that is to be greatest."),
         "tolerance": Key(
-            number(float, 0.0),
-            "How much worse than the best is good enough (default: 0).",
-            "guideline: tolerance",
+            number(float, 0.0), "How much worse than the best is good enough (default: 0).", "guideline: tolerance"
         ),
     },
     type="object",

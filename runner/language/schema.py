@@ -61,9 +61,7 @@ _OTHER_TYPE = f"^{NAME}(\\.{NAME})?$"  # a composite, or a type of another packa
 
 
 def json_schema(
-    catalogue: Catalogue,
-    figures: Mapping[str, type[Configurable]],
-    study_figures: Mapping[str, type[Configurable]],
+    catalogue: Catalogue, figures: Mapping[str, type[Configurable]], study_figures: Mapping[str, type[Configurable]]
 ) -> Schema:
     """The schema of model files, of files of composites that are included, of disturbances, and of studies."""
     types: dict[str, Mapping[str, type[Configurable]]] = {
@@ -151,10 +149,7 @@ def _choice(types: Mapping[str, type]) -> Schema:
 def _by_type(types: Mapping[str, type], prefix: str) -> list[Schema]:
     """What else holds, depending on the type."""
     return [
-        {
-            "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
-            "then": ref(f"{prefix}.{name}"),
-        }
+        {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": ref(f"{prefix}.{name}")}
         for name in types
     ]
 

@@ -162,12 +162,7 @@ class _StudyReader(NodeReader):
     """Reads one study file; whatever is misshapen is added to ``problems`` and left out."""
 
     def __init__(
-        self,
-        problems: Problems,
-        path: Path,
-        lender: tuple[str, str] | None = None,
-        *,
-        asks_for_files: bool = True,
+        self, problems: Problems, path: Path, lender: tuple[str, str] | None = None, *, asks_for_files: bool = True
     ) -> None:
         super().__init__(problems)
         self.path = path
@@ -307,10 +302,7 @@ class _StudyReader(NodeReader):
             seen[metric.name] = metric.node.position
 
 
-_HAS_NO = (
-    "{what} has no {key!r}",
-    "write {{metric: mean_wait, half_width: 0.1, at_most: 1000}}",
-)
+_HAS_NO = ("{what} has no {key!r}", "write {{metric: mean_wait, half_width: 0.1, at_most: 1000}}")
 UNTIL = Construct(
     "",
     {
@@ -341,12 +333,7 @@ METRIC = Construct(
     type="object",
     required=["value"],
 )
-_METRICS = {
-    "anyOf": [
-        names_of({"anyOf": [LABEL, METRIC.schema]}),
-        {"type": "array", "items": ref("name")},
-    ]
-}
+_METRICS = {"anyOf": [names_of({"anyOf": [LABEL, METRIC.schema]}), {"type": "array", "items": ref("name")}]}
 _DISTURB = {"anyOf": [{"type": "object", "additionalProperties": one_or_more({"type": "string"})}, ref("texts")]}
 STUDY = Construct(
     "A model under many conditions.",
@@ -371,9 +358,7 @@ STUDY = Construct(
             name="fixed",
         ),
         "vary": Key(
-            DIMENSIONS,
-            "What is varied; every value goes together with every one of the others.",
-            name="dimensions",
+            DIMENSIONS, "What is varied; every value goes together with every one of the others.", name="dimensions"
         ),
         "disturb": Key(
             Shape(_DISTURB, _StudyReader.disturb),

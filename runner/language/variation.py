@@ -70,9 +70,7 @@ class DimensionReader(NodeReader):
             values = {path: as_factor(node, kinds[path]) for path, node in pairs}
             if (first := seen.setdefault(repr(values), nodes[0])) is not nodes[0]:
                 self.problems.add(
-                    f"{name!r} takes the same value twice",
-                    nodes[0].position,
-                    f"first at {first.position}",
+                    f"{name!r} takes the same value twice", nodes[0].position, f"first at {first.position}"
                 )
             levels.append(Level(tuple(Setting(path, node, keys[path]) for path, node in pairs), values))
         return Listed(name, position, kinds, levels)
@@ -224,12 +222,7 @@ HYPERCUBE = Construct(
             node_as(
                 {
                     "type": "object",
-                    "additionalProperties": {
-                        "type": "array",
-                        "items": QUANTITY_SCHEMA,
-                        "minItems": 2,
-                        "maxItems": 2,
-                    },
+                    "additionalProperties": {"type": "array", "items": QUANTITY_SCHEMA, "minItems": 2, "maxItems": 2},
                 }
             ),
             "'path: [low, high]' for each parameter.",

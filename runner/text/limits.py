@@ -7,9 +7,19 @@ from dataclasses import dataclass
 MAX_SEED = 2**63 - 1
 
 
-@dataclass(frozen=True, slots=True)
+class _ForEachActor:
+    """A limit of so many for each actor that there may be."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __get__(self, limits: Limits, _: type[Limits]) -> int:
+        return self.number * limits.actors
+
+
+@dataclass(frozen=True)
 class Limits:
-    """``actors`` counts composites as well; of connections, and of places where aspects stand, five for each will do.
+    """``actors`` counts composites as well.
 
     A model as large as this loads in seconds and takes about 200 MB.  A slip of the pen that asks for a million is told
     before it has filled the memory; who wants a million says so.
@@ -17,45 +27,16 @@ class Limits:
 
     actors: int = 20_000
 
-    @property
-    def connections(self) -> int:
-        """How many there may be."""
-        return 5 * self.actors
-
-    @property
-    def wires(self) -> int:
-        """How many ways there may be from actor to actor, through composites."""
-        return 10 * self.actors
-
-    @property
-    def watched(self) -> int:
-        """From how many ports metrics may take their numbers, a port counted for each metric."""
-        return 10 * self.actors
-
-    @property
-    def comparisons(self) -> int:
-        """With how many paths patterns may be compared, once they have been chosen by the names in them."""
-        return 250 * self.actors
-
-    @property
-    def tokens(self) -> int:
-        """How many tokens and acts of aspects one tag may hold in a run."""
-        return 10 * self.actors
-
-    @property
-    def times(self) -> int:
-        """At how many times something may still be to come in a run."""
-        return 50 * self.actors
-
-    @property
-    def inherited(self) -> int:
-        """How many actors, aspects, connections, ports and parameters classes may take over from others."""
-        return 5 * self.actors
-
-    @property
-    def places(self) -> int:
-        """At how many ports and actors aspects may stand."""
-        return 5 * self.actors
+    connections = _ForEachActor(5)
+    wires = _ForEachActor(10)  # ways from actor to actor, through composites
+    watched = _ForEachActor(10)  # ports from which metrics take their numbers, a port counted for each metric
+    comparisons = _ForEachActor(250)  # of patterns with paths, once these have been chosen by the names in them
+    inherited = _ForEachActor(
+        5
+    )  # actors, aspects, connections, ports and parameters that classes take over from others
+    places = _ForEachActor(5)  # ports and actors at which aspects stand
+    tokens = _ForEachActor(10)  # and acts of aspects at one tag of a run
+    times = _ForEachActor(50)  # at which something is still to come in a run
 
 
 NORMAL = Limits()

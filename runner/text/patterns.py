@@ -14,7 +14,7 @@ from epicycle.actors import did_you_mean
 
 from .limits import NORMAL, Limits
 
-_SEGMENT = re.compile(r"(\*\*(?!\[)|\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?\Z")
+_SEGMENT = re.compile(r"(\*\*|(\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?)\Z")
 
 _INDEX = re.compile(r"\[\d+\]")
 MAX_PATTERN = 1_000
@@ -63,77 +63,57 @@ def names_of(path: str) -> set[str]:
 @lru_cache(maxsize=4096)
 def compile_pattern(text: str) -> re.Pattern[str]:
     """The regular expression of a pattern; raises ``PatternError``."""
+    check_pattern(text)
     # What stands between two `**` is taken where it fits first, and that is final (?>...): to look for it further on
     # could find nothing more, but might take for ever.
-    head, *tails = _split_at_doubles(_segments(text))
-    expression = "".join(f"{segment}\\." for segment in head)
-    for tail in tails[:-1]:
-        expression += r"(?>(?:[^.]+\.)+?" + "".join(f"{segment}\\." for segment in tail) + ")"
+    head, *tails = ("".join(map(_expression, segments)) for segments in _split_at_doubles(text))
+    expression = head + "".join(rf"(?>(?:[^.]+\.)+?{tail})" for tail in tails[:-1])
     if tails:
-        expression += r"(?:[^.]+\.)+" + "".join(f"{segment}\\." for segment in tails[-1])
+        expression += rf"(?:[^.]+\.)+{tails[-1]}"
     # Every segment has got its dot; the path gets one more to match.
     return re.compile(expression)
 
 
-def _split_at_doubles(segments: Iterable[tuple[str, str | None]]) -> list[list[str]]:
-    """The regular expressions of the segments before, between and behind the ``**`` of a pattern."""
+def _expression(segment: str) -> str:
+    """The regular expression of a segment that is not ``**``, and of the dot behind it."""
+    return (r"[^.]+" if segment[0] == "*" else re.escape(segment).replace(r"\[\*\]", r"\[\d+\]")) + r"\."
+
+
+def _split_at_doubles(pattern: str) -> list[list[str]]:
+    """The segments before, between and behind the ``**`` of a pattern."""
     parts: list[list[str]] = [[]]
-    for name, index in segments:
-        if name == "**":
+    for segment in pattern.split("."):
+        if segment == "**":
             parts.append([])
-        elif name == "*":
-            parts[-1].append(r"[^.]+")
-        elif index is None:
-            parts[-1].append(re.escape(name))
         else:
-            parts[-1].append(re.escape(name) + (r"\[\d+\]" if index == "*" else re.escape(f"[{index}]")))
+            parts[-1].append(segment)
     return parts
-
-
-def _segments(text: str) -> list[tuple[str, str | None]]:
-    """The names and indices of a pattern; raises ``PatternError``."""
-    if len(text) > MAX_PATTERN:
-        raise PatternError(f"a pattern has at most {MAX_PATTERN:,} characters")
-    found = []
-    for segment in text.split("."):
-        match = _SEGMENT.match(segment)
-        if match is None:
-            raise PatternError(f"{segment!r} is not a name, a name with an index, '*' or '**'")
-        found.append((match.group(1), match.group(3)))
-    return found
 
 
 def check_pattern(text: str) -> None:
     """Raise ``PatternError`` if a text is no pattern."""
-    _segments(text)
+    if len(text) > MAX_PATTERN:
+        raise PatternError(f"a pattern has at most {MAX_PATTERN:,} characters")
+    for segment in text.split("."):
+        if not _SEGMENT.match(segment):
+            raise PatternError(f"{segment!r} is not a name, a name with an index, '*' or '**'")
 
 
 def matches(pattern: str, path: str) -> bool:
     """Whether the pattern, which is one, selects the path; for a few paths sooner told than by ``compile_pattern``."""
-    head, *tails = _split(pattern.split("."), "**")
+    head, *tails = _split_at_doubles(pattern)
     names = path.split(".")
     if not tails:
-        return len(head) == len(names) and _fit(head, names)
+        return _fit(head, names)
     *middle, last = tails
     end = len(names) - len(last)
     if not _fit(head, names[: len(head)]) or not _fit(last, names[max(0, end) :]):
         return False
     at = len(head)
     for tail in middle:
-        at = next((place for place in range(at + 1, end) if _fit(tail, names[place : place + len(tail)])), end) + len(
-            tail
-        )
+        at = next((place for place in range(at + 1, end) if _fit(tail, names[place : place + len(tail)])), end)
+        at += len(tail)
     return at < end  # the last `**` stands for one at least
-
-
-def _split(segments: list[str], sign: str) -> list[list[str]]:
-    parts: list[list[str]] = [[]]
-    for segment in segments:
-        if segment == sign:
-            parts.append([])
-        else:
-            parts[-1].append(segment)
-    return parts
 
 
 def _fit(segments: list[str], names: list[str]) -> bool:
@@ -191,10 +171,9 @@ class PathIndex:
 
     def select(self, pattern: str) -> list[str]:
         """The paths that the pattern selects, in their order; raises ``PatternError``."""
-        if "*" not in pattern:
-            _segments(pattern)
-            return [pattern] if pattern in self._place else []
         check_pattern(pattern)
+        if "*" not in pattern:
+            return [pattern] if pattern in self._place else []
         # Where the first wildcard stands, `name[*]` still says the name.
         fixed = pattern.partition("*")[0].rstrip("[.")
         candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else self._order

@@ -81,13 +81,13 @@ class Problems:
     def __init__(self) -> None:
         self._kept: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
         self._warnings: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
-        self._unsaid = 0
+        self._count = 0
         self._scopes: dict[Position, str] = {}
         self._cause: BaseException | None = None  # the first exception that was not ours
-        self.muted = False  # while true, problems count for len() alone: they repeat what has been said
 
     def __len__(self) -> int:
-        return len(self._kept) + self._unsaid
+        """How many there are, those included that follow from what has been told."""
+        return self._count
 
     def __bool__(self) -> bool:
         """True for any collector, as `problems or Problems()` must not lose an empty one; ask len()."""
@@ -122,11 +122,11 @@ class Problems:
 
         ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
         """
-        if self.muted or (position is not None and position.told):
-            self._unsaid += 1
-            return
         key = about or message, position
-        if key in self._kept or (position is not None and self._scopes.setdefault(position, scope) != scope):
+        if key in self._kept:
+            return
+        self._count += 1
+        if position is not None and (position.told or self._scopes.setdefault(position, scope) != scope):
             return
         if len(self._kept) == MAX_PROBLEMS:
             # To find them all, and what each was meant to be, may take very long.

@@ -1,18 +1,36 @@
-"""What an exception says and where it comes from: the last line of a user's own code that it went through."""
+"""A Python program as if it were a text: the lines that call us and that fail in it, and its values as nodes."""
 
 from __future__ import annotations
 
+import linecache
 import os
+import sys
 import sysconfig
+from collections.abc import Mapping as AnyMapping
 from pathlib import PurePath
 from traceback import FrameSummary, extract_tb, walk_tb
 from types import FrameType
+from typing import Any
 
-from epicycle.actors import Configurable, EpicycleError
+import numpy as np
 
-from .problems import Position
+from epicycle.actors import MAX_DEPTH, Configurable, EpicycleError, is_too_deep
+
+from .document import Entry, Mapping, Node, Scalar, Sequence
+from .problems import ModelError, Position, Problem
 
 _LIBRARIES = tuple(sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib"))
+
+
+def call_site() -> Position:
+    """The line that called into this package."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith("epicycle."):
+        frame = frame.f_back
+    file, line = frame.f_code.co_filename, frame.f_lineno
+    source = linecache.getline(file, line, frame.f_globals).rstrip("\n")
+    text = source.strip()
+    return Position(in_short(file), line, len(source) - len(source.lstrip()) + 1, len(text), source)
 
 
 def raised_at(error: BaseException | None) -> Position | None:
@@ -42,7 +60,8 @@ def _is_users(frame: FrameType) -> bool:
 
 def _position(line: FrameSummary) -> Position:
     """The place of the expression that failed, or of its whole line where Python does not tell."""
-    source = _source(line)
+    # With its indentation, which the summary has left out.
+    source = linecache.getline(line.filename, line.lineno or 0).rstrip("\n") or line.line or ""
     start, end = len(source) - len(source.lstrip()), len(source.rstrip())
     if line.colno is not None:
         # Python counts bytes.
@@ -51,13 +70,6 @@ def _position(line: FrameSummary) -> Position:
         if line.end_lineno == line.lineno and line.end_colno is not None:
             end = len(encoded[: line.end_colno].decode("utf-8", "replace"))
     return Position(in_short(line.filename), line.lineno or 0, start + 1, max(end - start, 1), source)
-
-
-def _source(line: FrameSummary) -> str:
-    """The line with its indentation, which the summary has left out."""
-    import linecache
-
-    return linecache.getline(line.filename, line.lineno or 0).rstrip("\n") or line.line or ""
 
 
 def in_short(file: str) -> str:
@@ -71,3 +83,34 @@ def describe(error: BaseException) -> str:
     if isinstance(error, EpicycleError):
         return text
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def node_of(value: Any, position: Position) -> Node:
+    """A Python value as a model file would hold it; raises ``ModelError`` if it is nested too deeply for one."""
+    if is_too_deep(value):
+        raise ModelError([Problem(f"nested deeper than {MAX_DEPTH} levels", position)])
+    return _node(value, position)
+
+
+def _node(value: Any, position: Position) -> Node:
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return Sequence(tuple(_node(item, position) for item in value), position)
+    if isinstance(value, AnyMapping):
+        return Mapping(
+            {str(key): Entry(_key(str(key), position), _node(item, position)) for key, item in value.items()}, position
+        )
+    # Anything else is handed on as it is, such as an object that a parameter of an actor takes.
+    return Scalar(value, str(value), False, position)
+
+
+def entries_of(values: AnyMapping[str, Any], position: Position) -> dict[str, Entry]:
+    """Keyword arguments as the entries of a mapping."""
+    return {name: Entry(_key(name, position), node_of(value, position)) for name, value in values.items()}
+
+
+def _key(name: str, position: Position) -> Scalar:
+    return Scalar(name, name, False, position)
