@@ -8,19 +8,17 @@ output ``response``, or its only output.  Which of several inputs takes the toke
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import networkx as nx
 
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
-from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
+from epicycle.aspects import CompositeAspect, FiringTime, Request
 
 from ..graph import AspectModel, Detour, ModelGraph, WovenAspect
 from ..language import PartText, PointcutText
 from ..text import PathIndex, Position, Problems, did_you_mean
-from .draft import Draft
-from .firing_times import without_port
-from .paths import Paths
+from .looks import without_port
 from .settle import place_of
 from .weave import Weaving
 
@@ -35,29 +33,21 @@ def as_actor(part: PartText) -> PartText:
     return replace(part, values=values, priority=priority)
 
 
+@dataclass
 class ModelWeaving(Weaving):
     """Finds the places of an aspect that is the composite at ``path``, and connects it with them."""
 
-    def __init__(
-        self,
-        draft: Draft,
-        paths: Paths,
-        name: str,
-        path: str,
-        scope: str,
-        problems: Problems,
-        position: Position,
-        cls: type[Aspect] = CompositeAspect,
-    ) -> None:
-        super().__init__(draft, paths, name, cls, scope, problems)
-        self.path = path
-        self.position = position
-        self.inputs, self.outputs = draft.graph.borders(path)
-        self._response = ""
-        self._asked: dict[str, str] = {}  # the request port of each place
-        self._request_ports: dict[str, None] = {}  # with "" for one that is not known, which has been told
-        self._times: dict[str, FiringTime] = {}
-        self._is_misplaced = False
+    path: str
+    position: Position
+    _response: str = field(default="", init=False)
+    _asked: dict[str, str] = field(default_factory=dict, init=False)  # the request port of each place
+    # With "" for one that is not known, which has been told.
+    _request_ports: dict[str, None] = field(default_factory=dict, init=False)
+    _times: dict[str, FiringTime] = field(default_factory=dict, init=False)
+    _is_misplaced: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        self.inputs, self.outputs = self.graph.borders(self.path)
 
     @property
     def kind(self) -> str:

@@ -13,7 +13,7 @@ from ..language import CompositeText, PartText, Settings, inherit, read_library
 from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
 from .draft import Draft
 from .settle import Settler
-from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .unfold import Known, TooLargeError, Unfolding
 from .weave_all import weave_all
 
 
@@ -46,15 +46,15 @@ class CompositeInstance:
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which stands beside the parameters, as in a model file
             part = replace(part, priority=part.values.pop("priority").value)
-        limits = draft.graph.limits
-        made = Unfolded(draft.inside(draft.graph.director_of(path)), limits.actors)
-        known, settler = Known(cls.composites, cls.catalogue), Settler(Settings(limits=limits), problems)
+        settler = Settler(Settings(limits=draft.graph.limits), problems)
+        inside = draft.inside(draft.graph.director_of(path))
+        made = Unfolding(Known(cls.composites, cls.catalogue), settler, inside)
         _, bracket, index = path.rpartition("[")
         names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
         aspects: list[WovenAspect] = []
         with suppress(TooLargeError):
-            Unfolding(known, settler, made).instances(path, path.rpartition(".")[0], part, names)
-            aspects = weave_all(made, known, settler)
+            made.instances(path, path.rpartition(".")[0], part, names)
+            aspects = weave_all(made)
         problems.raise_if_any()
         return made.draft, aspects
 

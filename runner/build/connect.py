@@ -42,7 +42,6 @@ class Child:
     is_known: bool = True  # whether there are no other ports: an instance that could not be made may have had some
 
     def ports(self, direction: str) -> list[str]:
-        """The names of its ports of one direction."""
         return self.inputs if direction == "input" else self.outputs
 
 
@@ -93,7 +92,6 @@ class Links:
     is_whole: bool
 
     def make(self, draft: Draft) -> None:
-        """Connect the ports."""
         for link in self.found:
             draft.graph.connect(link.source, link.destination, link.delay, link.position)
         draft.is_wired = draft.is_wired and self.is_whole

@@ -54,7 +54,7 @@ def _weave(
             return None
     paths = Paths(draft, [port.path for port in own.values()])
     pointcuts = [PointcutText.of(Text(each, position)) for each in at_parameter]
-    weaving = Weaving(draft, paths, name, type(aspect), actor.path, problems)
+    weaving = Weaving(draft, paths, name, actor.path, problems, type(aspect))
     woven = replace(
         weaving.weave(aspect, pointcuts, lambda *_: position),
         ports=[own[port].path for port in decoration.ports if port in own],

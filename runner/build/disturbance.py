@@ -21,7 +21,7 @@ from ..text import Mapping, Position, Problems, node_of
 from .draft import Draft
 from .scope import Building
 from .settle import Settler
-from .unfold import Known, Unfolded, Unfolding
+from .unfold import Known, Unfolding
 from .weave_all import weave_all
 
 
@@ -53,10 +53,9 @@ def disturb(
     settler = Settler(Settings(settings_in(node, problems) if isinstance(node, Mapping) else []), problems)
     catalogue = installed().with_types(types)
     composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
-    known = Known(composites, catalogue, broken)
-    made = Unfolded(model.draft.copy(), model.graph.limits.actors)
-    Unfolding(known, settler, made).body("", root, settler.parameters("", root, {}, {}, None))
-    found = weave_all(made, known, settler)
+    made = Unfolding(Known(composites, catalogue, broken), settler, model.draft.copy())
+    made.body("", root, settler.parameters("", root, {}, {}, None))
+    found = weave_all(made)
     settler.check_unused(made.draft)
     problems.raise_if_any()
     return made.draft, found

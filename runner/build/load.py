@@ -35,7 +35,7 @@ from .draft import Draft
 from .figures import figures_of
 from .model import DeclaredFigure, Model
 from .settle import Settler
-from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .unfold import Known, TooLargeError, Unfolding
 from .untried import try_classes
 from .watch import Watching
 from .weave_all import weave_all
@@ -100,13 +100,13 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
     _check_names(known, problems)
     values.of_model = root.parameters
     names = settler.parameters("", root, {}, {}, None)
-    made = Unfolded(Draft(ModelGraph(limits)), limits.actors)
+    made = Unfolding(known, settler, Draft(ModelGraph(limits)))
     try:
-        Unfolding(known, settler, made).body("", root, names)
+        made.body("", root, names)
     except TooLargeError:
         pass
     else:
-        woven = weave_all(made, known, settler)
+        woven = weave_all(made)
         settler.check_unused(made.draft)
         check(made.draft, problems)
         check_processors(woven, made.draft.graph, problems)

@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from epicycle.actors import declared_parameters
 from epicycle.actors.expression import PortFormula
-from epicycle.aspects import Aspect, JoinPointAspect, PortsParameter, Reading, Selection, SelectionParameter
+from epicycle.aspects import (
+    Aspect,
+    ByActorParameter,
+    FiringTime,
+    FiringTimeParameter,
+    JoinPointAspect,
+    PortsParameter,
+    Reading,
+    Selection,
+    SelectionParameter,
+)
 
-from ..text import PatternError, Position, Problems, did_you_mean
-from .draft import Draft
-from .paths import Paths
+from ..graph import ModelGraph, WovenAspect
+from ..text import PatternError, Position, did_you_mean
+from .paths import View
 
-Found = tuple[dict[PortFormula, list[Reading]], dict[str, Selection], list[str]]
+Found = tuple[str, tuple[str, ...], str]  # what is wrong, the keys that lead there, and advice
 
 
-class Looks:
-    """Finds what one aspect looks at; ``scope`` is the composite that declares it, to which its names are relative."""
+class Looks(View):
+    """Finds what one aspect looks at."""
 
-    def __init__(self, draft: Draft, paths: Paths, name: str, scope: str, problems: Problems) -> None:
-        self.draft = draft
-        self.graph = draft.graph
-        self.paths = paths
-        self.ports = paths.ports
-        self.name = name
-        self.scope = scope
-        self.problems = problems
-
-    def of(self, aspect: Aspect, ports: list[str], position_of: Callable[..., Position | None]) -> Found:
+    def of(
+        self, aspect: Aspect, ports: list[str], position_of: Callable[..., Position | None]
+    ) -> tuple[dict[PortFormula, list[Reading]], dict[str, Selection], list[str]]:
         """What its expressions ask for, what its patterns select, and the ports that it looks at otherwise.
 
         ``ports`` are those at which it stands; ``position_of`` tells where a parameter is set in the model file.
@@ -120,8 +123,27 @@ class Looks:
     def _sends(self, port: str) -> bool:
         return self.graph.direction(port) == "output"
 
-    def _full(self, text: str) -> str:
-        return f"{self.scope}.{text}" if self.scope else text
 
-    def _problem(self, message: str, position: Position | None, *hints: str) -> None:
-        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope)
+def unknown_inputs(woven: WovenAspect, graph: ModelGraph) -> Iterator[Found]:
+    """Ports that an aspect's parameters name, and no actor has that these are for."""
+    for name, parameter in declared_parameters(type(woven.aspect)).items():
+        value = getattr(woven.aspect, name)
+        if isinstance(parameter, FiringTimeParameter):
+            yield from without_port((name,), value, woven.actors, graph)
+        elif isinstance(parameter, ByActorParameter) and isinstance(parameter.item, FiringTimeParameter):
+            for pattern, each in value.items():
+                chosen = {pattern: woven.selections[name].get(pattern, ())}
+                actors = [path for path in woven.actors if ByActorParameter.of({pattern: True}, chosen, path)]
+                yield from without_port((name, pattern), each, actors, graph)
+
+
+def without_port(keys: tuple[str, ...], times: FiringTime, actors: Iterable[str], graph: ModelGraph) -> Iterator[Found]:
+    """The ports in execution times that none of these actors has."""
+    inputs = dict.fromkeys(port for path in actors for port in graph.actors[path].inputs)
+    for port in times if isinstance(times, Mapping) and inputs else ():
+        if port not in inputs:
+            yield (
+                f"{': '.join(keys)}: no actor that this is for has an input {port!r}{did_you_mean(port, inputs)}",
+                (*keys, port),
+                f"their inputs: {', '.join(inputs)}",
+            )

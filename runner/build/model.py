@@ -217,7 +217,6 @@ class Model(Scope):
         self.metrics = [*self.metrics, *watched.metrics]
 
     def scope(self, path: str) -> Composite:
-        """The composite at a path."""
         return self._scopes.setdefault(path, Composite(self, path))
 
     def forget(self, path: str) -> None:

@@ -1,11 +1,14 @@
-"""Paths: what the patterns of a model's aspects choose from."""
+"""What aspects choose their places from, and how one of them sees it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cached_property
 
-from ..text import PathIndex
+from ..graph import ModelGraph
+from ..language import PointcutText
+from ..text import PathIndex, Position, Problems, Text
 from .draft import Draft
 
 
@@ -14,27 +17,55 @@ class Paths:
 
     def __init__(self, draft: Draft, ports: Iterable[str] | None = None) -> None:
         self._draft, self._graph = draft, draft.graph
-        graph = draft.graph
-        self.ports = PathIndex(graph.ports.nodes if ports is None else ports, graph.limits)
+        self.ports = self._index(draft.graph.ports.nodes if ports is None else ports)
+
+    def _index(self, paths: Iterable[str]) -> PathIndex:
+        return PathIndex(paths, self._graph.limits)
 
     @cached_property
     def actors(self) -> PathIndex:
-        """All actors."""
-        return PathIndex(self._graph.actors, self._graph.limits)
+        return self._index(self._graph.actors)
 
     @cached_property
     def holders(self) -> PathIndex:
         """All actors and composites."""
-        return PathIndex([*self._graph.actors, *self._graph.composites], self._graph.limits)
+        return self._index([*self._graph.actors, *self._graph.composites])
 
     @cached_property
     def owners(self) -> PathIndex:
         """All composites and actors, those that could not be made included."""
-        graph = self._graph
-        unmade = sorted(set(map(graph.owner, self._draft.open)))
-        return PathIndex(dict.fromkeys((*graph.composites, *graph.actors, *unmade)), graph.limits)
+        unmade = sorted(set(map(self._graph.owner, self._draft.open)))
+        return self._index(dict.fromkeys((*self._graph.composites, *self._graph.actors, *unmade)))
 
     @cached_property
     def kinds(self) -> dict[str, str]:
         """The types of all actors and composites."""
         return {path: type(actor).__name__ for path, actor in self._graph.actors.items()} | self._graph.composites
+
+
+@dataclass
+class View:
+    """A model as one aspect sees it: names are relative to ``scope``, the composite that declares the aspect."""
+
+    draft: Draft
+    paths: Paths
+    name: str
+    scope: str
+    problems: Problems
+
+    @property
+    def graph(self) -> ModelGraph:
+        return self.draft.graph
+
+    @property
+    def ports(self) -> PathIndex:
+        return self.paths.ports
+
+    def _full(self, text: str) -> str:
+        return f"{self.scope}.{text}" if self.scope else text
+
+    def _problem(
+        self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
+    ) -> None:
+        position = where.position if isinstance(where, (PointcutText, Text)) else where
+        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope, about=about)

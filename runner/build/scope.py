@@ -289,7 +289,6 @@ class Scope:
     def _links(
         self, source: Ends, destination: Ends | None, delay: float | str | None, position: Position, problems: Problems
     ) -> Links:
-        """The connections that are meant."""
         inside = self._inside
         connection = Named(self._model.graph, self.path, position, problems).connection(
             source, destination, delay, inside.name
@@ -352,7 +351,7 @@ class Scope:
         if isinstance(aspect, Aspect):
             with raising() as problems:
                 pointcuts = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
-                weaving = Weaving(model.draft, Paths(model.draft), full, type(aspect), self.path, problems)
+                weaving = Weaving(model.draft, Paths(model.draft), full, self.path, problems, type(aspect))
                 woven = weaving.weave(aspect, pointcuts, lambda *_: position)
             model.enlist([woven])
             return woven
@@ -368,7 +367,7 @@ class Scope:
         with raising() as problems:
             pointcuts = Named(draft.graph, self.path, position, problems).pointcuts(at, kind)
             pointcuts = [replace(each, firing_time=firing_time or 0.0) for each in pointcuts]
-            detour = ModelWeaving(draft, Paths(draft), full, path, self.path, problems, position, kind)
+            detour = ModelWeaving(draft, Paths(draft), full, self.path, problems, kind, path, position)
             woven = detour.weave(kind(), pointcuts, lambda *_: position)
             detour.check(woven)
             woven = detour.connect(woven)

@@ -235,7 +235,6 @@ def local_nanoseconds(start: object) -> int:
 
 
 def drift(value: object) -> float:
-    """How fast local time goes; raises ``ParameterError``."""
     found: Any = Parameter(float, unit="1", min=1e-6, max=1e6).convert(value)
     return 1.0 if found is None else float(found)
 

@@ -7,7 +7,9 @@ computed from it is not judged; a part that cannot be made is a gap in the draft
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 from epicycle.actors import Actor, Parameter
@@ -56,42 +58,26 @@ class Known:
         return f"valid types: {valid}", OF_YOUR_OWN
 
 
-@dataclass(frozen=True)
-class AspectToWeave:
-    """An aspect that a model or an instance of a composite declares; ``names`` are what its values may use."""
-
-    name: str
-    scope: str
-    part: PartText
-    names: Names
-
-
-@dataclass
-class Unfolded:
-    """What has been made so far: ``cost`` actors and composites, of which there may be ``most``, and aspects."""
-
-    draft: Draft
-    most: int
-    aspects: list[AspectToWeave] = field(default_factory=list)
-    actors: list[Actor] = field(default_factory=list)
-    classes: set[str] = field(default_factory=set)  # the composites of which there are instances
-    cost: int = 0
-    places: int = 0  # at which aspects stand
-
-
 class Unfolding:
-    """Makes parts of a model; that they are too many is told with ``advice``, or not at all."""
+    """What is made of declarations: parts in a draft, and the aspects that are yet to be woven around them.
 
-    def __init__(self, known: Known, settler: Settler, made: Unfolded, advice: str = RAISE_IT) -> None:
+    ``trial``: parts are made to see what is wrong with them, and no more than so many; more is not told.
+    """
+
+    def __init__(self, known: Known, settler: Settler, draft: Draft, trial: int | None = None) -> None:
         self.known = known
         self.settler = settler
         self.values = settler.values
         self.problems = settler.problems
-        self.made = made
-        self.draft = made.draft
-        self._advice = advice
+        self.draft = draft
+        self.aspects: list[tuple[str, PartText, Names]] = []  # where they are declared, and what their values may use
+        self.actors: list[Actor] = []
+        self.classes: set[str] = set()  # the composites of which there are instances
+        self.cost = 0  # actors and composites
+        self.places = 0  # at which aspects stand
+        self._trial = trial
         self._port_types: dict[str, Any] = {}
-        self._token_types: dict[str, type] | None = None
+        self._tokens = cache(partial(token_types, known.catalogue))
 
     def body(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...] = ()) -> None:
         """Make the actors of a composite, or of the model, and connect them; its aspects are noted."""
@@ -115,8 +101,7 @@ class Unfolding:
         self.draft.is_wired = self.draft.is_wired and composite.is_wired
         for connection in composite.connections:
             wiring.resolve(connection, names).make(self.draft)
-        for name, part in composite.aspects.items():
-            self.made.aspects.append(AspectToWeave(f"{path}.{name}" if path else name, path, part, names))
+        self.aspects += ((path, part, names) for part in composite.aspects.values())
 
     def instances(
         self, path: str, composite: str, part: PartText, names: Names, within: tuple[str, ...] = ()
@@ -190,11 +175,12 @@ class Unfolding:
 
     def _count_one(self, path: str, part: PartText) -> None:
         """Count one more instance; raises ``TooLargeError`` if there are too many."""
-        self.made.cost += 1
-        if self.made.cost > self.made.most:
-            if self._advice:
-                most = f"{self.made.most:,} actors and composites"
-                self._tell(f"{path}: the model has more than {most}", part.position, "", self._advice)
+        self.cost += 1
+        most = self.draft.graph.limits.actors if self._trial is None else self._trial
+        if self.cost > most:
+            if self._trial is None:
+                message = f"{path}: the model has more than {most:,} actors and composites"
+                self._tell(message, part.position, "", RAISE_IT)
             raise TooLargeError
 
     def _kinds(self, part: PartText) -> set[str]:
@@ -231,7 +217,7 @@ class Unfolding:
             try:
                 actor = actor_type(path, **values)
                 self.draft.graph.add_actor(actor, part.position)
-                self.made.actors.append(actor)
+                self.actors.append(actor)
                 return
             except Exception as error:  # whatever an actor's own __init__ does
                 self.settler.blame(path, error, part.position, path)
@@ -249,7 +235,7 @@ class Unfolding:
     ) -> None:
         """One instance of a composite, its ports and all that is in it; ``inside`` are its parameters."""
         graph = self.draft.graph
-        self.made.classes.add(composite.name)
+        self.classes.add(composite.name)
         graph.add_composite(path, composite.name)
         for direction in ("input", "output"):
             for name, port in composite.ports(direction).items():
@@ -281,11 +267,6 @@ class Unfolding:
             return None
         return found
 
-    def _tokens(self) -> dict[str, type]:
-        if self._token_types is None:
-            self._token_types = token_types(self.known.catalogue)
-        return self._token_types
-
     # -- aspects that are models ----------------------------------------------------------------------------------
 
     def _aspect_model(
@@ -302,12 +283,11 @@ class Unfolding:
             return None
         if self.settler.is_enabled(full, path, part, names):
             return self.instances(full, path, as_actor(part), names, within)
-        trial = replace(self.made, draft=self.draft.inside(graph.director_of(full)), aspects=[], actors=[])
+        trial = copy(self)
+        trial.draft, trial.aspects, trial.actors = self.draft.inside(graph.director_of(full)), [], []
         try:
-            Unfolding(self.known, self.settler, trial, self._advice).instances(
-                full, path, as_actor(part), names, within
-            )
+            trial.instances(full, path, as_actor(part), names, within)
         finally:
-            self.made.cost = trial.cost
+            self.cost = trial.cost
         self.draft.unknown.add(full)
         return None

@@ -12,7 +12,7 @@ from ..text import RAISE_IT, Limits, Problems
 from .checks import check
 from .draft import Draft
 from .settle import Settler
-from .unfold import Known, TooLargeError, Unfolded, Unfolding
+from .unfold import Known, TooLargeError, Unfolding
 from .weave_all import weave_all
 
 _OVERHEAD = 3  # what a class takes beside what is in it, as many actors
@@ -37,10 +37,9 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
             continue
         is_whole = False
         if left > 0:
-            made = Unfolded(Draft(ModelGraph(limits)), left)
-            is_whole = _try(
-                known.composites[name], made, known, Settler(Settings(), problems, Values(problems, values.budget))
-            )
+            settler = Settler(Settings(), problems, Values(problems, values.budget))
+            made = Unfolding(known, settler, Draft(ModelGraph(limits)), left)
+            is_whole = _try(known.composites[name], made)
             left -= _OVERHEAD + made.cost + (made.draft.graph.connections + made.places) // 5
             tried |= made.classes
         if not is_whole:
@@ -57,9 +56,9 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
         )
 
 
-def _try(composite: CompositeText, made: Unfolded, known: Known, settler: Settler) -> bool:
+def _try(composite: CompositeText, made: Unfolding) -> bool:
     """Unfold one instance of a class, called as it is, with nothing around it; whether all of it was looked at."""
-    path, values, draft = composite.name, settler.values, made.draft
+    path, values, draft = composite.name, made.values, made.draft
     names: dict[str, object] = {}
     for name, declared in composite.parameters.items():
         if declared.value is not None:
@@ -70,11 +69,11 @@ def _try(composite: CompositeText, made: Unfolded, known: Known, settler: Settle
         names[name] = values.missing
     names.setdefault("index", values.missing)
     try:
-        Unfolding(known, settler, made, "").composite(path, composite, names, None)
+        made.composite(path, composite, names, None)
     except TooLargeError:
         return False
     inputs, outputs = draft.graph.borders(path)
     draft.open.update(inputs, outputs)  # anything may be connected to them
-    weave_all(made, known, settler)
-    check(draft, settler.problems, whole=False)
+    weave_all(made)
+    check(draft, made.problems, whole=False)
     return True

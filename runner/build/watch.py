@@ -66,7 +66,6 @@ class Watching:
         return self.found
 
     def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
-        """A metric as the file gives it."""
         values: dict[str, object] = {}
         for key, entry in text.values.items():
             # What is only read by people holds no expressions.
@@ -134,7 +133,6 @@ class Watching:
     def _measure(
         self, what: str, options: Mapping[str, object], position: Position, places: Mapping[str, Position]
     ) -> Measure | None:
-        """What is taken; None, and problems, if that cannot be."""
         before = len(self.problems)
         values: dict[str, object] = {}
         declared = declared_parameters(Measure)

@@ -9,40 +9,29 @@ at a composite for all the actors in it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 
 from epicycle.actors import declared_parameters
 from epicycle.aspects import Aspect
 
 from ..graph import WovenAspect
 from ..language import PointcutText
-from ..text import PathIndex, PatternError, Position, Problems, Text, did_you_mean, in_general, nearest
-from .draft import Draft
-from .firing_times import unknown_inputs
-from .looks import Looks
-from .paths import Paths
+from ..text import PathIndex, PatternError, Position, did_you_mean, in_general, nearest
+from .looks import Looks, unknown_inputs
+from .paths import View
 
 
-class Weaving:
-    """Finds the places of one aspect; ``scope`` is the composite that declares it, to which its names are relative."""
+@dataclass
+class Weaving(View):
+    """Finds the places of one aspect, which is of the class ``cls``."""
 
-    def __init__(
-        self, draft: Draft, paths: Paths, name: str, cls: type[Aspect], scope: str, problems: Problems
-    ) -> None:
-        self.draft = draft
-        self.graph = draft.graph
-        self.paths = paths
-        self.ports = paths.ports
-        self.name = name
-        self.cls = cls
-        self.scope = scope
-        self.problems = problems
-        self._parameters: dict[str, bool] = {}  # those that pointcuts select, and whether they are left out again
-        self._left_out: set[str] = set()  # ports, which counts for the connections to them, too
-        self._is_excused = False  # whether a pointcut selects nothing because there is nothing now
+    cls: type[Aspect]
+    _parameters: dict[str, bool] = field(default_factory=dict, init=False)  # selected ones, and whether left out again
+    _left_out: set[str] = field(default_factory=set, init=False)  # ports, which counts for the connections to them, too
+    _is_excused: bool = field(default=False, init=False)  # whether a pointcut selects nothing as there is nothing now
 
     @property
     def kind(self) -> str:
-        """The name of its type."""
         return self.cls.__name__
 
     def weave(
@@ -80,7 +69,6 @@ class Weaving:
         return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
 
     def _select_ports(self, pointcuts: Sequence[PointcutText]) -> list[str]:
-        """The ports that the pointcuts select."""
         of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
         self._left_out = {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
@@ -175,7 +163,6 @@ class Weaving:
             self._parameters.setdefault(path, False)
 
     def _matching(self, pointcut: PointcutText) -> list[str] | None:
-        """What a pattern selects."""
         full = self._full(pointcut.text)
         try:
             found = self.ports.select(full)
@@ -356,15 +343,6 @@ class Weaving:
     def _fits(self, port: str) -> bool:
         """Whether the aspect can stand there."""
         return self.graph.direction(port) in self.cls.stands_at
-
-    def _full(self, text: str) -> str:
-        return f"{self.scope}.{text}" if self.scope else text
-
-    def _problem(
-        self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
-    ) -> None:
-        position = where.position if isinstance(where, (PointcutText, Text)) else where
-        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope, about=about)
 
 
 def _asked(pointcut: PointcutText) -> str:

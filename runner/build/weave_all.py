@@ -14,26 +14,27 @@ from ..text import RAISE_IT, Position, TooManyError, did_you_mean
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .decorated import arranged, weave_decorations
 from .paths import Paths
-from .settle import Settler, converted, place_of
-from .unfold import AspectToWeave, Known, Unfolded
+from .settle import converted, place_of
+from .unfold import Names, Unfolding
 from .weave import Weaving
 
 
-def weave_all(made: Unfolded, known: Known, settler: Settler) -> list[WovenAspect]:
+def weave_all(made: Unfolding) -> list[WovenAspect]:
     """Let all aspects stand where they are to, now that all ports exist, in the order in which tokens meet them."""
-    weaver, graph, problems = _Weaver(made, known, settler), made.draft.graph, settler.problems
-    for each in made.aspects:
+    weaver, graph, problems = _Weaver(made), made.draft.graph, made.problems
+    for scope, part, names in made.aspects:
+        name = f"{scope}.{part.name}" if scope else part.name
         try:
-            weaver.weave(each)
+            weaver.weave(name, scope, part, names)
         except TooManyError as error:
-            problems.add(f"aspect {each.name}: {error}", each.part.position, RAISE_IT)
+            problems.add(f"aspect {name}: {error}", part.position, RAISE_IT)
             problems.raise_if_any()
     found = weaver.found
     decorated = {cls for cls in set(map(type, made.actors)) if class_decorations(cls)}
     for actor in made.actors:
         if type(actor) in decorated:
             position = graph.positions[actor.path]
-            found += weave_decorations(actor, made.draft, problems, position, settler.set_from_outside)
+            found += weave_decorations(actor, made.draft, problems, position, made.settler.set_from_outside)
     found = arranged(found, graph)
     if check_nesting(found, graph, problems):
         graph.detours = detours(graph, found)
@@ -43,19 +44,17 @@ def weave_all(made: Unfolded, known: Known, settler: Settler) -> list[WovenAspec
 class _Weaver:
     """Weaves what is declared, one after the other."""
 
-    def __init__(self, made: Unfolded, known: Known, settler: Settler) -> None:
+    def __init__(self, made: Unfolding) -> None:
         self.made = made
         self.draft = made.draft
         self.graph = made.draft.graph
-        self.known = known
-        self.settler = settler
-        self.problems = settler.problems
+        self.known = made.known
+        self.settler = made.settler
+        self.problems = made.problems
         self.paths = Paths(made.draft)
         self.found: list[WovenAspect] = []
 
-    def weave(self, declared: AspectToWeave) -> None:
-        """Let one aspect stand where its declaration says."""
-        name, scope, part, names = declared.name, declared.scope, declared.part, declared.names
+    def weave(self, name: str, scope: str, part: PartText, names: Names) -> None:
         cls = self._type(name, scope, part)
         if cls is None:
             return
@@ -70,9 +69,9 @@ class _Weaver:
                 scope=scope,
             )
         self.graph.positions[f"aspect {name}"] = part.position
-        weaving = Weaving(self.draft, self.paths, name, cls, scope, self.problems)
+        weaving = Weaving(self.draft, self.paths, name, scope, self.problems, cls)
         if is_model and name in self.graph.composites:
-            weaving = ModelWeaving(self.draft, self.paths, name, name, scope, self.problems, part.position, cls)
+            weaving = ModelWeaving(self.draft, self.paths, name, scope, self.problems, cls, name, part.position)
             part = replace(part, at=tuple(self._timed(pointcut, name, scope, names) for pointcut in part.at))
         is_enabled = name in self.graph.composites if is_model else self.settler.is_enabled(name, scope, part, names)
         try:
@@ -152,7 +151,6 @@ class _Weaver:
         return CompositeExecutionAspect if aimed and not at_ports else CompositeAspect
 
     def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
-        """The pointcut with its execution time."""
         if pointcut.time is None:
             return pointcut
         values, convert = self.settler.values, FiringTimeParameter().convert

@@ -109,7 +109,6 @@ class Measure(Configurable):
 
     @property
     def kind(self) -> Take:
-        """What is declared of its ``take``."""
         return TAKES[self.take]
 
     @property

@@ -21,17 +21,14 @@ def model_folders() -> list[Path]:
 
 
 def packaged_models() -> dict[str, Path]:
-    """The packaged models by name."""
     return _yaml_files(model_folders())
 
 
 def packaged_disturbances() -> dict[str, Path]:
-    """The packaged disturbances by name."""
     return _yaml_files([folder / "disturbances" for folder in model_folders()])
 
 
 def packaged_studies() -> dict[str, Path]:
-    """The packaged studies by name."""
     return _yaml_files([folder / "studies" for folder in model_folders()])
 
 

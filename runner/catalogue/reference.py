@@ -82,7 +82,6 @@ class TypeReference:
 
     @property
     def summary(self) -> str:
-        """The first sentence of the doc."""
         return first_sentence(self.doc)
 
 

@@ -42,11 +42,6 @@ class Wire:
     destination: InputPort[Any]
     hops: tuple[Hop, ...]
 
-    @property
-    def immediate(self) -> bool:
-        """Whether a token arrives within the tag in which it is sent."""
-        return all(hop.delay is None for hop in self.hops)
-
 
 @dataclass(frozen=True, eq=False)
 class Detour(Hop):
@@ -126,7 +121,6 @@ class ModelGraph:
             self._enter(hop)
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
-        """Add an actor and its ports."""
         self._check_open()
         actor.is_part = True
         self.actors[actor.path] = actor
@@ -177,7 +171,6 @@ class ModelGraph:
         self.ports.nodes[path]["port"] = port
 
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
-        """Add one connection between two ports."""
         self._check_open()
         self._enter(Hop(source, destination, delay, position, self._order))
 
@@ -190,11 +183,9 @@ class ModelGraph:
 
     @property
     def connections(self) -> int:
-        """How many there are."""
         return len(self._hops)
 
     def disconnect(self, hop: Hop) -> None:
-        """Take a connection out."""
         self._check_open()
         del self._hops[hop.order]
         self.ports.remove_edge(hop.source, hop.destination, key=hop.order)

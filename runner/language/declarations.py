@@ -124,7 +124,6 @@ class CompositeText:
     spoilt: bool = False  # it could not be read as a whole, or made from its base: what is missing is no news
 
     def ports(self, direction: str) -> dict[str, PortText]:
-        """Its ``input`` or ``output`` ports."""
         return self.inputs if direction == "input" else self.outputs
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TypeVar
 
 from ..catalogue import find, packaged_disturbances
@@ -51,14 +50,9 @@ DISTURBANCE = Construct(
 )
 
 
-def find_disturbance(name: str, problems: Problems) -> Path | None:
-    """The file of a disturbance: a path if it looks like one, otherwise a packaged disturbance's name."""
-    return find(name, "disturbance", packaged_disturbances, problems)
-
-
 def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
     """A disturbance by its name or path; None if it cannot be read at all."""
-    path = find_disturbance(name, problems)
+    path = find(name, "disturbance", packaged_disturbances, problems)
     node = None if path is None else read(path, problems)
     return None if node is None else _declared(node, problems)
 

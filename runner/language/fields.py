@@ -158,7 +158,6 @@ class Key:
 
     @property
     def schema(self) -> Schema:
-        """What editors know of it."""
         return {**self.shape.schema, "description": self.doc}
 
 
@@ -172,7 +171,6 @@ class Construct:
 
     @property
     def schema(self) -> Schema:
-        """What editors know of it."""
         properties = {key: each.schema for key, each in self.keys.items()}
         found: Schema = {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
         return {**({"description": self.doc} if self.doc else {}), **found, **self.rules}

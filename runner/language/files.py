@@ -15,11 +15,6 @@ from .models import DeclarationReader
 MAX_INCLUDES = 200
 
 
-def find_model(name: str, problems: Problems) -> Path | None:
-    """The file of a model: a path if it looks like one, otherwise a packaged model's name."""
-    return find(name, "model", packaged_models, problems)
-
-
 def named_file(
     said: Text, folder: Path, kind: str, packaged: Callable[[], dict[str, Path]], problems: Problems, who: str = ""
 ) -> Path | None:
@@ -44,7 +39,7 @@ def named_file(
 
 def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
     """What a model's file declares, and the composite classes of it and of all that it includes."""
-    path = find_model(name, problems)
+    path = find(name, "model", packaged_models, problems)
     node = None if path is None else read(path, problems)
     if isinstance(node, Mapping) and "study" in node.entries:
         problems.add(f"{name} is a study, not a model", None, f"run it: epicycle study {name}")

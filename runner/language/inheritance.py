@@ -103,7 +103,6 @@ class _Heir:
         self.problems = problems
 
     def composite(self) -> CompositeText:
-        """The whole class."""
         base, text = self.base, self.text
         removed = {name: part.position for name, part in text.actors.items() if part.removes}
         parameters = dict(base.parameters)

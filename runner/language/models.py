@@ -413,10 +413,8 @@ class DeclarationReader(NodeReader):
         return ModelText(composite(self, said.pop("name", "model"), own, node.position), **said)
 
     def included(self, node: Node) -> ModelText | None:
-        """A file of composite classes."""
         said = LIBRARY.read(self, node, "an included file")
         return None if said is None else ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)
 
     def connection(self, node: Node) -> ConnectionText | None:
-        """One entry of ``connections``."""
         return connection(self, node)

@@ -128,7 +128,6 @@ def json_schema(
 
 
 def schema_text(schema: Schema) -> str:
-    """The schema as the text of a file."""
     return json.dumps(schema, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 

@@ -165,7 +165,6 @@ def _value(text: str, option: str, offset: int, problems: Problems) -> Node | No
 
 
 def without(text: ModelText, name: str, problems: Problems) -> ModelText:
-    """The model without one of its aspects."""
     aspects = text.root.aspects
     if name not in aspects:
         problems.add(

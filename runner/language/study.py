@@ -72,11 +72,6 @@ class Study:
         return {name: kind for dimension in self.dimensions for name, kind in dimension.columns.items()}
 
 
-def find_study(name: str, problems: Problems) -> Path | None:
-    """The file of a study: a path if it looks like one, otherwise a packaged study's name."""
-    return find(name, "study", packaged_studies, problems)
-
-
 def is_study(path: Path) -> bool:
     """Whether a file says that it is a study."""
     with suppress(OSError):
@@ -97,7 +92,7 @@ def read_study(
 ) -> Study:
     """The study of a file; raises ``ModelError`` with all that is wrong with what it says."""
     problems = Problems()
-    path = find_study(str(name), problems)
+    path = find(str(name), "study", packaged_studies, problems)
     node = None if path is None else read(path, problems)
     problems.raise_if_any()
     assert path is not None
@@ -170,7 +165,6 @@ class _StudyReader(NodeReader):
         self.lender = lender  # file and text of the study whose claims are judged here, if they are known
 
     def study(self, node: Node, text: str) -> Study | None:
-        """The whole file."""
         if (
             isinstance(node, Mapping)
             and "study" not in node.entries

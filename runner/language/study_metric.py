@@ -58,7 +58,6 @@ class StudyMetric:
 
     @property
     def formula(self) -> Formula:
-        """The checked expression."""
         return Formula(self.source)
 
     def _place(self, source: str, part: str) -> tuple[int, int]:

@@ -49,8 +49,6 @@ class Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """A list of nodes."""
-
     items: tuple["Node", ...]
     position: Position
 

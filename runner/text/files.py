@@ -39,13 +39,11 @@ def noting() -> Iterator[Noted]:
 
 
 def note_file(path: Path, data: bytes) -> None:
-    """A file has been read, with these contents."""
     if (noted := _noted.get()) is not None:
         noted.files[str(path)] = hashlib.sha256(data).hexdigest()
 
 
 def note_package(name: str, version: str) -> None:
-    """A type of an installed package has been named."""
     if (noted := _noted.get()) is not None:
         noted.packages[name] = version
 

@@ -38,7 +38,6 @@ class Comparisons:
         self._most = self._left = most
 
     def spend(self, number: int) -> None:
-        """Take some off."""
         self._left -= number
         if self._left < 0:
             raise TooManyError(f"patterns are compared with more than {self._most:,} paths")
@@ -226,7 +225,6 @@ class PathIndex:
 
     @property
     def paths(self) -> KeysView[str]:
-        """All of them, in their order."""
         return self._place.keys()
 
     def spend(self, number: int) -> None:
