@@ -65,38 +65,42 @@ class Settler:
     ) -> dict[str, object]:
         """The values of a composite's parameters: set from outside, else given, else the default."""
         names: dict[str, object] = {}
-        label = path or composite.name
-        for key, entry in given.items():
-            if key not in composite.parameters:
-                self.problems.add(
-                    f"{label}: {composite.name} has no parameter {key!r}"
-                    f"{did_you_mean(key, list(composite.parameters))}",
-                    entry.key.position,
-                    f"valid parameters: {', '.join(composite.parameters) or 'none'}",
-                    scope=path,
-                )
-        given = _as_meant(given, composite.parameters)
-        for name, declared in composite.parameters.items():
+        label, valid = path or composite.name, composite.parameters
+        kind = f"{label}: {composite.name}"
+        given = self._as_meant(
+            given, valid, path, lambda key: f"{kind} has no parameter {key!r}{did_you_mean(key, valid)}"
+        )
+        later: Collection[str]
+        for name, declared in valid.items():
             full = f"{path}.{name}" if path else name
-            node, known = declared.value, names
-            later: Collection[str] = composite.parameters.keys()
+            node, known, later = declared.value, names, valid.keys()
             if name in given:
                 node, known, later = given[name].value, outer, ()
             if (setting := self._setting(full)) is not None:
                 node, known, later = setting.node, self.values.outside, ()
             if node is None:
-                needs = f"{label}: {composite.name} needs" if path else f"{label} needs"
-                self.problems.add(
-                    f"{needs} a value for {name!r}",
-                    position or declared.position,
-                    *((f"{name}: {declared.doc}",) if declared.doc else ()),
-                    scope=path,
-                )
+                self._tell_missing(kind if path else label, name, declared.doc, position or declared.position, path)
                 names[name] = self.values.missing
-                continue
-            value = self.values.of(node, known, full, path, later)
-            names[name] = self.values.declared(full, declared, value, node.position, path)
+            else:
+                value = self.values.of(node, known, full, path, later)
+                names[name] = self.values.declared(full, declared, value, node.position, path)
         return names
+
+    def _as_meant(
+        self, given: dict[str, Entry], valid: Collection[str], path: str, unknown: Callable[[str], str]
+    ) -> dict[str, Entry]:
+        """The values with wrong names told and put right, or else they would seem to be missing as well."""
+        result = {name: entry for name, entry in given.items() if name in valid}
+        for name in (each for each in given if each not in valid):
+            hint = f"valid parameters: {', '.join(valid) or 'none'}"
+            self.problems.add(unknown(name), given[name].key.position, hint, scope=path)
+            if (meant := nearest(name, valid)) is not None:
+                result.setdefault(meant, given[name])
+        return result
+
+    def _tell_missing(self, who: str, name: str, doc: str, position: Position, path: str) -> None:
+        hints = [f"{name}: {doc}"] if doc else []
+        self.problems.add(f"{who} needs a value for {name!r}", position, *hints, scope=path)
 
     def _setting(self, full: str) -> Setting | None:
         """The setting for a parameter, if there is one."""
@@ -104,9 +108,7 @@ class Settler:
         try:
             return self.settings.find(full)
         except TooManyError as error:
-            self.problems.add(f"{full}: {error}", self.settings.position, RAISE_IT)
-            self.problems.raise_if_any()
-            raise AssertionError("too many paths are a problem") from None
+            self.problems.stop(f"{full}: {error}", self.settings.position, RAISE_IT)
 
     def set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
         """The parameters of something that is made already which are set from outside, with their new values."""
@@ -132,28 +134,14 @@ class Settler:
         declared = declared_parameters(cls)
         before, complete = len(self.problems), True
         result: dict[str, object] = {}
-        for key, entry in given.items():
-            if key not in declared:
-                self.problems.add(
-                    f"{label}: {unknown_parameter(cls, key)}",
-                    entry.key.position,
-                    f"valid parameters: {', '.join(declared) or 'none'}",
-                    scope=path,
-                )
-        given = _as_meant(given, declared)
+        given = self._as_meant(given, declared, path, lambda key: f"{label}: {unknown_parameter(cls, key)}")
         for name, parameter in declared.items():
-            node = given[name].value if name in given else None
-            known = names
+            node, known = given[name].value if name in given else None, names
             if (setting := self._setting(f"{path}.{name}")) is not None:
                 node, known = setting.node, self.values.outside
             if node is None:
                 if parameter.required:
-                    self.problems.add(
-                        f"{label}: {cls.__name__} needs a value for {name!r}",
-                        position,
-                        *((f"{name}: {parameter.doc}",) if parameter.doc else ()),
-                        scope=path,
-                    )
+                    self._tell_missing(f"{label}: {cls.__name__}", name, parameter.doc, position, path)
                 continue
             value = self.values.of(node, known, f"{label}.{name}", path)
             if value is self.values.missing:
@@ -164,9 +152,8 @@ class Settler:
                 if parameter.type is Path and result[name] is not None:
                     result[name] = data_file(Path(value), node.position)
             except ParameterError as error:
-                self.problems.add(
-                    f"{label}.{name}: {error}", place_of(node, error.keys, of_key=error.of_key), scope=path
-                )
+                place = place_of(node, error.keys, of_key=error.of_key)
+                self.problems.add(f"{label}.{name}: {error}", place, scope=path)
             except Exception as error:  # of a class of a user's
                 self.blame(f"{label}.{name}", error, node.position, path)
         return result if complete and len(self.problems) == before else None
@@ -264,12 +251,3 @@ def place_of(node: Node, keys: tuple[str, ...], *, of_key: bool) -> Position:
             return node.entries[key].key.position
         node = node.entries[key].value
     return node.position
-
-
-def _as_meant(given: dict[str, Entry], valid: Collection[str]) -> dict[str, Entry]:
-    """The values with misspelled names put right, or else they would seem to be missing as well."""
-    result = {name: entry for name, entry in given.items() if name in valid}
-    for name, entry in given.items():
-        if name not in valid and (meant := nearest(name, valid)) is not None:
-            result.setdefault(meant, entry)
-    return result

@@ -27,8 +27,7 @@ def weave_all(made: Unfolding) -> list[WovenAspect]:
         try:
             weaver.weave(name, scope, part, names)
         except TooManyError as error:
-            problems.add(f"aspect {name}: {error}", part.position, RAISE_IT)
-            problems.raise_if_any()
+            problems.stop(f"aspect {name}: {error}", part.position, RAISE_IT)
     found = weaver.found
     decorated = {cls for cls in set(map(type, made.actors)) if class_decorations(cls)}
     for actor in made.actors:
@@ -91,8 +90,7 @@ class _Weaver:
         self.made.places += len(woven.places)
         limit = self.graph.limits.places
         if self.made.places > limit:
-            self.problems.add(f"aspect {name}: aspects stand at more than {limit:,} places", part.position, RAISE_IT)
-            self.problems.raise_if_any()
+            self.problems.stop(f"aspect {name}: aspects stand at more than {limit:,} places", part.position, RAISE_IT)
         if is_enabled:
             self.found.append(woven)
 

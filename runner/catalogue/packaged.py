@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
 from epicycle.actors import irregular
 
-from ..text import Problems, did_you_mean
+from ..text import Position, Problems, did_you_mean
 
 
 def model_folders() -> list[Path]:
@@ -20,20 +20,16 @@ def model_folders() -> list[Path]:
     return [Path(entry) for entry in package.__path__ if Path(entry).is_dir()]
 
 
-def packaged_models() -> dict[str, Path]:
-    return _yaml_files(model_folders())
-
-
-def packaged_disturbances() -> dict[str, Path]:
-    return _yaml_files([folder / "disturbances" for folder in model_folders()])
-
-
-def packaged_studies() -> dict[str, Path]:
-    return _yaml_files([folder / "studies" for folder in model_folders()])
-
-
-def _yaml_files(folders: list[Path]) -> dict[str, Path]:
+def packaged_files(kind: str) -> dict[str, Path]:
+    """The packaged models, disturbances or studies by name; ``kind`` is the singular."""
+    folders = [folder / _FOLDERS[kind] for folder in model_folders()]
     return {path.stem: path for folder in folders for path in sorted(folder.glob("*.yaml"))}
+
+
+_FOLDERS = {"model": "", "disturbance": "disturbances", "study": "studies"}
+packaged_models = partial(packaged_files, "model")
+packaged_disturbances = partial(packaged_files, "disturbance")
+packaged_studies = partial(packaged_files, "study")
 
 
 def is_path(name: str) -> bool:
@@ -54,21 +50,17 @@ def unreadable(path: Path | None) -> str | None:
     return f"is {kind}" if kind else ""
 
 
-def packaged_ones(kind: str, packaged: Iterable[str]) -> str:
+def packaged_ones(kind: str) -> str:
     """What could be named in place of a model, disturbance or study that there is not."""
     kinds = "studies" if kind == "study" else f"{kind}s"
-    return f"packaged {kinds}: {', '.join(packaged) or 'none'}; a path to a file ends in .yaml"
+    return f"packaged {kinds}: {', '.join(packaged_files(kind)) or 'none'}; a path to a file ends in .yaml"
 
 
-def find(name: str, kind: str, packaged_files: Callable[[], dict[str, Path]], problems: Problems) -> Path | None:
+def find(name: str, kind: str, problems: Problems, position: Position | None = None) -> Path | None:
     """The file that a name means: a path if it looks like one, otherwise what is packaged under it."""
-    if is_path(name):
-        return Path(name)
-    packaged = packaged_files()
-    if name not in packaged:
+    known = packaged_files(kind)
+    if not is_path(name) and name not in known:
         problems.add(
-            f"there is no packaged {kind} {name!r}{did_you_mean(name, list(packaged))}",
-            None,
-            packaged_ones(kind, packaged),
+            f"there is no packaged {kind} {name!r}{did_you_mean(name, list(known))}", position, packaged_ones(kind)
         )
-    return packaged.get(name)
+    return Path(name) if is_path(name) else known.get(name)

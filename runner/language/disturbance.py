@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from ..catalogue import find, packaged_disturbances
+from ..catalogue import find
 from ..text import Mapping, Node, NodeReader, Problems, read
 from .declarations import CompositeText, ModelText, ParameterText
 from .fields import NAMED, Construct, Key
@@ -52,7 +52,7 @@ DISTURBANCE = Construct(
 
 def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
     """A disturbance by its name or path; None if it cannot be read at all."""
-    path = find(name, "disturbance", packaged_disturbances, problems)
+    path = find(name, "disturbance", problems)
     node = None if path is None else read(path, problems)
     return None if node is None else _declared(node, problems)
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from epicycle.actors import irregular
 
-from ..catalogue import find, is_path, model_folders, packaged_models, packaged_ones, unreadable
+from ..catalogue import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
 from ..text import Mapping, Problems, Text, did_you_mean, read
 from .declarations import CompositeText, ModelText
 from .models import DeclarationReader
@@ -15,43 +14,35 @@ from .models import DeclarationReader
 MAX_INCLUDES = 200
 
 
-def named_file(
-    said: Text, folder: Path, kind: str, packaged: Callable[[], dict[str, Path]], problems: Problems, who: str = ""
-) -> Path | None:
+def named_file(said: Text, folder: Path, kind: str, problems: Problems, who: str = "") -> Path | None:
     """The file that a name in a file means: as seen from its folder, or packaged; None, and a problem, if it cannot be.
 
     ``who`` begins the message.
     """
-    known = packaged()
+    known = packaged_files(kind)
     path = folder / said.text if is_path(said.text) else known.get(said.text)
     if (reason := unreadable(path)) == "":
         return path
-    if reason is not None:
+    if reason is None:
+        guess = did_you_mean(said.text, list(known))
+        problems.add(f"{who}there is no {kind} {said.text!r}{guess}", said.position, packaged_ones(kind))
+    else:
         problems.add(f"{who}the {kind} {said.text!r} {reason}", said.position)
-        return None
-    problems.add(
-        f"{who}there is no {kind} {said.text!r}{did_you_mean(said.text, list(known))}",
-        said.position,
-        packaged_ones(kind, known),
-    )
     return None
 
 
 def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
     """What a model's file declares, and the composite classes of it and of all that it includes."""
-    path = find(name, "model", packaged_models, problems)
+    path, text = find(name, "model", problems), None
     node = None if path is None else read(path, problems)
     if isinstance(node, Mapping) and "study" in node.entries:
         problems.add(f"{name} is a study, not a model", None, f"run it: epicycle study {name}")
-        node = None
     elif isinstance(node, Mapping) and "disturbance" in node.entries and "model" not in node.entries:
         problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
-        node = None
-    text = None if node is None else DeclarationReader(problems).model(node)
-    if text is None:
-        problems.raise_if_any()
-    assert text is not None, "what cannot be read is a problem"
-    assert path is not None, "and so is what cannot be found"
+    elif node is not None:
+        text = DeclarationReader(problems).model(node)
+    if path is None or text is None:
+        return problems.whole(None)
     return text, _composites(text, path, problems)
 
 
@@ -65,9 +56,7 @@ def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeTex
     if node is not None:
         is_model = isinstance(node, Mapping) and "model" in node.entries
         text = reader.model(node) if is_model else reader.included(node)
-    problems.raise_if_any()
-    assert text is not None, "what cannot be read is a problem"
-    return _composites(text, path, problems)
+    return _composites(problems.whole(text), path, problems)
 
 
 def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, CompositeText]:

@@ -49,8 +49,7 @@ def inherit(
                 inherited += _size(whole[base.text])
                 if inherited > limits.inherited:
                     most = f"{limits.inherited:,} actors, aspects, connections, ports and parameters"
-                    problems.add(f"{text.name}: the classes take over more than {most}", base.position, RAISE_IT)
-                    problems.raise_if_any()
+                    problems.stop(f"{text.name}: the classes take over more than {most}", base.position, RAISE_IT)
                 whole[text.name] = _Heir(whole[base.text], text, problems).composite()
     return {name: whole[name] for name in composites if name in whole}, broken
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..catalogue import packaged_studies
 from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence, Text, did_you_mean, inside, parse
 from ..text import Mapping as MappingNode
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
@@ -93,7 +92,7 @@ class QuestionReader(NodeReader):
     def lender(self, node: Scalar) -> tuple[str, str] | None:
         """File and text of the study that is named in the place of claims."""
         said = Text(node.text, node.position)
-        path = named_file(said, self.folder, "study", packaged_studies, self.problems, "claims: ")
+        path = named_file(said, self.folder, "study", self.problems, "claims: ")
         return None if path is None else (str(path), path.read_text(encoding="utf-8", errors="replace"))
 
     def borrowed(self, node: Scalar, file: str, text: str) -> tuple[Node, Mapping[str, str]] | None:

@@ -7,15 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..catalogue import (
-    find,
-    is_path,
-    packaged_disturbances,
-    packaged_models,
-    packaged_ones,
-    packaged_studies,
-    unreadable,
-)
+from ..catalogue import find, is_path, unreadable
 from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Problems, Scalar, did_you_mean, parse, read
 from .claims import Questions
 from .declarations import PartText
@@ -92,13 +84,13 @@ def read_study(
 ) -> Study:
     """The study of a file; raises ``ModelError`` with all that is wrong with what it says."""
     problems = Problems()
-    path = find(str(name), "study", packaged_studies, problems)
+    path = find(str(name), "study", problems)
     node = None if path is None else read(path, problems)
     problems.raise_if_any()
     assert path is not None
     assert node is not None
-    reader = _StudyReader(problems, path)
-    return _made(node, reader, path.read_text(encoding="utf-8"), set, types, replications, seed)
+    text = path.read_text(encoding="utf-8")
+    return _StudyReader(problems, path).changed(node, text, set, types, replications, seed)
 
 
 def study_of_text(
@@ -119,38 +111,7 @@ def study_of_text(
     problems.raise_if_any()
     assert node is not None, "a text that cannot be read is a problem"
     reader = _StudyReader(problems, path, lender, asks_for_files=False)
-    return _made(node, reader, text, set, types, replications, seed)
-
-
-def _made(
-    node: Node,
-    reader: _StudyReader,
-    text: str,
-    set: Iterable[str],
-    types: Iterable[Path],
-    replications: int | None,
-    seed: int | None,
-) -> Study:
-    problems = reader.problems
-    study = reader.study(node, text)
-    problems.raise_if_any()
-    assert study is not None, "what is no study is a problem"
-    changes = tuple(set)
-    settings = [setting for change in changes if (setting := parse_setting(change, problems)) is not None]
-    for setting in settings:
-        if setting.path in study.factors:
-            problems.add(
-                f"{setting.position.source}: {setting.path} is what the study varies", None, "change it in the study"
-            )
-    problems.raise_if_any()
-    return replace(
-        study,
-        replications=study.replications if replications is None else replications,
-        seed=study.seed if seed is None else seed,
-        fixed=(*study.fixed, *settings),
-        changes=changes,
-        types=tuple(types),
-    )
+    return reader.changed(node, text, set, types, replications, seed)
 
 
 class _StudyReader(NodeReader):
@@ -163,6 +124,32 @@ class _StudyReader(NodeReader):
         self.path = path
         self.asks_for_files = asks_for_files  # whether what is named has to be there
         self.lender = lender  # file and text of the study whose claims are judged here, if they are known
+
+    def changed(
+        self,
+        node: Node,
+        text: str,
+        set: Iterable[str],
+        types: Iterable[Path],
+        replications: int | None,
+        seed: int | None,
+    ) -> Study:
+        """The whole file, with what is said from outside; raises ``ModelError``."""
+        study, changes = self.problems.whole(self.study(node, text)), tuple(set)
+        settings = [each for change in changes if (each := parse_setting(change, self.problems)) is not None]
+        for each in settings:
+            if each.path in study.factors:
+                message = f"{each.position.source}: {each.path} is what the study varies"
+                self.problems.add(message, None, "change it in the study")
+        self.problems.raise_if_any()
+        return replace(
+            study,
+            replications=study.replications if replications is None else replications,
+            seed=study.seed if seed is None else seed,
+            fixed=(*study.fixed, *settings),
+            changes=changes,
+            types=tuple(types),
+        )
 
     def study(self, node: Node, text: str) -> Study | None:
         if (
@@ -208,13 +195,8 @@ class _StudyReader(NodeReader):
             elif reason:
                 self.problems.add(f"the model {name!r} {reason}", node.position)
             return str(file)
-        if self.asks_for_files and name not in packaged_models():
-            known = list(packaged_models())
-            self.problems.add(
-                f"there is no packaged model {name!r}{did_you_mean(name, known)}",
-                node.position,
-                packaged_ones("model", known),
-            )
+        if self.asks_for_files:
+            find(name, "model", self.problems, node.position)
         return name
 
     def disturb(self, node: Node, what: str) -> list[Dimension]:
@@ -228,7 +210,7 @@ class _StudyReader(NodeReader):
         for variant, texts in variants.items():
             if self.asks_for_files:
                 for text in texts:
-                    named_file(text, self.path.parent, "disturbance", packaged_disturbances, self.problems)
+                    named_file(text, self.path.parent, "disturbance", self.problems)
             names = [str(self.path.parent / each.text) if is_path(each.text) else each.text for each in texts]
             levels.append(Level((), {"disturb": variant}, tuple(names)))
         return [Listed(what, node.position, {"disturb": "text"}, levels)] if levels else []

@@ -83,8 +83,7 @@ class Values:
         try:
             self.budget.spend(steps)
         except BudgetError as error:
-            self.problems.add(f"{label}: {error}", node.position, scope=scope)
-            self.problems.raise_if_any()
+            self.problems.stop(f"{label}: {error}", node.position, scope=scope)
 
     def _unseen(self, text: str, names: Container[str]) -> tuple[str, ...]:
         """What to do about a name of the model's that is not known inside a composite, or outside of the model."""

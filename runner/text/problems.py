@@ -3,6 +3,7 @@
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NoReturn, TypeVar
 
 from epicycle.actors import EpicycleError, did_you_mean, nearest, shortened, visible, visible_character
 
@@ -12,6 +13,8 @@ __all__ = ["ModelError", "Position", "Problem", "Problems", "did_you_mean", "nea
 MAX_PROBLEMS = 100
 MAX_SOURCE_WIDTH = 120
 _CUT = "..."
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +141,17 @@ class Problems:
         """Raise all problems as one ModelError, if there are any."""
         if self._kept:
             raise self._error() from self._cause
+
+    def stop(self, message: str, position: Position | None, *hints: str, scope: str = "") -> NoReturn:
+        """Note a problem after which there is no going on, and raise all as one ModelError."""
+        self.add(message, position, *hints, scope=scope)
+        raise self._error() from self._cause
+
+    def whole(self, made: T | None) -> T:
+        """What has been made; raises all problems as one ModelError if there are any."""
+        self.raise_if_any()
+        assert made is not None, "what cannot be made is a problem"
+        return made
 
     def _error(self, *, more: bool = False) -> ModelError:
         return ModelError(sorted(self.found, key=self._place), more)
