@@ -17,12 +17,12 @@ from ..text import NAME, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
-from .decorated import arranged
 from .draft import Draft
 from .named import Port, raising
 from .scope import Composite, Scope
 from .settle import nanoseconds
 from .watch import Watching, checked_seed
+from .weave_all import arranged
 
 DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 

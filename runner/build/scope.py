@@ -20,7 +20,6 @@ from ..language import Values
 from ..text import NAME, Position, Problems, call_site, did_you_mean
 from .composite_aspect import ModelWeaving, check_nesting
 from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
-from .decorated import weave_decorations
 from .draft import Draft
 from .named import (
     CompositePort,
@@ -36,6 +35,7 @@ from .named import (
 )
 from .paths import Paths
 from .weave import Weaving
+from .weave_all import weave_decorations
 
 _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
 

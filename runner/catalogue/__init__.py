@@ -2,7 +2,6 @@
 
 from .figure import Figure, figure_types
 from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
-from .own_types import TypesError, types_of_file
 from .packaged import (
     find,
     is_path,
@@ -27,7 +26,7 @@ from .reference import (
     parts_of,
     shown,
 )
-from .types import Catalogue, CatalogueError, Types, built_in, installed, load_all
+from .types import Catalogue, CatalogueError, Types, TypesError, built_in, installed, load_all, types_of_file
 
 __all__ = [
     "MSER5",

@@ -1,19 +1,21 @@
-"""Dimensions: what a study varies, each a row of levels of which one is taken at a time."""
+"""What a study varies, each a row of levels of which one is taken at a time; and how its file says it."""
 
 from __future__ import annotations
 
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
+from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any, TypeAlias
 
-from epicycle.actors import Quantity, UnitError
+from epicycle.actors import Quantity, UnitError, parse_unit, random_stream
 
-from ..text import Node, Position, Scalar, plain
-from .settings import Setting
+from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Scalar, Sequence, is_empty, plain
+from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, number, ref
+from .settings import Setting, is_pattern, settings_in
 
 Factor: TypeAlias = bool | int | float | str | None
 KINDS: dict[str, type] = {"bool": bool, "int": int, "float": float, "text": str}
@@ -48,14 +50,14 @@ class Dimension(ABC):
         """One level."""
 
     @abstractmethod
-    def find(self, values: Mapping[str, Factor]) -> int | None:
+    def find(self, values: AnyMapping[str, Factor]) -> int | None:
         """The level that puts these values into its columns; None if there is none."""
 
 
 class Listed(Dimension):
     """Levels that are written out, one by one."""
 
-    def __init__(self, name: str, position: Position, columns: dict[str, str], levels: Sequence[Level]) -> None:
+    def __init__(self, name: str, position: Position, columns: dict[str, str], levels: list[Level]) -> None:
         super().__init__(name, position, columns)
         self._levels = tuple(levels)
         self._places = {tuple(level.values.values()): index for index, level in enumerate(levels)}
@@ -67,7 +69,7 @@ class Listed(Dimension):
     def level(self, index: int) -> Level:
         return self._levels[index]
 
-    def find(self, values: Mapping[str, Factor]) -> int | None:
+    def find(self, values: AnyMapping[str, Factor]) -> int | None:
         return self._places.get(tuple(values[name] for name in self.columns))
 
 
@@ -96,7 +98,7 @@ class Ranged(Dimension):
         ends = {0, max(0, self._size - 2)} if self._size > 1 else set()
         return all(self.level(at).values != self.level(at + 1).values for at in ends)
 
-    def find(self, values: Mapping[str, Factor]) -> int | None:
+    def find(self, values: AnyMapping[str, Factor]) -> int | None:
         first, second, wanted = (
             float(each or 0) for each in (*(self.level(at).values[self.name] for at in (0, 1)), values[self.name])
         )
@@ -162,3 +164,262 @@ def _quantity(node: Node) -> float | None:
         return Quantity(float(parts[0]), parts[1]).si
     except UnitError:
         return None
+
+
+MAX_LEVELS = 10**12  # of a range
+MAX_SAMPLES = 100_000  # of a Latin hypercube, which is made as a whole
+
+
+class DimensionReader(NodeReader):
+    """Reads what stands below ``vary``; whatever is misshapen is added to ``problems`` and left out."""
+
+    def vary(self, node: Node, what: str) -> tuple[Dimension, ...]:
+        """An ordered mapping of dimensions."""
+        if is_empty(node):
+            return ()
+        if not isinstance(node, Mapping):
+            self.problems.add(f"{what} is not a mapping", node.position, "write lines like 'load: [0.5, 0.75, 0.9]'")
+            return ()
+        found = (self.dimension(name, entry) for name, entry in node.entries.items())
+        return tuple(dimension for dimension in found if dimension is not None)
+
+    def dimension(self, name: str, entry: Entry) -> Dimension | None:
+        """A list, a range, or a mapping with the key zip, cases or latin_hypercube."""
+        node, position = entry.value, entry.key.position
+        if isinstance(node, Sequence):
+            return self.listed(name, position, {name: Entry(entry.key, node)})
+        if isinstance(node, Mapping):
+            keys = node.entries.keys()
+            for form, reader in (("zip", self.zipped), ("cases", self.cases), ("latin_hypercube", self.hypercube)):
+                if form in keys and len(keys) == 1:
+                    return reader(name, position, node.entries[form].value)
+            if keys & RANGE.keys.keys():
+                return self.ranged(name, position, node)
+        self.problems.add(
+            f"{name!r} does not say what values it takes",
+            node.position,
+            "write a list, {from, to, step}, {zip: ...}, {cases: ...} or {latin_hypercube: ...}",
+        )
+        return None
+
+    def listed(self, name: str, position: Position, lists: dict[str, Entry]) -> Dimension | None:
+        """One list for each path, all of one length."""
+        before = len(self.problems)
+        items = {path: entry.value.items for path, entry in lists.items() if isinstance(entry.value, Sequence)}
+        keys = {path: entry.key.position for path, entry in lists.items()}
+        for path, key in keys.items():
+            is_pattern(path, key, self.problems)
+        sizes = {len(each) for each in items.values()}
+        if 0 in sizes:
+            self.problems.add(f"{name!r} takes no value at all", position, "give at least one")
+        elif len(sizes) > 1:
+            shown = ", ".join(f"{path}: {len(each)}" for path, each in items.items())
+            self.problems.add(f"the lists of {name!r} differ in length", position, shown)
+        if len(self.problems) > before:
+            return None
+        kinds = {path: kind_of(each) for path, each in items.items()}
+        levels: list[Level] = []
+        seen: dict[str, Node] = {}
+        for nodes in zip(*items.values(), strict=True):
+            pairs = list(zip(items, nodes, strict=True))
+            values = {path: as_factor(node, kinds[path]) for path, node in pairs}
+            if (first := seen.setdefault(repr(values), nodes[0])) is not nodes[0]:
+                self.problems.add(
+                    f"{name!r} takes the same value twice", nodes[0].position, f"first at {first.position}"
+                )
+            levels.append(Level(tuple(Setting(path, node, keys[path]) for path, node in pairs), values))
+        return Listed(name, position, kinds, levels)
+
+    def zipped(self, name: str, position: Position, node: Node) -> Dimension | None:
+        """Parameters that go together: the first values of all lists, the second ones, and so on."""
+        if not isinstance(node, Mapping) or not node.entries:
+            self.problems.add(f"zip of {name!r} is not a mapping from parameters to lists", node.position)
+            return None
+        before = len(self.problems)
+        for path, entry in node.entries.items():
+            if not isinstance(entry.value, Sequence):
+                self.problems.add(f"{path!r} is not a list", entry.value.position, "begin each entry with '- '")
+        return self.listed(name, position, node.entries) if len(self.problems) == before else None
+
+    def cases(self, name: str, position: Position, node: Node) -> Dimension | None:
+        """Named sets of values; the column holds the names."""
+        if not isinstance(node, Mapping) or not node.entries:
+            self.problems.add(f"cases of {name!r} is not a mapping from names to settings", node.position)
+            return None
+        levels = []
+        for case, entry in node.entries.items():
+            settings: list[Setting] = []
+            if isinstance(entry.value, Mapping):
+                settings = settings_in(entry.value, self.problems)
+            elif not is_empty(entry.value):
+                self.problems.add(f"case {case!r} is not a mapping from parameters to values", entry.value.position)
+            levels.append(Level(tuple(settings), {name: case}))
+        return Listed(name, position, {name: "text"}, levels)
+
+    def ranged(self, name: str, position: Position, node: Mapping) -> Dimension | None:
+        """``{from: 0, to: 0.5, step: 0.1}``; the end counts if a step falls on it."""
+        before = len(self.problems)
+        is_pattern(name, position, self.problems)
+        entries = RANGE.entries(self, node, f"the range of {name!r}") or {}
+        numbers: dict[str, Decimal] = {}
+        units: dict[str, None] = {}
+        for key in RANGE.keys:
+            if key not in entries:
+                self.problems.add(f"the range of {name!r} has no {key!r}", node.position)
+            elif (number := self.quantity(entries[key].value, f"{key} of {name!r}")) is not None:
+                numbers[key] = number[0]
+                units[number[1]] = None
+        if len(self.problems) > before:
+            return None
+        start, end, step = (numbers[key] for key in RANGE.keys)
+        at = entries["step"].value.position
+        if len(units) > 1:
+            self.problems.add(f"the range of {name!r} has more than one unit", node.position, "write the same for all")
+            return None
+        if step == 0 or (end - start) / step < 0:
+            self.problems.add(f"the range of {name!r} never gets from {start} to {end} in steps of {step}", at)
+            return None
+        size = int((end - start) / step) + 1
+        if size > MAX_LEVELS:
+            self.problems.add(f"the range of {name!r} has more than {MAX_LEVELS:,} values", at)
+            return None
+        found = Ranged(name, position, start, step, size, next(iter(units)), node.position)
+        try:
+            is_distinct = found.is_distinct()
+        except UnitError as error:
+            self.problems.add(f"the range of {name!r}: {error}", at)
+            return None
+        if not is_distinct:
+            self.problems.add(
+                f"the range of {name!r} has values that cannot be told apart as floats: "
+                f"from {start} to {end} in steps of {step}",
+                at,
+            )
+            return None
+        return found
+
+    def quantity(self, node: Node, what: str) -> tuple[Decimal, str] | None:
+        """A number, perhaps with a unit."""
+        found = split_number(node)
+        if found is None:
+            self.problems.add(f"{what} is not a number", node.position, "write 5, 0.1 or '5 m'")
+            return None
+        try:
+            if found[1]:
+                parse_unit(found[1])
+        except UnitError as error:
+            self.problems.add(f"{what}: {error}", node.position)
+            return None
+        return found
+
+    def hypercube(self, name: str, position: Position, node: Node) -> Dimension | None:
+        """Points that fill a box evenly: of ``size`` slices of each range, each is met by one point."""
+        before = len(self.problems)
+        entries = HYPERCUBE.entries(self, node, f"latin_hypercube of {name!r}") or {}
+        if "size" not in entries or "ranges" not in entries:
+            self.problems.add(
+                f"latin_hypercube of {name!r} needs 'size' and 'ranges'",
+                position,
+                "write {size: 20, seed: 1, ranges: {load: [0.1, 0.9]}}",
+            )
+            return None
+        said = HYPERCUBE.values(self, entries, "", position)
+        size, seed = said.get("size", 1), said.get("seed", 0)
+        box = entries["ranges"].value
+        if not isinstance(box, Mapping) or not box.entries:
+            self.problems.add(f"ranges of {name!r} is not a mapping from parameters to [low, high]", box.position)
+            return None
+        bounds: dict[str, tuple[float, float, str, Position]] = {}
+        for path, entry in box.entries.items():
+            is_pattern(path, entry.key.position, self.problems)
+            items = entry.value.items if isinstance(entry.value, Sequence) else ()
+            ends = [end for item in items if (end := self.quantity(item, f"a bound of {path!r}")) is not None]
+            if len(items) == 2 and len(ends) < 2:
+                continue  # which has been told
+            if len(ends) != 2 or ends[0][1] != ends[1][1] or not ends[0][0] < ends[1][0]:
+                self.problems.add(f"{path!r} is not [low, high] in one unit", entry.value.position)
+            else:
+                bounds[path] = float(ends[0][0]), float(ends[1][0]), ends[0][1], entry.key.position
+        if len(self.problems) > before:
+            return None
+        shares = []
+        for path in bounds:
+            stream = random_stream(seed, path, "latin hypercube")
+            shares.append([(slice_ + stream.random()) / size for slice_ in stream.permutation(size).tolist()])
+        levels = []
+        for point in zip(*shares, strict=True):
+            settings, values = [], {}
+            for (path, (low, high, unit, at)), share in zip(bounds.items(), point, strict=True):
+                value = low + share * (high - low)
+                settings.append(Setting(path, number_node(value, unit, at), at))
+                values[path] = in_si(value, unit)
+            levels.append(Level(tuple(settings), dict(values)))
+        return Listed(name, position, dict.fromkeys(bounds, "float"), levels)
+
+
+_QUANTITY = node_as(QUANTITY_SCHEMA)
+RANGE = Construct(
+    "Values at equal distances.",
+    {
+        "from": Key(_QUANTITY, "The first value."),
+        "to": Key(_QUANTITY, "The last value, if a step falls on it."),
+        "step": Key(_QUANTITY, "The distance between two values."),
+    },
+    type="object",
+    required=["from", "to", "step"],
+)
+HYPERCUBE = Construct(
+    "",
+    {
+        "size": Key(number(int, 1, MAX_SAMPLES), "The number of points."),
+        "seed": Key(number(int, 0, MAX_SEED), "What the points are drawn from (default: 0)."),
+        "ranges": Key(
+            node_as(
+                {
+                    "type": "object",
+                    "additionalProperties": {"type": "array", "items": QUANTITY_SCHEMA, "minItems": 2, "maxItems": 2},
+                }
+            ),
+            "'path: [low, high]' for each parameter.",
+        ),
+    },
+    required=["size", "ranges"],
+)
+DIMENSIONS = Shape(
+    {"type": ["object", "null"], "additionalProperties": ref("dimension")},
+    lambda reader, node, what: DimensionReader(reader.problems).vary(node, what),
+)
+
+
+def dimension_schema() -> Schema:
+    """What editors know of one of the forms in which a study says what values something takes."""
+    some = {"type": "object", "minProperties": 1}
+    forms = (
+        (
+            "zip",
+            {**some, "additionalProperties": {"type": "array", "minItems": 1}},
+            "Parameters that go together: 'path: [value, ...]', all of one length.",
+        ),
+        (
+            "cases",
+            {**some, "additionalProperties": {"type": ["object", "null"]}},
+            "Named sets of values: 'name: {path: value}'.",
+        ),
+        ("latin_hypercube", HYPERCUBE.schema, "Points that fill a box evenly."),
+    )
+    return {
+        "description": "The values of a parameter, or of several that go together.",
+        "anyOf": [
+            {"type": "array", "minItems": 1},
+            RANGE.schema,
+            *(
+                {
+                    "type": "object",
+                    "properties": {key: {**schema, "description": description}},
+                    "required": [key],
+                    "additionalProperties": False,
+                }
+                for key, schema, description in forms
+            ),
+        ],
+    }

@@ -28,6 +28,7 @@ from ..text import (
 from .declarations import CompositeText, ConnectionText, MetricText, ModelText, ParameterText, PartText, PortText
 from .fields import (
     AT,
+    COMPUTED_FLAG,
     LABEL,
     NAMED,
     TEXT,
@@ -36,6 +37,7 @@ from .fields import (
     Key,
     Schema,
     Shape,
+    about,
     computed,
     named,
     names_of,
@@ -43,9 +45,9 @@ from .fields import (
     number,
     one_or_more,
     ref,
+    schema_of,
 )
 from .fields import NAME as NAME_PATTERN
-from .parameter_schema import COMPUTED_FLAG, about, schema_of
 from .places import CONNECTIONS, PATTERN_SCHEMA, PATTERNS, POINTCUTS, connection
 
 # -- ports and parameters -----------------------------------------------------------------------------------------

@@ -14,8 +14,21 @@ from epicycle.actors import Configurable, declared_parameters
 from epicycle.aspects import FiringTimeParameter
 
 from ..catalogue import Catalogue, doc_of, first_sentence, parts_of
+from .dimensions import HYPERCUBE, RANGE, dimension_schema
 from .disturbance import DISTURBANCE
-from .fields import EXPRESSION, LABEL, NAME, Construct, Schema, looks_like, one_or_more, ref
+from .fields import (
+    EXPRESSION,
+    LABEL,
+    NAME,
+    Construct,
+    Schema,
+    about,
+    looks_like,
+    one_or_more,
+    part_name,
+    ref,
+    schema_of,
+)
 from .models import (
     BESIDE,
     COMPOSITE,
@@ -29,12 +42,10 @@ from .models import (
     RUN,
     composite_schema,
 )
-from .parameter_schema import about, part_name, schema_of
 from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
 from .questions import CLAIM, GUIDELINE
 from .study import METRIC as METRIC_OF_STUDY
 from .study import STUDY, UNTIL
-from .variation import HYPERCUBE, RANGE, dimension_schema
 
 # What has keys of its own, for a reference.
 CONSTRUCTS = {

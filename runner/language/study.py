@@ -11,14 +11,13 @@ from ..catalogue import find, is_path, unreadable
 from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Problems, Scalar, did_you_mean, parse, read
 from .claims import Questions
 from .declarations import PartText
-from .dimensions import Dimension, Level, Listed
+from .dimensions import DIMENSIONS, Dimension, Level, Listed
 from .fields import FLAG, LABEL, NAMED, TEXT, Construct, Key, Shape, names_of, node_as, number, one_or_more, ref
 from .files import named_file
 from .models import parts
 from .questions import CLAIMS, GUIDELINE, QuestionReader, without
 from .settings import Setting, parse_setting, settings_like
 from .study_metric import StudyMetric, checked_metric
-from .variation import DIMENSIONS
 
 LARGE = 10_000_000  # bytes of a file
 MAX_REPLICATIONS = 10**9

@@ -23,7 +23,8 @@ from epicycle.actors import (
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
 from epicycle.runner.build.connect import _ENDPOINT as ENDPOINT
-from epicycle.runner.build.indices import BadIndexError, resolve
+from epicycle.runner.build.connect import BadIndexError
+from epicycle.runner.build.connect import indices_of as resolve
 from epicycle.runner.catalogue import Catalogue, built_in, figure_types, model_folders, packaged_models
 from epicycle.runner.language import (
     DeclarationReader,
@@ -36,8 +37,8 @@ from epicycle.runner.language import (
     variation,
 )
 from epicycle.runner.language.fields import QUANTITY, Construct
+from epicycle.runner.language.fields import schema_of as value_schema
 from epicycle.runner.language.models import BESIDE
-from epicycle.runner.language.parameter_schema import schema_of as value_schema
 from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
 from epicycle.runner.show.report import study_figure_types
 from epicycle.runner.text import PatternError, Problems, compile_pattern, parse, plain

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.runner.build import load_model
-from epicycle.runner.build.indices import BadIndexError, resolve
+from epicycle.runner.build.connect import BadIndexError
+from epicycle.runner.build.connect import indices_of as resolve
 from tests.model.model_parts import TYPES
 
 
