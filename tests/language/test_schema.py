@@ -28,13 +28,13 @@ from epicycle.runner.build.connect import indices_of as resolve
 from epicycle.runner.catalogue import Catalogue, built_in, figure_types, model_folders, packaged_models
 from epicycle.runner.language import (
     DeclarationReader,
+    dimensions,
     disturbance,
     json_schema,
     models,
     places,
     questions,
     study,
-    variation,
 )
 from epicycle.runner.language.fields import QUANTITY, Construct
 from epicycle.runner.language.fields import schema_of as value_schema
@@ -167,7 +167,7 @@ def breaks_shape(problem: str, file: str) -> bool:
 
 
 def test_every_key_of_the_language_says_what_it_is() -> None:
-    modules = (disturbance, models, places, questions, study, variation)
+    modules = (disturbance, models, places, questions, study, dimensions)
     constructs = {id(each): each for module in modules for each in vars(module).values() if isinstance(each, Construct)}
     assert len(constructs) > 15
     for construct in constructs.values():
