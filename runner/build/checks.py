@@ -10,8 +10,8 @@ import networkx as nx
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
-from ..graph import Detour, Hop, ModelGraph, Wire, dependencies
-from ..text import RAISE_IT, Position, Problems, in_general
+from ..graph import Detour, Hop, ModelGraph, dependencies
+from ..text import RAISE_IT, Problems, in_general
 from .draft import Draft
 
 MAX_PASSAGE = 200  # composite ports in a row
@@ -77,13 +77,14 @@ def check_types(graph: ModelGraph, problems: Problems) -> None:
             if accepts(wanted, given):
                 continue
             way = " -> ".join([path, *(hop.destination for hop in hops)])
+            first, last = hops[0].position, hops[-1].position
             verb = "sends" if graph.ports.nodes[path]["port"] is not None else "hands on"
             problems.add(
                 f"{path} {verb} {type_name(given)}, but {far} takes {type_name(wanted)}",
-                hops[0].position,
+                first,
                 *(who for who in (_who(graph, path), _who(graph, far)) if who),
                 *((f"the way: {way}",) if len(hops) > 1 else ()),
-                *_other_position(hops[0].position, hops[-1].position),
+                *((f"connected onward at {last}",) if first and last and first != last else ()),
                 about=("types", in_general(path), in_general(far)),
             )
 
@@ -108,12 +109,6 @@ def _who(graph: ModelGraph, port: str) -> str:
     return f"{what}, declared at {at}" if at is not None else ""
 
 
-def _other_position(first: Position | None, last: Position | None) -> tuple[str, ...]:
-    if first is None or last is None or first == last:
-        return ()
-    return (f"connected onward at {last}",)
-
-
 def check_connections(draft: Draft, problems: Problems) -> None:
     """Required inputs are connected, and single inputs have one writer."""
     graph = draft.graph
@@ -134,11 +129,12 @@ def check_connections(draft: Draft, problems: Problems) -> None:
                 writers = ", ".join(
                     f"{path} ({number} times)" if number > 1 else path for path, number in times.items()
                 )
+                first = wires[0].hops[-1].position
                 what = f"{counted(len(times), 'sender')} write{'s' if len(times) == 1 else ''}"
                 problems.add(
                     f"{port.path} takes one connection, but {what} to it: {writers}",
                     wires[1].hops[-1].position,
-                    *_first_connection(wires),
+                    *((f"the first connection is at {first}",) if first else ()),
                     "connect one of them, or send through an actor that merges them",
                     about=("several", in_general(port.path)),
                 )
@@ -146,13 +142,9 @@ def check_connections(draft: Draft, problems: Problems) -> None:
 
 def _may_be_connected(draft: Draft, path: str) -> bool:
     """Whether a missing connection may be due to another problem: a wrong connection, or an actor not made."""
-    before = nx.ancestors(draft.graph.ports, path) if draft.is_wired and draft.open else ()
-    return not draft.is_wired or path in draft.open or not draft.open.isdisjoint(before)
-
-
-def _first_connection(wires: list[Wire]) -> tuple[str, ...]:
-    at = wires[0].hops[-1].position
-    return (f"the first connection is at {at}",) if at is not None else ()
+    if not draft.is_wired or not draft.open:
+        return not draft.is_wired
+    return not draft.open.isdisjoint((path, *nx.ancestors(draft.graph.ports, path)))
 
 
 def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
@@ -192,32 +184,24 @@ def _shortest_loop(graph: ModelGraph, inner: nx.DiGraph) -> list[list[Hop]]:
 
 def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> None:
     actors = [graph.owner(way[0].source) for way in ways]
-    detour = next((hop for way in ways for hop in way if isinstance(hop, Detour)), None)
-    if detour is not None:
-        problems.add(
-            f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
-            detour.position,
-            *map(_step, ways),
-            f"the aspect {detour.aspect} sends the tokens of all its ports through one model: let it stand at fewer of "
-            "them, or give that model a delay",
-            about=("loop", *map(in_general, actors)),
-        )
-        return
-    # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
-    # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
-    back = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
-    problems.add(
-        f"a loop without delay: {' -> '.join([*actors, actors[0]])}",
-        back.position,
-        *map(_step, ways),
-        *(
+    blamed: Hop | None = next((hop for way in ways for hop in way if isinstance(hop, Detour)), None)
+    if isinstance(blamed, Detour):
+        fewer = "let it stand at fewer of them, or give that model a delay"
+        hints = [f"the aspect {blamed.aspect} sends the tokens of all its ports through one model: {fewer}"]
+    else:
+        # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
+        # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
+        blamed = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
+        hints = [
             f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
             for path in dict.fromkeys(actors)
             if path in graph.clocks
-        ),
-        f"give one of these connections a delay, best the one that leads back: {_with_delay(graph, back)}",
-        about=("loop", *map(in_general, actors)),
-    )
+        ]
+        best = _with_delay(graph, blamed)
+        hints.append(f"give one of these connections a delay, best the one that leads back: {best}")
+    loop = " -> ".join([*actors, actors[0]])
+    about = ("loop", *map(in_general, actors))
+    problems.add(f"a loop without delay: {loop}", blamed.position, *map(_step, ways), *hints, about=about)
 
 
 def _step(way: list[Hop]) -> str:
