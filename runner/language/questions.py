@@ -14,7 +14,7 @@ from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence
 from ..text import Mapping as MappingNode
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
-from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, names_of, node_as, number, ref
+from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, Schema, Shape, names_of, node_as, number, ref
 from .files import named_file
 
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which look at all of them
@@ -142,39 +142,20 @@ class QuestionReader(NodeReader):
         if len(self.problems) > before:
             return None
         said = CLAIM.values(self, entries, what, position)
-        where = self.selection(entries, "where", what)
-        condition, metrics = "", list(said.get(form, ())) if form != ALWAYS else []
-        if form == ALWAYS:
-            condition, metrics = self.condition(entries[form].value, what)
-        elif not metrics and len(self.problems) == before:
+        condition, metrics = ("", said.pop(form, ())) if form != ALWAYS else said.pop(form)
+        if not metrics and len(self.problems) == before:
             self.problems.add(f"{what} names no metric", entries[form].value.position)
-        at = self.selection(entries, "at", what)
-        than = self.selection(entries, "than", what) if "than" in entries else None
+        at, than = said.get("at", {}), said.get("than")
         if than is not None and than.keys() != at.keys() and len(self.problems) == before:
             self.problems.add(
                 f"{what}: 'at' and 'than' give levels of other factors",
                 entries["than"].key.position,
                 f"at: {', '.join(at)}; than: {', '.join(than) or 'none'}",
             )
-        over = self.trend(entries, "over", what)
-        per = self.trend(entries, "per", what)
         if len(self.problems) > before:
             return None
-        claim = Claim(
-            name,
-            form,
-            tuple(metrics),
-            position,
-            said.get("doc", ""),
-            condition,
-            at,
-            than,
-            over,
-            per,
-            where,
-            said.get("share", 1.0),
-        )
-        self.compares(claim, position)
+        claim = Claim(name, form, tuple(metrics), position, condition=condition, **said)
+        self.compares(claim)
         return claim if len(self.problems) == before else None
 
     def condition(self, node: Node, what: str) -> tuple[str, list[Text]]:
@@ -194,11 +175,8 @@ class QuestionReader(NodeReader):
             )
         return text, [Text(name, inside(node, text, max(text.find(name), 0), name)) for name in formula.names]
 
-    def selection(self, entries: Mapping[str, Entry], key: str, what: str) -> Selection:
+    def selection(self, node: Node, what: str, key: str) -> Selection:
         """``{factor: level}`` or ``{factor: [level, ...]}``, with levels of the study."""
-        if key not in entries:
-            return {}
-        node = entries[key].value
         if not isinstance(node, MappingNode) or not node.entries:
             self.problems.add(
                 f"{what}: {key!r} is not a mapping from factors to levels",
@@ -248,11 +226,8 @@ class QuestionReader(NodeReader):
         )
         return False
 
-    def trend(self, entries: Mapping[str, Entry], key: str, what: str) -> str:
+    def trend(self, node: Node, what: str, key: str) -> str:
         """A factor in whose order something happens; for ``per`` it is one of numbers."""
-        if key not in entries:
-            return ""
-        node = entries[key].value
         name = self.text(node, what)
         if name is None or not self.is_factor(name, node.position, what):
             return ""
@@ -263,9 +238,9 @@ class QuestionReader(NodeReader):
             self.problems.add(f"{what}: {name} takes a value more than once, so that it has no order", node.position)
         return name
 
-    def compares(self, claim: Claim, position: Position) -> None:
+    def compares(self, claim: Claim) -> None:
         """A claim is about something: there is more than one level to compare."""
-        what = f"claim {claim.name}"
+        what, position = f"claim {claim.name}", claim.position
         if claim.form in (RISES, FALLS):
             homes = [
                 next(each for each in self.dimensions if name in each.columns)
@@ -317,10 +292,22 @@ class QuestionReader(NodeReader):
 
 
 _METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})
-_LEVELS = node_as(
-    {"type": "object", "minProperties": 1, "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]}}
-)
-_FACTOR = node_as({"type": "string"})
+_LEVELS: Schema = {
+    "type": "object",
+    "minProperties": 1,
+    "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]},
+}
+_TEXT: Schema = {"type": "string"}
+
+
+def _levels(key: str, doc: str) -> Key:
+    return Key(Shape(_LEVELS, lambda reader, node, what: reader.selection(node, what, key)), doc, "{what}")
+
+
+def _trend(key: str, doc: str) -> Key:
+    return Key(Shape(_TEXT, lambda reader, node, what: reader.trend(node, what, key)), doc, "{what}")
+
+
 _TREND = "Metrics whose mean, or slope per unit of another factor, {} over the levels of a factor."
 CLAIM = Construct(
     "A hypothesis on the results.",
@@ -330,12 +317,14 @@ CLAIM = Construct(
         GREATER: Key(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
         RISES: Key(_METRICS, _TREND.format(RISES), "{what}"),
         FALLS: Key(_METRICS, _TREND.format(FALLS), "{what}"),
-        ALWAYS: Key(node_as({"type": "string"}), "A condition on the metrics that holds in every run."),
-        "at": Key(_LEVELS, "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'."),
-        "than": Key(_LEVELS, "What they are compared with (default: all other levels, so that these are the best)."),
-        "over": Key(_FACTOR, "The factor over which something rises or falls."),
-        "per": Key(_FACTOR, "What rises or falls is the slope over this factor."),
-        "where": Key(_LEVELS, "The levels to which the claim is confined (default: all)."),
+        ALWAYS: Key(
+            Shape(_TEXT, QuestionReader.condition), "A condition on the metrics that holds in every run.", "{what}"
+        ),
+        "at": _levels("at", "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'."),
+        "than": _levels("than", "What they are compared with (default: all other levels, so that these are the best)."),
+        "over": _trend("over", "The factor over which something rises or falls."),
+        "per": _trend("per", "What rises or falls is the slope over this factor."),
+        "where": _levels("where", "The levels to which the claim is confined (default: all)."),
         "share": Key(
             number(float, 0.5, 1.0),
             "In how many of the comparisons, or runs, it is to hold (default: 1, in all).",
@@ -349,7 +338,7 @@ GUIDELINE = Construct(
     "",
     {
         "choose": Key(
-            TEXT.described({"type": "string"}),
+            TEXT.described(_TEXT),
             "The factor whose best level is wanted, for every combination of the others.",
         ),
         "least": Key(AT.described(ref("name")), "The metric that is to be least."),
@@ -362,4 +351,4 @@ GUIDELINE = Construct(
     required=["choose"],
     oneOf=[{"required": ["least"]}, {"required": ["greatest"]}],
 )
-CLAIMS = node_as({"anyOf": [names_of(ref("claim")), {"type": "string"}]})
+CLAIMS = node_as({"anyOf": [names_of(ref("claim")), _TEXT]})
