@@ -4,7 +4,7 @@ from .composite_class import CompositeClass, load_composite
 from .figures import Complaint, figures_of, made_figure, place_in_figure, tell_of_figure
 from .load import load_model
 from .model import Model
-from .named import CompositePort, Instance
+from .named import CompositePort
 from .scope import Composite
 
 __all__ = [
@@ -12,7 +12,6 @@ __all__ = [
     "Composite",
     "CompositeClass",
     "CompositePort",
-    "Instance",
     "Model",
     "figures_of",
     "load_composite",

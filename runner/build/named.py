@@ -10,10 +10,9 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
-from ..graph import ModelGraph, WovenAspect
+from ..graph import ModelGraph
 from ..language import ConnectionText, DeclarationReader, PointcutText
 from ..text import ModelError, Position, Problem, Problems, Scalar, Text, node_of, within
-from .draft import Draft
 from .settle import drift, local_nanoseconds
 
 
@@ -42,16 +41,6 @@ class Holder(Protocol):
 
     def remove(self, name: str) -> None:
         """Take out a part."""
-
-
-@runtime_checkable
-class Instance(Protocol):
-    """An instance of a composite class that can be added to a model; see ``load_composite``."""
-
-    path: str
-
-    def unfold(self, path: str, draft: Draft, position: Position) -> tuple[Draft, list[WovenAspect]]:
-        """What it is as a part of a draft, at its full path, with the aspects that come with it."""
 
 
 @contextmanager

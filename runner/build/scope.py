@@ -19,12 +19,12 @@ from ..graph import ModelGraph, WovenAspect
 from ..language import Values
 from ..text import NAME, Position, Problems, call_site, did_you_mean
 from .composite_aspect import ModelWeaving, check_nesting
+from .composite_class import CompositeInstance
 from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
 from .draft import Draft
 from .named import (
     CompositePort,
     Ends,
-    Instance,
     Named,
     Places,
     check_aspect,
@@ -114,8 +114,8 @@ class Scope:
     @overload
     def add(self, part: A, *, priority: int | None = None) -> A: ...
     @overload
-    def add(self, part: Instance) -> Composite: ...
-    def add(self, part: Actor | Instance, *, priority: int | None = None) -> Actor | Composite:
+    def add(self, part: CompositeInstance) -> Composite: ...
+    def add(self, part: Actor | CompositeInstance, *, priority: int | None = None) -> Actor | Composite:
         """Add an actor, or an instance of a composite class, and return it.
 
         Elements of an array are called ``robot[0]``, ``robot[1]`` and so on, in this order.  Of actors of one depth,
@@ -138,7 +138,7 @@ class Scope:
         self._model.enlist(aspects)
         return part if isinstance(part, Actor) else self._model.scope(full)
 
-    def _made(self, part: Actor | Instance, full: str, position: Position) -> tuple[Draft, list[WovenAspect]]:
+    def _made(self, part: Actor | CompositeInstance, full: str, position: Position) -> tuple[Draft, list[WovenAspect]]:
         """A part that is yet to be merged, and the aspects that come with it."""
         draft = self._model.draft
         if not isinstance(part, Actor):
@@ -325,7 +325,7 @@ class Scope:
     def weave(
         self,
         name: str,
-        aspect: Aspect | Composite | Instance,
+        aspect: Aspect | Composite | CompositeInstance,
         *,
         at: Places | Mapping[str, Places],
         time: FiringTime | str | None = None,
@@ -345,7 +345,7 @@ class Scope:
                 problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
-            check_aspect(aspect, (Aspect, Composite, Instance), position, problems)
+            check_aspect(aspect, (Aspect, Composite, CompositeInstance), position, problems)
             firing_time = firing_time_of(time, aspect, position, problems)
         model = self._model
         if isinstance(aspect, Aspect):

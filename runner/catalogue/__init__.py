@@ -26,7 +26,7 @@ from .reference import (
     parts_of,
     shown,
 )
-from .types import Catalogue, CatalogueError, Types, TypesError, built_in, installed, load_all, types_of_file
+from .types import Catalogue, CatalogueError, Types, built_in, installed, load_all, types_of_file
 
 __all__ = [
     "MSER5",
@@ -42,7 +42,6 @@ __all__ = [
     "PortTypeError",
     "TypeReference",
     "Types",
-    "TypesError",
     "as_written",
     "built_in",
     "conversion_problem",

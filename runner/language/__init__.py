@@ -1,6 +1,6 @@
 """What a file says: models, composites, disturbances, studies and what is set from outside, as declared constructs."""
 
-from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Questions, Selection
+from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Selection
 from .declarations import (
     CompositeText,
     ConnectionText,
@@ -15,7 +15,6 @@ from .dimensions import Dimension, Factor, Level, in_si, split_number
 from .disturbance import (
     COMPOSITE_THERE,
     PARAMETER_THERE,
-    Disturbance,
     add_disturbances,
     joined,
     load_disturbance,
@@ -50,7 +49,6 @@ __all__ = [
     "ConnectionText",
     "DeclarationReader",
     "Dimension",
-    "Disturbance",
     "Factor",
     "Guideline",
     "Level",
@@ -60,7 +58,6 @@ __all__ = [
     "PartText",
     "PointcutText",
     "PortText",
-    "Questions",
     "Selection",
     "Setting",
     "Settings",
