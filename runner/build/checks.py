@@ -40,11 +40,9 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
     if not nx.is_directed_acyclic_graph(between):
         cycle = [source for source, _ in nx.find_cycle(between)]
         hop = graph.outgoing(cycle[-1])[0]
-        problems.add(
-            f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}",
-            hop.position,
-            "a composite that hands its input straight on to its output cannot be connected to itself",
-        )
+        message = f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}"
+        hint = "a composite that hands its input straight on to its output cannot be connected to itself"
+        problems.add(message, hop.position, hint)
         return False
     if nx.dag_longest_path_length(between) > MAX_PASSAGE:
         path = nx.dag_longest_path(between)

@@ -60,17 +60,11 @@ class ModelWeaving(Weaving):
             self._request(PointcutText("", self.position))
         for port in filter(None, self._request_ports):
             for hop in self.graph.incoming(port):
-                self._problem(
-                    f"{port} is for the tokens of this aspect, and nothing else can be connected to it",
-                    hop.position,
-                    "add another input for what else the composite needs",
-                )
+                message = f"{port} is for the tokens of this aspect, and nothing else can be connected to it"
+                self._problem(message, hop.position, "add another input for what else the composite needs")
             if isinstance(self.graph.ports.nodes[port]["port"], OutputPort):
-                self._problem(
-                    f"{self.path} is the model of another aspect already",
-                    self.position,
-                    "let that one stand here, too, or add another composite",
-                )
+                hint = "let that one stand here, too, or add another composite"
+                self._problem(f"{self.path} is the model of another aspect already", self.position, hint)
         self._check_types()
         self._check_directors(woven)
 
@@ -141,11 +135,8 @@ class ModelWeaving(Weaving):
             found = f"{self.path}.{asked.text}"
             if found not in self.inputs:
                 names = _names(self.inputs)
-                self._problem(
-                    f"{self.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}",
-                    asked,
-                    f"its inputs: {', '.join(names) or 'none'}",
-                )
+                hint = f"its inputs: {', '.join(names) or 'none'}"
+                self._problem(f"{self.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}", asked, hint)
                 found = ""
         self._request_ports[found] = None
         return found
@@ -158,12 +149,9 @@ class ModelWeaving(Weaving):
         if not ports:
             self._problem(f"{self.kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {self.kind}")
         else:
-            self._problem(
-                f"{self.kind} has {len(ports)} {direction}s, none of them called {name!r}",
-                position,
-                f"its {direction}s: {', '.join(_names(ports))}",
-                f"call one of them {name!r}" + (f", {hint}" if hint else ""),
-            )
+            message = f"{self.kind} has {len(ports)} {direction}s, none of them called {name!r}"
+            known = f"its {direction}s: {', '.join(_names(ports))}"
+            self._problem(message, position, known, f"call one of them {name!r}" + (f", {hint}" if hint else ""))
         return ""
 
     def _check_types(self) -> None:
@@ -268,11 +256,9 @@ def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: P
     is_sound = nx.is_directed_acyclic_graph(inside)
     if not is_sound:
         first, second = nx.find_cycle(inside)[0]
-        problems.add(
-            f"aspect {first}: it stands inside of {second}, and {second} inside of it",
-            graph.positions.get(f"aspect {first}"),
-            f"a token would never come out: let one of them stand elsewhere, or leave it out: '!{second}.**'",
-        )
+        message = f"aspect {first}: it stands inside of {second}, and {second} inside of it"
+        hint = f"a token would never come out: let one of them stand elsewhere, or leave it out: '!{second}.**'"
+        problems.add(message, graph.positions.get(f"aspect {first}"), hint)
     return bool(is_sound)
 
 

@@ -75,10 +75,7 @@ def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -
     catalogue = installed().with_types(types)
     composites, broken = inherit(declared, catalogue.actors, problems)
     if name not in composites and name not in broken:
-        problems.add(
-            f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}",
-            call_site(),
-            f"its composites: {', '.join(composites) or 'none'}",
-        )
+        hint = f"its composites: {', '.join(composites) or 'none'}"
+        problems.add(f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}", call_site(), hint)
     problems.raise_if_any()
     return CompositeClass(name, composites, catalogue)

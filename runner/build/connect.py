@@ -238,11 +238,8 @@ class Wiring:
         """The port paths behind one end of a connection, as seen from inside the composite."""
         match = _ENDPOINT.match(text.text)
         if match is None:
-            self._problem(
-                f"{text.text!r} is not a port that can be connected here",
-                text,
-                "write 'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or the name of an own port",
-            )
+            hint = "write 'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or the name of an own port"
+            self._problem(f"{text.text!r} is not a port that can be connected here", text, hint)
             return None
         name, index, port = match.groups()
         if name is None:
@@ -253,12 +250,9 @@ class Wiring:
         if child is None:
             if name not in inside.names:  # otherwise its own problem is told already
                 gone = None if inside.text is None else inside.text.removed.get(name)
-                self._problem(
-                    f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}",
-                    text,
-                    f"valid actors: {', '.join(inside.names) or 'none'}",
-                    *((f"it is removed at {gone}",) if gone is not None else ()),
-                )
+                message = f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}"
+                hint = f"valid actors: {', '.join(inside.names) or 'none'}"
+                self._problem(message, text, hint, *((f"it is removed at {gone}",) if gone is not None else ()))
             return None
         has_port = self._has_port(name, child, port, wanted, text)
         found = self._instances(name, index, child, port, text, names)
@@ -310,11 +304,8 @@ class Wiring:
         if index == "*":
             return child.paths, True
         if index is None:
-            self._problem(
-                f"{label} is an array of {child.count}: say which",
-                text,
-                f"write {name}[*].{port} for all, or {name}[0].{port} for the first",
-            )
+            hint = f"write {name}[*].{port} for all, or {name}[0].{port} for the first"
+            self._problem(f"{label} is an array of {child.count}: say which", text, hint)
             return None
 
         def value(expression: str) -> object:

@@ -37,11 +37,8 @@ def disturb(
     parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
     root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
     for setting in disturbance.settings:
-        problems.add(
-            f"{setting.path!r} cannot be set any more: the model is made",
-            setting.position,
-            f"load the model together with the disturbance: load_model(..., disturb={name!r})",
-        )
+        hint = f"load the model together with the disturbance: load_model(..., disturb={name!r})"
+        problems.add(f"{setting.path!r} cannot be set any more: the model is made", setting.position, hint)
     for key in sorted(values.keys() & model.parameters.keys() - disturbance.text.parameters.keys()):
         problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
     taken = {woven.name for woven in model.aspects}

@@ -30,11 +30,8 @@ class Complaint:
 
 def tell_of_figure(complaint: Complaint, name: str, written: Mapping, problems: Problems) -> None:
     """Add a complaint to the problems, at the place of what it is about."""
-    problems.add(
-        f"figure {name}: {complaint.message}",
-        place_in_figure(complaint, written),
-        *([complaint.help] if complaint.help else []),
-    )
+    message = f"figure {name}: {complaint.message}"
+    problems.add(message, place_in_figure(complaint, written), *([complaint.help] if complaint.help else []))
 
 
 def place_in_figure(complaint: Complaint, written: Mapping) -> Position:

@@ -194,11 +194,8 @@ class Scope:
         with raising() as problems:
             if full not in instances:
                 known = [path[len(self._full("")) :] for each in parts.values() for path in each]
-                problems.add(
-                    f"{self._inside.name} has no actor {name!r}{did_you_mean(name, known)}",
-                    position,
-                    f"valid actors: {', '.join(known) or 'none'}",
-                )
+                hint = f"valid actors: {', '.join(known) or 'none'}"
+                problems.add(f"{self._inside.name} has no actor {name!r}{did_you_mean(name, known)}", position, hint)
             elif full != instances[-1]:
                 problems.add(f"{full} is not the last of its array", position, f"only {instances[-1]} can be removed")
         self._model.forget(full)
@@ -313,11 +310,8 @@ class Scope:
             if before is not None:
                 at = before.position
                 where = f", at {at.file}:{at.line}" if at is not None else ""
-                problems.add(
-                    f"{target.path} takes one connection, and {before.source} is connected to it already{where}",
-                    link.position,
-                    "disconnect that one, or send through an actor that merges them",
-                )
+                message = f"{target.path} takes one connection, and {before.source} is connected to it already{where}"
+                problems.add(message, link.position, "disconnect that one, or send through an actor that merges them")
             new.setdefault(link.destination, link)
 
     # -- aspects --------------------------------------------------------------------------------------------------

@@ -200,12 +200,9 @@ class Unfolding:
         if part.priority is None:
             return
         if isinstance(kind, CompositeText) and kind.director is None:
-            self._tell(
-                f"{path}: {kind.name} has no priority, for its actors fire one by one",
-                part.priority.position,
-                path,
-                f"give the actors inside a priority, or give {kind.name} a director of its own: 'director: {{}}'",
-            )
+            message = f"{path}: {kind.name} has no priority, for its actors fire one by one"
+            hint = f"give the actors inside a priority, or give {kind.name} a director of its own: 'director: {{}}'"
+            self._tell(message, part.priority.position, path, hint)
             return
         found = converted(self.values, part.priority, names, f"{path}: priority", path, Parameter(int).convert)
         if found is not self.values.missing:

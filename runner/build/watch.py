@@ -90,11 +90,9 @@ class Watching:
             self.found.stop_ports.append(path)
             for port in self.graph.source_of(path):
                 if not accepts(float | bool, port.type):
-                    self.problems.add(
-                        f"stop_when: {path} sends {type_name(port.type)}, which is neither true nor false",
-                        text.position,
-                        "name a port that sends bool or numbers; the run ends when it sends true, or not 0",
-                    )
+                    message = f"stop_when: {path} sends {type_name(port.type)}, which is neither true nor false"
+                    hint = "name a port that sends bool or numbers; the run ends when it sends true, or not 0"
+                    self.problems.add(message, text.position, hint)
                     return
 
     def metric(
@@ -122,11 +120,8 @@ class Watching:
         for path in paths:
             for port in self.graph.source_of(path):
                 if port.type in (Any, object) or not accepts(wanted, port.type):
-                    self.problems.add(
-                        f"{what}: {path} sends {type_name(port.type)}, of which there is no {measure.take!r}",
-                        of.position,
-                        "name a port that sends numbers, or take 'count'",
-                    )
+                    message = f"{what}: {path} sends {type_name(port.type)}, of which there is no {measure.take!r}"
+                    self.problems.add(message, of.position, "name a port that sends numbers, or take 'count'")
                     return
 
     def _measure(

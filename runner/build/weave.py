@@ -122,11 +122,8 @@ class Weaving(View):
         having = [path for path in actors or () if name in declared_parameters(type(self.graph.actors[path]))]
         if said is not None and actors is not None and not having:
             names = sorted({each for path in actors for each in declared_parameters(type(self.graph.actors[path]))})
-            self._problem(
-                f"no {_asked(pointcut)} has a parameter {name!r}{did_you_mean(name, names)}",
-                said,
-                f"their parameters: {', '.join(names) or 'none'}",
-            )
+            hint = f"their parameters: {', '.join(names) or 'none'}"
+            self._problem(f"no {_asked(pointcut)} has a parameter {name!r}{did_you_mean(name, names)}", said, hint)
         for path in having:
             self._enter_parameter(path, name, pointcut)
         return bool(having) or said is not None
@@ -153,12 +150,8 @@ class Weaving(View):
             self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
         elif path in self.graph.ports and self.graph.incoming(path):
             sender = self.graph.incoming(path)[0].source
-            self._problem(
-                f"{path} gets its values over a connection",
-                pointcut,
-                f"let the aspect stand at {sender!r}, where they come from",
-                about=about,
-            )
+            hint = f"let the aspect stand at {sender!r}, where they come from"
+            self._problem(f"{path} gets its values over a connection", pointcut, hint, about=about)
         else:
             self._parameters.setdefault(path, False)
 
@@ -222,11 +215,8 @@ class Weaving(View):
             return None
         if not owners:
             what = "types" if pointcut.type is not None else "tags"
-            self._problem(
-                f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}",
-                wanted,
-                f"{what} in it: {', '.join(sorted(known)) or 'none'}",
-            )
+            message = f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}"
+            self._problem(message, wanted, f"{what} in it: {', '.join(sorted(known)) or 'none'}")
             return None
         return owners
 
@@ -260,11 +250,8 @@ class Weaving(View):
             return self._chosen_owners(pointcut) or ()
         if "->" in text:
             receiver = text.rpartition("->")[2].strip().rpartition(".")[0]
-            self._problem(
-                f"{name} stands at actors, not on connections",
-                pointcut,
-                f"write {receiver!r} for the one that receives",
-            )
+            hint = f"write {receiver!r} for the one that receives"
+            self._problem(f"{name} stands at actors, not on connections", pointcut, hint)
             return ()
         full = self._full(text)
         try:
@@ -282,11 +269,8 @@ class Weaving(View):
             else:
                 inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
                 known = sorted(path for path in inside if path.count(".") == text.count("."))
-                self._problem(
-                    f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}",
-                    pointcut,
-                    f"actors and composites at this depth: {', '.join(known) or 'none'}",
-                )
+                hint = f"actors and composites at this depth: {', '.join(known) or 'none'}"
+                self._problem(f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}", pointcut, hint)
         return found
 
     def _select_connections(self, pointcuts: Sequence[PointcutText]) -> list[tuple[str, str]]:
@@ -299,11 +283,8 @@ class Weaving(View):
             if not pointcut.exclude:
                 chosen |= dict.fromkeys(found)
             elif found and not chosen.keys() & found:
-                self._problem(
-                    f"'!{pointcut.text}' leaves out no connection that is selected",
-                    pointcut,
-                    "ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'",
-                )
+                hint = "ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'"
+                self._problem(f"'!{pointcut.text}' leaves out no connection that is selected", pointcut, hint)
             else:
                 chosen = {each: None for each in chosen if each not in found}
         return [each for each in chosen if each[1] not in self._left_out]

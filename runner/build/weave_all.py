@@ -71,12 +71,8 @@ class _Weaver:
         given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
         values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name)
         if not part.at:
-            self.problems.add(
-                f"aspect {name} does not say where it stands",
-                part.position,
-                "add 'at:' with ports or patterns",
-                scope=scope,
-            )
+            hint = "add 'at:' with ports or patterns"
+            self.problems.add(f"aspect {name} does not say where it stands", part.position, hint, scope=scope)
         self.graph.positions[f"aspect {name}"] = part.position
         weaving = Weaving(self.draft, self.paths, name, scope, self.problems, cls)
         if is_model and name in self.graph.composites:
@@ -118,42 +114,28 @@ class _Weaver:
             return self._model_type(name, scope, part, cls)
         if cls is None:
             near = did_you_mean(wanted, [*known.catalogue.aspects, *known.composites])
-            self.problems.add(
-                f"aspect {name}: there is no aspect type {wanted!r}{near}",
-                part.type.position,
-                *known.valid_types("aspect", wanted),
-                scope=scope,
-            )
+            message = f"aspect {name}: there is no aspect type {wanted!r}{near}"
+            self.problems.add(message, part.type.position, *known.valid_types("aspect", wanted), scope=scope)
             return None
         for pointcut in part.at:
             for key, said in (("request", pointcut.request), ("time", pointcut.time)):
                 if said is not None:
-                    self.problems.add(
-                        f"aspect {name}: {wanted} is no composite, so a pointcut of it has no {key!r}",
-                        said.position,
-                        scope=scope,
-                    )
+                    message = f"aspect {name}: {wanted} is no composite, so a pointcut of it has no {key!r}"
+                    self.problems.add(message, said.position, scope=scope)
         return cls
 
     def _model_type(self, name: str, scope: str, part: PartText, namesake: type[Aspect] | None) -> type[Aspect] | None:
         """Whether an aspect that is a composite stands at ports or at actors."""
         if namesake is not None:
-            self.problems.add(
-                f"aspect {name}: {part.type.text} is an aspect type and a composite",
-                part.type.position,
-                "give the composite another name",
-                scope=scope,
-            )
+            message = f"aspect {name}: {part.type.text} is an aspect type and a composite"
+            self.problems.add(message, part.type.position, "give the composite another name", scope=scope)
             return None
         aimed = [pointcut for pointcut in part.at if not pointcut.exclude]
         at_ports = [pointcut for pointcut in aimed if pointcut.time is None]
         if at_ports and len(at_ports) < len(aimed):
-            self.problems.add(
-                f"aspect {name}: it stands at ports here, and elsewhere at actors",
-                at_ports[0].position,
-                "give every place a time, or none: actors have one, the execution time of their firings",
-                scope=scope,
-            )
+            message = f"aspect {name}: it stands at ports here, and elsewhere at actors"
+            hint = "give every place a time, or none: actors have one, the execution time of their firings"
+            self.problems.add(message, at_ports[0].position, hint, scope=scope)
             self.draft.leave_open(name)
             return None
         return CompositeExecutionAspect if aimed and not at_ports else CompositeAspect

@@ -102,9 +102,7 @@ def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems
         if not (isinstance(aspect, ExecutionAspect) and aspect.is_processor):
             continue
         if twice := [actor for actor in woven.actors if actor in taken]:
-            problems.add(
-                f"aspect {woven.name}: {twice[0]} runs on the processor {taken[twice[0]]!r} already",
-                graph.positions.get(f"aspect {woven.name}"),
-                f"an actor has one processor: leave it out here, with '!{twice[0]}', or there",
-            )
+            message = f"aspect {woven.name}: {twice[0]} runs on the processor {taken[twice[0]]!r} already"
+            hint = f"an actor has one processor: leave it out here, with '!{twice[0]}', or there"
+            problems.add(message, graph.positions.get(f"aspect {woven.name}"), hint)
         taken.update(dict.fromkeys(woven.actors, woven.name))

@@ -86,11 +86,8 @@ class Questions:
             asked.append(("guideline", self.guideline.metric))
         for who, metric in asked:
             if metric.text not in known:
-                problems.add(
-                    f"{who}: the study has no metric {metric.text!r}{did_you_mean(metric.text, known)}",
-                    metric.position,
-                    f"its metrics: {', '.join(known) or 'none'}",
-                )
+                message = f"{who}: the study has no metric {metric.text!r}{did_you_mean(metric.text, known)}"
+                problems.add(message, metric.position, f"its metrics: {', '.join(known) or 'none'}")
 
 
 def shown_level(value: Factor) -> str:

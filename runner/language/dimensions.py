@@ -195,11 +195,8 @@ class DimensionReader(NodeReader):
                     return reader(name, position, node.entries[form].value)
             if keys & RANGE.keys.keys():
                 return self.ranged(name, position, node)
-        self.problems.add(
-            f"{name!r} does not say what values it takes",
-            node.position,
-            "write a list, {from, to, step}, {zip: ...}, {cases: ...} or {latin_hypercube: ...}",
-        )
+        hint = "write a list, {from, to, step}, {zip: ...}, {cases: ...} or {latin_hypercube: ...}"
+        self.problems.add(f"{name!r} does not say what values it takes", node.position, hint)
         return None
 
     def listed(self, name: str, position: Position, lists: dict[str, Entry]) -> Dimension | None:
@@ -317,11 +314,8 @@ class DimensionReader(NodeReader):
         before = len(self.problems)
         entries = HYPERCUBE.entries(self, node, f"latin_hypercube of {name!r}") or {}
         if "size" not in entries or "ranges" not in entries:
-            self.problems.add(
-                f"latin_hypercube of {name!r} needs 'size' and 'ranges'",
-                position,
-                "write {size: 20, seed: 1, ranges: {load: [0.1, 0.9]}}",
-            )
+            hint = "write {size: 20, seed: 1, ranges: {load: [0.1, 0.9]}}"
+            self.problems.add(f"latin_hypercube of {name!r} needs 'size' and 'ranges'", position, hint)
             return None
         said = HYPERCUBE.values(self, entries, "", position)
         size, seed = said.get("size", 1), said.get("seed", 0)

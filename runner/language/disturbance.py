@@ -60,11 +60,8 @@ def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
 def _declared(node: Node, problems: Problems) -> Disturbance | None:
     """What a file declares; whatever is misshapen is a problem and left out."""
     if isinstance(node, Mapping) and "model" in node.entries and "disturbance" not in node.entries:
-        problems.add(
-            f"{node.position.file} is a model, not a disturbance",
-            node.entries["model"].key.position,
-            "a disturbance begins with a line like 'disturbance: my_disturbance'",
-        )
+        hint = "a disturbance begins with a line like 'disturbance: my_disturbance'"
+        problems.add(f"{node.position.file} is a model, not a disturbance", node.entries["model"].key.position, hint)
         return None
     reader = NodeReader(problems)
     entries = DISTURBANCE.entries(reader, node, "the disturbance")
@@ -112,9 +109,6 @@ def joined(known: dict[str, T], more: dict[str, T], message: str, problems: Prob
     """What two files declare; of two things of one name the first one counts, and the second is a problem."""
     for name, second in more.items():
         if (first := known.get(name)) is not None:
-            problems.add(
-                message.format(name),
-                second.position,
-                f"it is declared at {first.position.file}:{first.position.line}; give this one another name",
-            )
+            hint = f"it is declared at {first.position.file}:{first.position.line}; give this one another name"
+            problems.add(message.format(name), second.position, hint)
     return {**known, **more, **known}

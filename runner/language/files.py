@@ -70,11 +70,8 @@ def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, Co
         for name, composite in current.composites.items():
             if name in composites:
                 first = composites[name].position
-                problems.add(
-                    f"composite {name!r} is defined twice",
-                    composite.position,
-                    f"the first definition is at {first.file}:{first.line}",
-                )
+                hint = f"the first definition is at {first.file}:{first.line}"
+                problems.add(f"composite {name!r} is defined twice", composite.position, hint)
             composites.setdefault(name, composite)
         for include in current.include:
             try:
@@ -85,11 +82,8 @@ def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, Co
                 problems.add(f"{include.text!r} cannot be included: {reason}", include.position)
                 continue
             if not target.is_relative_to(root) or target.suffix not in (".yaml", ".yml"):
-                problems.add(
-                    f"{include.text!r} cannot be included",
-                    include.position,
-                    "included files are .yaml files in or below the model's folder",
-                )
+                hint = "included files are .yaml files in or below the model's folder"
+                problems.add(f"{include.text!r} cannot be included", include.position, hint)
                 continue
             if target in seen:
                 continue

@@ -141,11 +141,8 @@ class _Heir:
         for name, port in self.text.ports(direction).items():
             old, crossed = ports.get(name), self.base.ports(other).get(name)
             if crossed is not None:
-                self._problem(
-                    f"{name!r} is an {other} of {self.base.name} and cannot become an {direction}",
-                    port.position,
-                    f"{self.base.name} declares it at {crossed.position}",
-                )
+                message = f"{name!r} is an {other} of {self.base.name} and cannot become an {direction}"
+                self._problem(message, port.position, f"{self.base.name} declares it at {crossed.position}")
                 continue
             ports[name] = port if old is None else replace(port, type=port.type or old.type, doc=port.doc or old.doc)
         return ports
@@ -215,11 +212,8 @@ class _Heir:
             for source, end in _pairs(connection):
                 if (source, end) not in known:
                     wanted = f"{source} -> {end}"
-                    self._problem(
-                        f"{self.base.name} has no connection {wanted!r} to remove{did_you_mean(wanted, written)}",
-                        connection.position,
-                        f"write both ends as {self.base.name} does",
-                    )
+                    message = f"{self.base.name} has no connection {wanted!r} to remove{did_you_mean(wanted, written)}"
+                    self._problem(message, connection.position, f"write both ends as {self.base.name} does")
 
 
 def _pairs(connection: ConnectionText) -> list[tuple[str, str]]:

@@ -129,11 +129,8 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
     if name in _NO_PARAMETERS or iskeyword(name):
         meaning = "which instance of an array it is" if name == "index" else "something else"
-        reader.problems.add(
-            f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}",
-            entry.key.position,
-            "give it another name",
-        )
+        message = f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}"
+        reader.problems.add(message, entry.key.position, "give it another name")
     if not isinstance(entry.value, Mapping):
         return ParameterText(name, entry.key.position, entry.value)
     what = f"parameter {name!r}"
@@ -178,11 +175,8 @@ def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: boo
     if not isinstance(entry.value, Mapping):
         said = entry.value.value if isinstance(entry.value, Scalar) else None
         type_said = said if isinstance(said, str) and NAME.match(said) else "..."
-        problems.add(
-            f"{kind} {name!r} is not a mapping",
-            entry.value.position,
-            f"write '{name}: {{type: {type_said}}}' with the {kind}'s type and parameters",
-        )
+        hint = f"write '{name}: {{type: {type_said}}}' with the {kind}'s type and parameters"
+        problems.add(f"{kind} {name!r} is not a mapping", entry.value.position, hint)
         return None
     values = dict(entry.value.entries)
     kind_entry = values.pop("type", None)

@@ -85,11 +85,8 @@ def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText
     if isinstance(node, Scalar):
         return _arrow(reader, node)
     if not isinstance(node, Mapping):
-        problems.add(
-            "this is not a connection",
-            node.position,
-            "write 'actor.port -> actor.port' or {from: ..., to: ..., delay: ...}",
-        )
+        hint = "write 'actor.port -> actor.port' or {from: ..., to: ..., delay: ...}"
+        problems.add("this is not a connection", node.position, hint)
         return None
     entries = CONNECTION.entries(reader, node, "a connection") or {}
     before = len(problems)
@@ -177,11 +174,8 @@ def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText, 
         at = said.pop("at", None)
         where = PointcutText("", item.position) if at is None else PointcutText.of(at)
         if sum(key in entries for key in ("at", "type", "tag")) != 1 or (at is not None and "port" in said):
-            reader.problems.add(
-                "a pointcut chooses by pattern, by type or by tag",
-                item.position,
-                "write {at: ...}, {type: ..., port: ...} or {tag: ...}",
-            )
+            hint = "write {at: ...}, {type: ..., port: ...} or {tag: ...}"
+            reader.problems.add("a pointcut chooses by pattern, by type or by tag", item.position, hint)
             said = {}
         found.append(replace(where, **said))
     return tuple(found)

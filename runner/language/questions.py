@@ -81,11 +81,8 @@ class QuestionReader(NodeReader):
         claims = QuestionReader(misfits, self.dimensions, self.kinds, self.folder, self.factors_of).claims(tree)
         if first := next(iter(misfits.found), None):
             more = f", and {len(misfits) - 1} more" if len(misfits) > 1 else ""
-            self.problems.add(
-                f"claims: those of {node.text!r} do not fit this study: {first.message}{more}",
-                node.position,
-                *first.help,
-            )
+            message = f"claims: those of {node.text!r} do not fit this study: {first.message}{more}"
+            self.problems.add(message, node.position, *first.help)
         apart = tuple(name for name in self.kinds if name not in factors)
         return Questions(claims, guideline, apart, lender)
 
@@ -147,11 +144,9 @@ class QuestionReader(NodeReader):
             self.problems.add(f"{what} names no metric", entries[form].value.position)
         at, than = said.get("at", {}), said.get("than")
         if than is not None and than.keys() != at.keys() and len(self.problems) == before:
-            self.problems.add(
-                f"{what}: 'at' and 'than' give levels of other factors",
-                entries["than"].key.position,
-                f"at: {', '.join(at)}; than: {', '.join(than) or 'none'}",
-            )
+            message = f"{what}: 'at' and 'than' give levels of other factors"
+            hint = f"at: {', '.join(at)}; than: {', '.join(than) or 'none'}"
+            self.problems.add(message, entries["than"].key.position, hint)
         if len(self.problems) > before:
             return None
         claim = Claim(name, form, tuple(metrics), position, condition=condition, **said)
@@ -178,11 +173,8 @@ class QuestionReader(NodeReader):
     def selection(self, node: Node, what: str, key: str) -> Selection:
         """``{factor: level}`` or ``{factor: [level, ...]}``, with levels of the study."""
         if not isinstance(node, MappingNode) or not node.entries:
-            self.problems.add(
-                f"{what}: {key!r} is not a mapping from factors to levels",
-                node.position,
-                "write {load: 0.5} or {load: [0.5, 0.7]}",
-            )
+            hint = "write {load: 0.5} or {load: [0.5, 0.7]}"
+            self.problems.add(f"{what}: {key!r} is not a mapping from factors to levels", node.position, hint)
             return {}
         found: Selection = {}
         for factor, entry in node.entries.items():
@@ -208,22 +200,16 @@ class QuestionReader(NodeReader):
         shown = node.text if isinstance(node, Scalar) else "what stands here"
         texts = [shown_level(each) for each in known]
         guess = did_you_mean(shown, texts) if self.kinds[factor] == "text" else ""
-        self.problems.add(
-            f"{what}: the study has no level {shown} of {factor}{guess}",
-            node.position,
-            f"its levels: {', '.join(texts[:20])}{', ...' if len(texts) > 20 else ''}",
-        )
+        hint = f"its levels: {', '.join(texts[:20])}{', ...' if len(texts) > 20 else ''}"
+        self.problems.add(f"{what}: the study has no level {shown} of {factor}{guess}", node.position, hint)
         return None
 
     def is_factor(self, name: str, position: Position, what: str) -> bool:
         """Whether the study varies it; a problem otherwise."""
         if name in self.kinds:
             return True
-        self.problems.add(
-            f"{what}: {name!r} is nothing that the study varies{did_you_mean(name, self.kinds)}",
-            position,
-            f"what it varies: {', '.join(self.kinds) or 'nothing'}",
-        )
+        message = f"{what}: {name!r} is nothing that the study varies{did_you_mean(name, self.kinds)}"
+        self.problems.add(message, position, f"what it varies: {', '.join(self.kinds) or 'nothing'}")
         return False
 
     def trend(self, node: Node, what: str, key: str) -> str:
@@ -276,11 +262,8 @@ class QuestionReader(NodeReader):
             return None
         aims = [key for key in ("least", "greatest") if key in entries]
         if "choose" not in entries or len(aims) != 1:
-            self.problems.add(
-                "guideline does not say which factor to choose, and what is to be least or greatest",
-                entry.key.position,
-                "write {choose: servers, least: mean_wait}",
-            )
+            message = "guideline does not say which factor to choose, and what is to be least or greatest"
+            self.problems.add(message, entry.key.position, "write {choose: servers, least: mean_wait}")
             return None
         said = GUIDELINE.values(self, entries, "guideline", entry.key.position)
         name, at = said.get("choose"), entries["choose"].value.position

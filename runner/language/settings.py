@@ -93,11 +93,8 @@ def read_overrides(path: Path, problems: Problems) -> list[Setting]:
     if node is None:
         return []
     if not isinstance(node, Mapping):
-        problems.add(
-            f"{path} is not a mapping from parameters to values",
-            node.position,
-            "write lines like 'observer[*].sensor.range: 5 m'",
-        )
+        hint = "write lines like 'observer[*].sensor.range: 5 m'"
+        problems.add(f"{path} is not a mapping from parameters to values", node.position, hint)
         return []
     return settings_in(node, problems)
 
@@ -167,11 +164,8 @@ def _value(text: str, option: str, offset: int, problems: Problems) -> Node | No
 def without(text: ModelText, name: str, problems: Problems) -> ModelText:
     aspects = text.root.aspects
     if name not in aspects:
-        problems.add(
-            f"the model has no aspect {name!r}{did_you_mean(name, list(aspects))}",
-            _in_option(f"--without {name}", 10),
-            f"its aspects: {', '.join(aspects) or 'none'}",
-        )
+        message = f"the model has no aspect {name!r}{did_you_mean(name, list(aspects))}"
+        problems.add(message, _in_option(f"--without {name}", 10), f"its aspects: {', '.join(aspects) or 'none'}")
     left = {key: part for key, part in aspects.items() if key != name}
     return replace(text, root=replace(text.root, aspects=left))
 

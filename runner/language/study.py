@@ -269,11 +269,8 @@ class _StudyReader(NodeReader):
         for metric in study.metrics or ():
             assert metric.node is not None
             if metric.name in RESERVED or metric.name in seen:
-                self.problems.add(
-                    f"a metric cannot be called {metric.name!r}: the table has such a column already",
-                    metric.node.position,
-                    "give it another name: metrics: {name: expression}",
-                )
+                message = f"a metric cannot be called {metric.name!r}: the table has such a column already"
+                self.problems.add(message, metric.node.position, "give it another name: metrics: {name: expression}")
             seen[metric.name] = metric.node.position
 
 

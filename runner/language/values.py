@@ -59,12 +59,8 @@ class Values:
             if any(names.get(name) is self.missing for name in asked):
                 return self.missing  # what is wrong with that name has been told
             if early := sorted(name for name in asked if name in later and name not in names):
-                self.problems.add(
-                    f"{label}: {early[0]!r} has no value yet: a default may use the parameters above it only",
-                    node.position,
-                    f"declare {early[0]!r} further up",
-                    scope=scope,
-                )
+                message = f"{label}: {early[0]!r} has no value yet: a default may use the parameters above it only"
+                self.problems.add(message, node.position, f"declare {early[0]!r} further up", scope=scope)
                 return self.missing
             value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self.budget)
         except ExpressionError as error:

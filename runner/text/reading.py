@@ -40,11 +40,8 @@ class NodeReader:
             if key in valid:
                 known[key] = entry
             else:
-                self.problems.add(
-                    f"{what} has no key {key!r}{did_you_mean(key, valid)}",
-                    entry.key.position,
-                    f"valid keys: {', '.join(valid)}",
-                )
+                hint = f"valid keys: {', '.join(valid)}"
+                self.problems.add(f"{what} has no key {key!r}{did_you_mean(key, valid)}", entry.key.position, hint)
                 # Read on as if it had been written right, or else it would seem to be missing as well; but only if
                 # there is no doubt, or else what follows would be judged by what it is not.
                 if (meant := nearest(key, valid, SURE)) is not None and meant not in node.entries:
