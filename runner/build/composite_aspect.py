@@ -198,20 +198,21 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
     Where an aspect stands, tokens may also pass it by, when it is not active: its detours come beside the connections,
     which they never replace.  So a model that is right with such an aspect is right without it.
     """
-    at: dict[str, list[WovenAspect]] = {}
+    at: dict[str, list[tuple[WovenAspect, AspectModel]]] = {}
+    responses: dict[str, WovenAspect] = {}
     for woven in aspects:
-        if woven.model is not None:
-            for place in woven.model.requests:
-                at.setdefault(place, []).append(woven)
+        if (model := woven.model) is not None and model.requests:
+            responses[model.response] = woven
+            for place in model.requests:
+                at.setdefault(place, []).append((woven, model))
     found: dict[tuple[str, str, str], Detour] = {}
 
     def lead(sources: list[str], place: str) -> list[str]:
         """Through the aspects at a place; the ports from which tokens may come then."""
-        for woven in at.get(place, ()):
-            assert woven.model is not None
+        for woven, model in at.get(place, ()):
             for source in sources:
-                add(source, woven.model.requests[place], woven)
-            sources = [*sources, woven.model.response]
+                add(source, model.requests[place], woven)
+            sources = [*sources, model.response]
         return sources
 
     def add(source: str, destination: str, woven: WovenAspect) -> None:
@@ -220,14 +221,11 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
         key = (source, destination, woven.name)
         found.setdefault(key, Detour(source, destination, None, position, order, woven.name))
 
-    for place in list(at):
-        if place in graph.actors:  # what it asks for comes in after its turn
-            actor = graph.actors[place]
-            for woven in at[place]:
-                for port in (*actor.inputs.values(), *actor.outputs.values()):
-                    assert woven.model is not None
-                    add(port.path, woven.model.requests[place], woven)
-    responses = {woven.model.response: woven for many in at.values() for woven in many if woven.model is not None}
+    for place in (place for place in at if place in graph.actors):  # what it asks for comes in after its turn
+        actor = graph.actors[place]
+        for woven, model in at[place]:
+            for port in (*actor.inputs.values(), *actor.outputs.values()):
+                add(port.path, model.requests[place], woven)
     senders: dict[str, list[str]] = {}
     for port in graph.ports.nodes if at else ():
         if graph.direction(port) == "output" and graph.is_end(port):
@@ -245,13 +243,12 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
 
 def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> bool:
     """Whether no aspect stands in another that stands in it, or the tokens of both would never come out."""
-    models = [woven for woven in aspects if woven.model is not None]
+    models = [(woven, woven.model.path) for woven in aspects if woven.model is not None]
     inside = nx.DiGraph()
-    for woven in models:
-        for other in models:
-            assert other.model is not None
-            ends = [*woven.ports, *woven.actors, *(end for ends in woven.connections for end in ends)]
-            if woven is not other and any(end.startswith(f"{other.model.path}.") for end in ends):
+    for woven, _ in models:
+        ends = [*woven.ports, *woven.actors, *(end for ends in woven.connections for end in ends)]
+        for other, path in models:
+            if woven is not other and any(end.startswith(f"{path}.") for end in ends):
                 inside.add_edge(woven.name, other.name)
     is_sound = nx.is_directed_acyclic_graph(inside)
     if not is_sound:

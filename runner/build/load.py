@@ -97,7 +97,9 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
     """The model that declarations stand for, in passes; it is good only if there are no problems then."""
     problems, values, root = settler.problems, settler.values, text.root
     model = Model(root.name, doc=root.doc)
-    _check_names(known, problems)
+    for name in sorted(known.composites.keys() & known.catalogue.actors.keys()):
+        at = known.composites[name].position
+        problems.add(f"composite {name!r} has the name of an actor type", at, "give it another name")
     values.of_model = root.parameters
     names = settler.parameters("", root, {}, {}, None)
     made = Unfolding(known, settler, Draft(ModelGraph(limits)))
@@ -111,18 +113,14 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         check(made.draft, problems)
         check_processors(woven, made.draft.graph, problems)
         model.adopt(made.draft, woven, Watching(made.draft, values, problems).read(text, names))
-        model.parameters = {name: _shown(value, root.parameters[name].unit) for name, value in names.items()}
+        # Numbers are plain ones, in the units that the model declares.
+        model.parameters = {
+            name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()
+        }
         model.declared = {name: (text.unit, text.doc) for name, text in root.parameters.items()}
         model.figures = _figures(text, values, names)
     try_classes(known, made.classes, values, limits, problems)
     return model
-
-
-def _check_names(known: Known, problems: Problems) -> None:
-    for name in sorted(known.composites.keys() & known.catalogue.actors.keys()):
-        problems.add(
-            f"composite {name!r} has the name of an actor type", known.composites[name].position, "give it another name"
-        )
 
 
 def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, DeclaredFigure]:
@@ -134,11 +132,6 @@ def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[
             in_si = {key: counted_in_si(value) for key, value in given.items()}
             found[name] = (part.type.text, in_si, MappingNode(part.values, part.type.position))
     return found
-
-
-def _shown(value: object, unit: str) -> object:
-    """The value of a parameter of the model, as a plain number in the unit that it declares."""
-    return plain(value) if unit else counted_in_si(value)
 
 
 def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:

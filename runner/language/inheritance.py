@@ -30,19 +30,16 @@ def inherit(
     for each in composites:
         name = each
         # From the class up to the first base that is done with, then back down: no recursion, however long the way.
-        way: list[CompositeText] = []
+        way: list[tuple[CompositeText, Text]] = []
         while name not in whole and name not in broken:
-            text = composites[name]
-            base = text.extends
-            assert base is not None
-            way.append(text)
+            base = composites[name].extends
+            assert base is not None, "what extends nothing is whole"
+            way.append((composites[name], base))
             if not _is_sound(way, composites, actor_types, problems):
-                broken.update(text.name for text in way)
+                broken.update(text.name for text, _ in way)
                 break
             name = base.text
-        for text in reversed(way):
-            base = text.extends
-            assert base is not None
+        for text, base in reversed(way):
             if base.text in broken:
                 broken.add(text.name)
             if text.name not in broken:
@@ -61,36 +58,35 @@ def _size(text: CompositeText) -> int:
 
 
 def _is_sound(
-    way: list[CompositeText], composites: dict[str, CompositeText], actor_types: Collection[str], problems: Problems
+    way: list[tuple[CompositeText, Text]],
+    composites: dict[str, CompositeText],
+    actor_types: Collection[str],
+    problems: Problems,
 ) -> bool:
     """Whether the last class of the way extends one that is there and not on the way already."""
-    last = way[-1]
-    base = last.extends
-    assert base is not None
-    names = [text.name for text in way]
+    last, base = way[-1]
+    names = [text.name for text, _ in way]
+    if not base.text:
+        return False  # told when it was read
     if base.text not in composites:
+        known = [name for name in composites if name != last.name]
+        message = f"there is no composite {base.text!r} to extend{did_you_mean(base.text, known)}"
+        hint = f"composites: {', '.join(known) or 'none'}"
         if base.text in actor_types:
             message, hint = f"{base.text} is an actor type, and only composites can be extended", "use it as an actor"
-        elif base.text:
-            known = [name for name in composites if name != last.name]
-            message = f"there is no composite {base.text!r} to extend{did_you_mean(base.text, known)}"
-            hint = f"composites: {', '.join(known) or 'none'}"
-        else:
-            return False  # told when it was read
         problems.add(f"{last.name}: {message}", base.position, hint)
-        return False
-    if base.text in names:
+    elif base.text in names:
         loop = way[names.index(base.text) :]
         problems.add(
-            f"{base.text} extends itself: {' -> '.join([*(text.name for text in loop), base.text])}",
-            loop[0].extends.position if loop[0].extends is not None else None,
-            *(f"{text.name} extends {text.extends.text} at {text.extends.position}" for text in loop if text.extends),
+            f"{base.text} extends itself: {' -> '.join([*(text.name for text, _ in loop), base.text])}",
+            loop[0][1].position,
+            *(f"{text.name} extends {extended.text} at {extended.position}" for text, extended in loop),
         )
-        return False
-    if len(way) > MAX_BASES:
-        problems.add(f"{way[0].name} has more than {MAX_BASES} bases, one upon the other", base.position)
-        return False
-    return True
+    elif len(way) > MAX_BASES:
+        problems.add(f"{names[0]} has more than {MAX_BASES} bases, one upon the other", base.position)
+    else:
+        return True
+    return False
 
 
 class _Heir:
