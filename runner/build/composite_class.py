@@ -53,7 +53,7 @@ class CompositeInstance:
         names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
         aspects: list[WovenAspect] = []
         with suppress(TooLargeError):
-            made.instances(path, path.rpartition(".")[0], part, names)
+            made.instances(path, part, names)
             aspects = weave_all(made)
         problems.raise_if_any()
         return made.draft, aspects

@@ -84,7 +84,7 @@ class Unfolding:
         children: dict[str, Child] = {}
         for name, part in composite.actors.items():
             full = f"{path}.{name}" if path else name
-            child = self.instances(full, path, part, names, within)
+            child = self.instances(full, part, names, within)
             if child is None:
                 self.draft.unknown.add(full)
             else:
@@ -103,14 +103,12 @@ class Unfolding:
             wiring.resolve(connection, names).make(self.draft)
         self.aspects += ((path, part, names) for part in composite.aspects.values())
 
-    def instances(
-        self, path: str, composite: str, part: PartText, names: Names, within: tuple[str, ...] = ()
-    ) -> Child | None:
+    def instances(self, path: str, part: PartText, names: Names, within: tuple[str, ...] = ()) -> Child | None:
         """Make the instances of one entry of ``actors``; None if there is no such type."""
-        kind = self._type(path, composite, part, within)
+        kind = self._type(path, part, within)
         if kind is None:
             return None
-        count, is_array = self._count(path, composite, part, names), part.count is not None
+        count, is_array = self._count(path, part, names), part.count is not None
         if count is None:
             self.draft.unknown.add(path)
         elif count == 0:
@@ -136,26 +134,24 @@ class Unfolding:
 
     # -- one entry of ``actors`` ----------------------------------------------------------------------------------
 
-    def _type(
-        self, path: str, composite: str, part: PartText, within: tuple[str, ...]
-    ) -> CompositeText | type[Actor] | None:
+    def _type(self, path: str, part: PartText, within: tuple[str, ...]) -> CompositeText | type[Actor] | None:
         """What a part is; None, and told, if it cannot be that."""
         known, wanted = self.known, part.type.text
         inner = known.composites.get(wanted)
         try:
             found = known.catalogue.actors.get(wanted) if inner is None else inner
         except CatalogueError as error:
-            self._tell(f"{path}: {error.message}", part.type.position, composite, *error.help)
+            self._tell(f"{path}: {error.message}", part.type.position, path, *error.help)
             return None
         if wanted in known.broken:
             return None
         if found is None:
             near = did_you_mean(wanted, [*known.composites, *known.catalogue.actors])
             hints = known.valid_types("actor", wanted)
-            self._tell(f"{path}: there is no actor type {wanted!r}{near}", part.type.position, composite, *hints)
+            self._tell(f"{path}: there is no actor type {wanted!r}{near}", part.type.position, path, *hints)
         elif wanted in within:
             way = " -> ".join([*within[within.index(wanted) :], wanted])
-            self._tell(f"{path}: composite {wanted} contains itself: {way}", part.type.position, composite)
+            self._tell(f"{path}: composite {wanted} contains itself: {way}", part.type.position, path)
         elif len(within) >= MAX_DEPTH:
             self._tell(f"{path}: composites are nested deeper than {MAX_DEPTH} levels", part.type.position, "")
         else:
@@ -165,12 +161,12 @@ class Unfolding:
     def _tell(self, message: str, position: Position | None, scope: str, *hints: str) -> None:
         self.problems.add(message, position, *hints, scope=scope)
 
-    def _count(self, path: str, composite: str, part: PartText, names: Names) -> int | None:
+    def _count(self, path: str, part: PartText, names: Names) -> int | None:
         """How many instances there are; None if that is not known."""
         if part.count is None:
             return 1
         count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
-        found = converted(self.values, part.count, names, f"{path}: count", composite, count.convert)
+        found = converted(self.values, part.count, names, f"{path}: count", path, count.convert)
         return None if found is self.values.missing else found
 
     def _count_one(self, path: str, part: PartText) -> None:
@@ -279,11 +275,11 @@ class Unfolding:
             )
             return None
         if self.settler.is_enabled(full, path, part, names):
-            return self.instances(full, path, as_actor(part), names, within)
+            return self.instances(full, as_actor(part), names, within)
         trial = copy(self)
         trial.draft, trial.aspects, trial.actors = self.draft.inside(graph.director_of(full)), [], []
         try:
-            trial.instances(full, path, as_actor(part), names, within)
+            trial.instances(full, as_actor(part), names, within)
         finally:
             self.cost = trial.cost
         self.draft.unknown.add(full)

@@ -66,13 +66,10 @@ class Weaving(View):
         """The ports, connections and actors that the pointcuts select."""
         if not self.cls.at_ports:
             return [], [], self._select_actors(pointcuts)
-        return self._select_ports(pointcuts), self._select_connections(pointcuts), {}
-
-    def _select_ports(self, pointcuts: Sequence[PointcutText]) -> list[str]:
         of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
         self._left_out = {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
-        return self.ports.in_order(chosen - self._left_out)
+        return self.ports.in_order(chosen - self._left_out), self._select_connections(pointcuts), {}
 
     def _of(self, pointcut: PointcutText) -> list[str]:
         """The ports at which the aspect can stand, of those that one pointcut selects."""

@@ -232,11 +232,10 @@ class DimensionReader(NodeReader):
         if not isinstance(node, Mapping) or not node.entries:
             self.problems.add(f"zip of {name!r} is not a mapping from parameters to lists", node.position)
             return None
-        before = len(self.problems)
-        for path, entry in node.entries.items():
-            if not isinstance(entry.value, Sequence):
-                self.problems.add(f"{path!r} is not a list", entry.value.position, "begin each entry with '- '")
-        return self.listed(name, position, node.entries) if len(self.problems) == before else None
+        wrong = {path: each for path, each in node.entries.items() if not isinstance(each.value, Sequence)}
+        for path, entry in wrong.items():
+            self.problems.add(f"{path!r} is not a list", entry.value.position, "begin each entry with '- '")
+        return None if wrong else self.listed(name, position, node.entries)
 
     def cases(self, name: str, position: Position, node: Node) -> Dimension | None:
         """Named sets of values; the column holds the names."""

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 from epicycle.actors import MappingParameter, Parameter, ParameterError
 
 from ..catalogue import as_written, is_part, shown
-from ..text import Entry, Node, NodeReader, Position, Scalar, Text, is_empty
+from ..text import Entry, Node, NodeReader, Position, Scalar, is_empty
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -80,20 +80,11 @@ class Shape:
         return Shape(schema, self.read)
 
 
-def _positioned(reader: NodeReader, node: Node, what: str) -> Text | None:
-    said = reader.text(node, what)
-    return None if said is None else Text(said, node.position)
-
-
 def _flag(reader: NodeReader, node: Node, what: str) -> bool | None:
     if isinstance(node, Scalar) and isinstance(node.value, bool):
         return node.value
     reader.problems.add(f"{what} is neither true nor false", node.position)
     return None
-
-
-def _names(reader: NodeReader, node: Node, what: str) -> tuple[Text, ...]:
-    return tuple(reader.texts(node, what))
 
 
 def node_as(schema: Schema) -> Shape:
@@ -134,8 +125,8 @@ QUANTITY_SCHEMA: Schema = {
 LABEL: Schema = {"type": ["string", "number", "boolean", "null"]}  # any single value, taken as it is written
 TEXT = Shape(ref("text"), NodeReader.text)
 NAMED = Shape(ref("name"), NodeReader.name)
-AT = Shape(ref("text"), _positioned)  # a text with its place
-TEXTS = Shape(one_or_more({"type": "string"}), _names)
+AT = Shape(ref("text"), NodeReader.placed)
+TEXTS = Shape(one_or_more({"type": "string"}), NodeReader.texts)
 FLAG = Shape({"type": "boolean"}, _flag)
 
 

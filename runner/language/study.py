@@ -204,7 +204,7 @@ class _StudyReader(NodeReader):
             variants = {name: self.texts(each.value, "a disturbance") for name, each in node.entries.items()}
         else:
             texts = self.texts(node, what)
-            variants = {Path(text.text).stem: [text] for text in texts}
+            variants = {Path(text.text).stem: (text,) for text in texts}
         levels = []
         for variant, texts in variants.items():
             if self.asks_for_files:

@@ -1,5 +1,7 @@
 """Positioned text: YAML as nodes that know where they stand, problems with places, and limits; it knows no language."""
 
+from epicycle.actors import did_you_mean, nearest
+
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, plain, read
 from .files import COMMAND_LINE, Noted, data_file, note_package, noting
 from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
@@ -17,7 +19,7 @@ from .patterns import (
     names_of,
     select,
 )
-from .problems import MAX_PROBLEMS, ModelError, Position, Problem, Problems, did_you_mean, nearest, told_raised
+from .problems import MAX_PROBLEMS, ModelError, Position, Problem, Problems, told_raised
 from .program import call_site, describe, entries_of, node_of, raised_at
 from .reading import NAME, NAMES_HAVE, SURE, NodeReader, Text, inside, is_empty, split, within
 

@@ -23,10 +23,10 @@ from yaml.events import (
     ScalarEvent,
 )
 
-from epicycle.actors import MAX_DEPTH, irregular, open_regular
+from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
 from .files import note_file
-from .problems import Position, Problems, did_you_mean
+from .problems import Position, Problems
 
 MAX_BYTES = 10_000_000
 MAX_NODES = 200_000  # with each alias counted as often as it is used

@@ -9,9 +9,9 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from epicycle.actors import ParameterError, irregular, read_regular
+from epicycle.actors import ParameterError, did_you_mean, irregular, read_regular
 
-from .problems import Position, did_you_mean
+from .problems import Position
 
 COMMAND_LINE = "command line"  # the file of a position in an option
 

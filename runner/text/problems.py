@@ -5,10 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
-from epicycle.actors import EpicycleError, did_you_mean, nearest, shortened, visible, visible_character
-
-# The runner takes the functions from here, as it does all that makes a message.
-__all__ = ["ModelError", "Position", "Problem", "Problems", "did_you_mean", "nearest", "visible"]
+from epicycle.actors import EpicycleError, shortened, visible, visible_character
 
 MAX_PROBLEMS = 100
 MAX_SOURCE_WIDTH = 120

@@ -6,8 +6,10 @@ import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+from epicycle.actors import did_you_mean, nearest
+
 from .document import Entry, Mapping, Node, Scalar, Sequence
-from .problems import Position, Problems, did_you_mean, nearest
+from .problems import Position, Problems
 
 SURE = 0.75  # how like a key must be to the one that it is taken for
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
@@ -71,16 +73,16 @@ class NodeReader:
         self.problems.add(f"{what} is not a list", node.position, "begin each entry with '- '")
         return None
 
-    def texts(self, node: Node, what: str) -> list[Text]:
-        """A text, or a list of texts."""
+    def texts(self, node: Node, what: str) -> tuple[Text, ...]:
+        """A text, or a list of texts; empty entries are left out."""
         nodes = node.items if isinstance(node, Sequence) else (node,)
-        found = []
-        for item in nodes:
-            if is_empty(item):
-                continue
-            if (text := self.text(item, what)) is not None:
-                found.append(Text(text, item.position))
-        return found
+        found = (self.placed(item, what) for item in nodes if not is_empty(item))
+        return tuple(each for each in found if each is not None)
+
+    def placed(self, node: Node, what: str) -> Text | None:
+        """A text with its place."""
+        said = self.text(node, what)
+        return None if said is None else Text(said, node.position)
 
     def text(self, node: Node, what: str) -> str | None:
         if isinstance(node, Scalar):
