@@ -11,8 +11,8 @@ from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph import ModelGraph
-from ..language import ConnectionText, DeclarationReader, PointcutText
-from ..text import ModelError, Position, Problem, Problems, Scalar, Text, node_of, within
+from ..language import ConnectionText, PointcutText, connection
+from ..text import ModelError, NodeReader, Position, Problem, Problems, Scalar, Text, node_of, within
 from .settle import drift, local_nanoseconds
 
 
@@ -107,17 +107,16 @@ class Named:
         """A connection as a model file would declare it; ``inside`` is what the scope is called."""
         if destination is not None:
             sources, destinations = self._ends(source, inside), self._ends(destination, inside)
-            connection: ConnectionText | None = ConnectionText(sources, destinations, self._position)
+            made: ConnectionText | None = ConnectionText(sources, destinations, self._position)
         elif isinstance(source, str):
-            written = Scalar(source, source, False, self._position)
-            connection = DeclarationReader(self._problems).connection(written)
+            made = connection(NodeReader(self._problems), Scalar(source, source, False, self._position))
         else:
             self._tell("the connection has no destination", "write connect(a.output, b.input)")
             return None
         # A list that is empty connects nothing: there may be no robots.
-        if connection is None or not (connection.sources and connection.destinations):
+        if made is None or not (made.sources and made.destinations):
             return None
-        return connection if delay is None else replace(connection, delay=node_of(delay, self._position))
+        return made if delay is None else replace(made, delay=node_of(delay, self._position))
 
     def pointcuts(self, at: Places | Mapping[str, Places], cls: type[Aspect]) -> list[PointcutText]:
         """Pointcuts as a model file would declare them."""

@@ -9,11 +9,12 @@ from epicycle.actors import Parameter, ParameterError, accepts, declared_paramet
 
 from ..catalogue import Measure
 from ..graph import Metric, Watched
-from ..language import DeclarationReader, MetricText, ModelText, Values
+from ..language import MetricText, ModelText, Values
 from ..text import (
     MAX_SEED,
     RAISE_IT,
     Node,
+    NodeReader,
     PathIndex,
     PatternError,
     Position,
@@ -47,7 +48,7 @@ class Watching:
 
     def read(self, text: ModelText, names: dict[str, object]) -> Watched:
         """Everything that the model file says about it."""
-        reader = DeclarationReader(self.problems)
+        reader = NodeReader(self.problems)
         for key, entry in text.run.items():
             if key in ("record", "stop_when"):
                 watch = self.record if key == "record" else self.stop_when

@@ -222,12 +222,13 @@ class Weaving(View):
         index = self.paths.owners
         aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
         spared = {path for pointcut in pointcuts if pointcut.exclude for path in self._aimed_at(pointcut, index)}
-        known = self.paths.holders.paths
+        known = self.paths.holders
         if any(each not in known for unit in aimed for each in (unit, *index.inside(unit))):
             self._is_excused = True  # there is an actor that could not be made, which has been told
         found = {}
         actors = self.paths.actors
-        for actor in actors.in_order({each for unit in aimed for each in (unit, *actors.inside(unit))} & actors.paths):
+        chosen = {each for unit in aimed for each in (unit, *actors.inside(unit)) if each in actors}
+        for actor in actors.in_order(chosen):
             parts = actor.split(".")
             around = [".".join(parts[:length]) for length in range(1, len(parts) + 1)]
             unit = next((path for path in around if path in aimed), None)

@@ -22,7 +22,7 @@ from .disturbance import (
 )
 from .files import read_library, read_model
 from .inheritance import inherit
-from .models import DeclarationReader
+from .places import connection
 from .schema import CONSTRUCTS, json_schema, schema_text
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
@@ -47,7 +47,6 @@ __all__ = [
     "Claim",
     "CompositeText",
     "ConnectionText",
-    "DeclarationReader",
     "Dimension",
     "Factor",
     "Guideline",
@@ -68,6 +67,7 @@ __all__ = [
     "asks_for_none",
     "change_aspect",
     "check_usage",
+    "connection",
     "in_si",
     "inherit",
     "is_study",

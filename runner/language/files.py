@@ -9,7 +9,7 @@ from epicycle.actors import irregular
 from ..catalogue import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
 from ..text import Mapping, Problems, Text, did_you_mean, read
 from .declarations import CompositeText, ModelText
-from .models import DeclarationReader
+from .models import library_of, model_of
 
 MAX_INCLUDES = 200
 
@@ -40,7 +40,7 @@ def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, Comp
     elif isinstance(node, Mapping) and "disturbance" in node.entries and "model" not in node.entries:
         problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
     elif node is not None:
-        text = DeclarationReader(problems).model(node)
+        text = model_of(node, problems)
     if path is None or text is None:
         return problems.whole(None)
     return text, _composites(text, path, problems)
@@ -51,11 +51,10 @@ def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeTex
     path = Path(file)
     candidates = (path, *(folder / path for folder in model_folders()))
     path = next((each for each in candidates if each.is_file()), path)
-    node, reader = read(path, problems), DeclarationReader(problems)
-    text = None
+    node, text = read(path, problems), None
     if node is not None:
         is_model = isinstance(node, Mapping) and "model" in node.entries
-        text = reader.model(node) if is_model else reader.included(node)
+        text = (model_of if is_model else library_of)(node, problems)
     return _composites(problems.whole(text), path, problems)
 
 
@@ -99,7 +98,7 @@ def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, Co
                 problems.add(f"the included file {include.text!r} {kind}", include.position)
                 continue
             node = read(target, problems, str(where.parent / include.text))
-            inner = DeclarationReader(problems).included(node) if node is not None else None
+            inner = library_of(node, problems) if node is not None else None
             if inner is not None:
                 waiting.append((inner, target))
     return composites

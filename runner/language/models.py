@@ -20,6 +20,7 @@ from ..text import (
     Node,
     NodeReader,
     Position,
+    Problems,
     Scalar,
     Text,
     is_empty,
@@ -48,7 +49,7 @@ from .fields import (
     schema_of,
 )
 from .fields import NAME as NAME_PATTERN
-from .places import CONNECTIONS, PATTERN_SCHEMA, PATTERNS, POINTCUTS, connection
+from .places import CONNECTIONS, PATTERN_SCHEMA, PATTERNS, POINTCUTS
 
 # -- ports and parameters -----------------------------------------------------------------------------------------
 
@@ -396,21 +397,18 @@ MODEL = Construct(
 _OF_FILE = Construct("", {key: each for key, each in MODEL.keys.items() if key not in COMPOSITE.keys})
 
 
-class DeclarationReader(NodeReader):
-    """Reads one file's nodes; whatever is misshapen is added to ``problems`` and left out."""
+def model_of(node: Node, problems: Problems) -> ModelText | None:
+    """What a file says that is a model: it has the key ``model``."""
+    reader = NodeReader(problems)
+    entries = MODEL.entries(reader, node, "the model")
+    if entries is None:
+        return None
+    said = _OF_FILE.values(reader, entries, "the model", node.position)
+    own = {key: entry for key, entry in entries.items() if key in COMPOSITE.keys}
+    return ModelText(composite(reader, said.pop("name", "model"), own, node.position), **said)
 
-    def model(self, node: Node) -> ModelText | None:
-        """A file that is a model: it has the key ``model``."""
-        entries = MODEL.entries(self, node, "the model")
-        if entries is None:
-            return None
-        said = _OF_FILE.values(self, entries, "the model", node.position)
-        own = {key: entry for key, entry in entries.items() if key in COMPOSITE.keys}
-        return ModelText(composite(self, said.pop("name", "model"), own, node.position), **said)
 
-    def included(self, node: Node) -> ModelText | None:
-        said = LIBRARY.read(self, node, "an included file")
-        return None if said is None else ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)
-
-    def connection(self, node: Node) -> ConnectionText | None:
-        return connection(self, node)
+def library_of(node: Node, problems: Problems) -> ModelText | None:
+    """What a file of composite classes says."""
+    said = LIBRARY.read(NodeReader(problems), node, "an included file")
+    return None if said is None else ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)

@@ -269,8 +269,7 @@ class _Builder:
         if isinstance(event, ScalarEvent):
             node = self._scalar(event)
             self._count(1, node.position)
-            self._name_anchor(event.anchor, node, 1, 0)
-            self._add(node, 1, 0)
+            self._add(node, 1, 0, event.anchor)
         elif isinstance(event, CollectionStartEvent):
             self._open(event)
         elif isinstance(event, CollectionEndEvent):
@@ -282,8 +281,10 @@ class _Builder:
 
     # --- nodes
 
-    def _add(self, node: Node, weight: int, height: int) -> None:
+    def _add(self, node: Node, weight: int, height: int, anchor: str | None = None) -> None:
         """Hang a finished node into the list or mapping that is open."""
+        if anchor is not None:
+            self._anchors[anchor] = (node, weight, height)
         if not self._stack:
             self._root = node
             return
@@ -322,8 +323,7 @@ class _Builder:
             node = Mapping(frame.entries, position)
         else:
             node = Sequence(tuple(frame.items), position)
-        self._name_anchor(frame.event.anchor, node, frame.weight, frame.height)
-        self._add(node, frame.weight, frame.height)
+        self._add(node, frame.weight, frame.height, frame.event.anchor)
 
     def _alias(self, event: AliasEvent) -> None:
         position = self._span(event)
@@ -389,10 +389,6 @@ class _Builder:
         else:
             return key
         return None
-
-    def _name_anchor(self, anchor: str | None, node: Node, weight: int, height: int) -> None:
-        if anchor is not None:
-            self._anchors[anchor] = (node, weight, height)
 
     # --- positions
 

@@ -7,7 +7,7 @@ segments.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, KeysView, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
 
 from epicycle.actors import did_you_mean
@@ -222,10 +222,6 @@ class PathIndex:
             return ("there is no port that would do",)
         more = ", ..." if len(holders) > MAX_SHOWN else ""
         return (f"there are such ports at {', '.join(holders[:MAX_SHOWN])}{more}",)
-
-    @property
-    def paths(self) -> KeysView[str]:
-        return self._place.keys()
 
     def spend(self, number: int) -> None:
         """Count paths that are gone through for another reason; raises ``TooManyError`` if there are too many."""

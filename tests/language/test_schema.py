@@ -27,7 +27,6 @@ from epicycle.runner.build.connect import BadIndexError
 from epicycle.runner.build.connect import indices_of as resolve
 from epicycle.runner.catalogue import Catalogue, built_in, figure_types, model_folders, packaged_models
 from epicycle.runner.language import (
-    DeclarationReader,
     dimensions,
     disturbance,
     json_schema,
@@ -41,7 +40,7 @@ from epicycle.runner.language.fields import schema_of as value_schema
 from epicycle.runner.language.models import BESIDE
 from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
 from epicycle.runner.show.report import study_figure_types
-from epicycle.runner.text import PatternError, Problems, compile_pattern, parse, plain
+from epicycle.runner.text import NodeReader, PatternError, Problems, compile_pattern, parse, plain
 from tests.bad_models.test_bad_models import CASES
 from tests.cases import Case
 from tests.model.model_parts import TYPES
@@ -248,8 +247,8 @@ ARROWS = st.sampled_from([" -> ", "=>", ", "])
 @given(st.lists(st.one_of(ENDS, ENDS, ARROWS), max_size=7).map("".join))
 def test_connections_are_those_that_can_be_read(text: str) -> None:
     node = parse(f"connection: {text!r}", "m.yaml", Problems())
-    reader = DeclarationReader(problems := Problems())
-    connection = reader.connection(node.entries["connection"].value)  # type: ignore[union-attr]
+    reader = NodeReader(problems := Problems())
+    connection = places.connection(reader, node.entries["connection"].value)  # type: ignore[union-attr]
     ports = [*connection.sources, *connection.destinations] if connection is not None else []
     is_good = connection is not None and not len(problems) and all(is_endpoint(port.text) for port in ports)
     assert bool(re.search(CONNECTION_TEXT, text)) == is_good, text
