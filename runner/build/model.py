@@ -13,7 +13,7 @@ from ..graph import Metric, ModelGraph, Watched, WovenAspect, check_processors, 
 from ..language import Values
 from ..shown import short
 from ..tables import Table, as_html, as_text
-from ..text import NAME, Position, Problem, Problems, Text, call_site, within
+from ..text import NAME, NAMES_HAVE, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
@@ -142,7 +142,7 @@ class Model(Scope):
         position = call_site()
         problems = Problems()
         if not NAME.match(name):
-            problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+            problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
         if any(metric.name == name for metric in self.metrics):
             problems.add(f"there is a metric {name!r} already", position, "give this another name")
         if problem := take_problem(name, take):

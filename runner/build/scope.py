@@ -17,7 +17,7 @@ from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, 
 
 from ..graph import ModelGraph, WovenAspect
 from ..language import Values
-from ..text import NAME, Position, Problems, call_site, did_you_mean
+from ..text import NAME, NAMES_HAVE, Position, Problems, call_site, did_you_mean
 from .composite_aspect import ModelWeaving, check_nesting
 from .composite_class import CompositeInstance
 from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
@@ -336,7 +336,7 @@ class Scope:
         full = self._full(name)
         with raising() as problems:
             if not NAME.match(name):
-                problems.add(f"{name!r} is not a name", position, "use letters, digits and _, no digit first")
+                problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
             if any(woven.name == full for woven in self._model.aspects):
                 problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
             check_aspect(aspect, (Aspect, Composite, CompositeInstance), position, problems)

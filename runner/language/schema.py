@@ -101,21 +101,21 @@ def json_schema(
         "director": DIRECTOR.schema,
         "composite": composite_schema(),
         "port_declaration": PORT.schema,
-        "changed_actor": _changed("actor", RESERVED["actor"]),
-        "changed_aspect": _changed("aspect", RESERVED["aspect"]),
-        "actor": _typed(types["actor"], "actor", RESERVED["actor"], open_to=_OTHER_TYPE),
-        "aspect": _typed(types["aspect"], "aspect", RESERVED["aspect"], ("type", "at"), open_to=_OTHER_TYPE),
-        "added_aspect": _typed(types["aspect"], "aspect", RESERVED["aspect"], open_to=_OTHER_TYPE),
-        "figure": _typed(figures, "figure", RESERVED["figure"]),
-        "study_figure": _typed(study_figures, "study_figure", RESERVED["figure"]),
+        "changed_actor": _changed("actor"),
+        "changed_aspect": _changed("aspect"),
+        "actor": _typed(types["actor"], "actor", open_to=_OTHER_TYPE),
+        "aspect": _typed(types["aspect"], "aspect", ("type", "at"), open_to=_OTHER_TYPE),
+        "added_aspect": _typed(types["aspect"], "aspect", open_to=_OTHER_TYPE),
+        "figure": _typed(figures, "figure"),
+        "study_figure": _typed(study_figures, "study_figure"),
     }
     for kind, known in types.items():
         for name, cls in known.items():
-            definitions[f"{kind}.{name}"] = _type(name, cls, RESERVED[kind.removeprefix("study_")])
+            definitions[f"{kind}.{name}"] = _type(name, cls, kind)
     for base, variants in parts.items():
         definitions[part_name(base)] = _part(base, variants)
         for name, cls in variants.items():
-            definitions[f"{part_name(base)}.{name}"] = _type(name, cls, RESERVED["figure"])
+            definitions[f"{part_name(base)}.{name}"] = _type(name, cls, "figure")
     model_only = [key for key in MODEL.keys if key not in LIBRARY.keys]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -142,13 +142,17 @@ def schema_text(schema: Schema) -> str:
     return json.dumps(schema, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _changed(kind: str, reserved: frozenset[str]) -> Schema:
+def _beside(kind: str) -> Schema:
+    """What stands beside the parameters of an actor, aspect or figure."""
+    return {key: BESIDE[key].schema for key in sorted(RESERVED[kind.removeprefix("study_")] - {"type"})}
+
+
+def _changed(kind: str) -> Schema:
     """What may stand for an actor or aspect in a class that extends another."""
-    beside = {key: BESIDE[key].schema for key in sorted(reserved - {"type"})}
     return {
         "type": ["object", "null"],
         "description": f"A new {kind}, what is to change of an inherited one, or null to do without it.",
-        "properties": {"type": {"type": "string"}, **beside},
+        "properties": {"type": {"type": "string"}, **_beside(kind)},
     }
 
 
@@ -164,22 +168,17 @@ def _by_type(types: Mapping[str, type], prefix: str) -> list[Schema]:
     ]
 
 
-def _typed(
-    types: Mapping[str, type],
-    kind: str,
-    reserved: frozenset[str],
-    required: tuple[str, ...] = ("type",),
-    *,
-    open_to: str = "",
-) -> Schema:
+def _typed(types: Mapping[str, type], kind: str, required: tuple[str, ...] = ("type",), *, open_to: str = "") -> Schema:
     """A mapping with a type; types other than the known ones (composites) fit the pattern ``open_to``."""
     choice = _choice(types)
     if open_to:
         choice = {"anyOf": [choice, {"type": "string", "pattern": open_to}]}
-    beside = {key: BESIDE[key].schema for key in sorted(reserved - {"type"})}
     return {
         "type": "object",
-        "properties": {"type": {**choice, "description": f"The type of the {kind.replace('_', ' ')}."}, **beside},
+        "properties": {
+            "type": {**choice, "description": f"The type of the {kind.replace('_', ' ')}."},
+            **_beside(kind),
+        },
         "required": list(required),
         "allOf": _by_type(types, kind),
     }
@@ -197,14 +196,14 @@ def _part(base: type, known: Mapping[str, type]) -> Schema:
     }
 
 
-def _type(name: str, cls: type, reserved: frozenset[str]) -> Schema:
+def _type(name: str, cls: type, kind: str) -> Schema:
     """What may and must be given for one type."""
     declared = declared_parameters(cls)
     return {
         "description": doc_of(cls),
         "properties": {
             "type": {"const": name},
-            **dict.fromkeys(sorted(reserved - {"type"}), True),  # whose rules stand where the type does
+            **dict.fromkeys(_beside(kind), True),  # whose rules stand where the type does
             **{key: {**schema_of(parameter), "description": about(parameter)} for key, parameter in declared.items()},
         },
         "required": [key for key, parameter in declared.items() if parameter.required],
