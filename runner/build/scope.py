@@ -67,7 +67,7 @@ class _Children(Mapping[str, Child]):
 
 
 class Building(Protocol):
-    """A model in the making: what scopes read of it, and how they change it once they know what is right."""
+    """A ``Model`` in the making: what scopes read of it, and how they change it once they know what is right."""
 
     name: str
     draft: Draft
@@ -75,23 +75,12 @@ class Building(Protocol):
     parameters: dict[str, object]
 
     @property
-    def graph(self) -> ModelGraph:
-        """All actors, composites, ports and connections."""
-
-    def edit(self) -> Draft:
-        """The draft, which is then changed."""
-
-    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect]) -> None:
-        """Go on with a draft that came of the present one, with further aspects."""
-
-    def enlist(self, aspects: Iterable[WovenAspect]) -> None:
-        """These aspects stand in it from now on."""
-
-    def forget(self, path: str) -> None:
-        """Take out an actor or composite, and whatever stands at it or watches it."""
-
-    def scope(self, path: str) -> Composite:
-        """The composite at a path."""
+    def graph(self) -> ModelGraph: ...
+    def edit(self) -> Draft: ...
+    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect]) -> None: ...
+    def enlist(self, aspects: Iterable[WovenAspect]) -> None: ...
+    def forget(self, path: str) -> None: ...
+    def scope(self, path: str) -> Composite: ...
 
 
 class Scope:
