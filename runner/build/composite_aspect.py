@@ -160,12 +160,9 @@ class ModelWeaving(Weaving):
             node = self.graph.ports.nodes[port]
             wanted = node.get("type")
             if wanted is not None and not accepts(wanted, Request):
-                self._problem(
-                    f"{port.rpartition('.')[2]} of {self.kind} is for {type_name(wanted)}, but through an "
-                    "aspect go requests",
-                    node.get("declared"),
-                    "leave out its type: the actors inside get requests, which hold the tokens",
-                )
+                what = f"{port.rpartition('.')[2]} of {self.kind} is for {type_name(wanted)}"
+                hint = "leave out its type: the actors inside get requests, which hold the tokens"
+                self._problem(f"{what}, but through an aspect go requests", node.get("declared"), hint)
 
     def _check_directors(self, woven: WovenAspect) -> None:
         """Whether all places stand under the composite's own director, which has one order and one time for them."""
@@ -177,14 +174,11 @@ class ModelWeaving(Weaving):
             found[_place(source, destination)] = graph.director_over(hop)
         for place, director in found.items():
             if director != own:
-                self._problem(
-                    f"{place} is {'inside' if director else 'outside'} of {director or own}, which has a director of "
-                    "its own",
-                    self.position,
-                    f"declare it inside of {director}, or let it stand at the ports of {director}"
-                    if director
-                    else f"declare it outside of {own}",
-                )
+                where, hint = f"outside of {own}", f"declare it outside of {own}"
+                if director:
+                    where = f"inside of {director}"
+                    hint = f"declare it inside of {director}, or let it stand at the ports of {director}"
+                self._problem(f"{place} is {where}, which has a director of its own", self.position, hint)
                 self._is_misplaced = True
                 return
 

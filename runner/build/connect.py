@@ -205,9 +205,9 @@ class Wiring:
                 return Links(links, False)
             if in_pairs and len(source.ports) != len(target.ports):
                 is_whole = False
+                one, other = self._label(source.text), self._label(target.text)
                 self._problem(
-                    f"{self._label(source.text)} stands for {_ports(source)}, {self._label(target.text)} for "
-                    f"{_ports(target)}",
+                    f"{one} stands for {_ports(source)}, {other} for {_ports(target)}",
                     target.text,
                     "with several on both sides, '->' connects the first to the first and so on, so both need as many",
                     "to connect all to all, write '=>'",

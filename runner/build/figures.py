@@ -53,12 +53,9 @@ def made_figure(
     type_name, values, written = declared
     cls, before = known.get(type_name), len(problems)
     if cls is None:
-        problems.add(
-            f"figure {name}: there is no figure {'of a study of type' if of_study else 'type'} {type_name!r}"
-            f"{did_you_mean(type_name, list(known))}",
-            written.position,
-            f"valid types: {', '.join(sorted(known))}",
-        )
+        kind = f"figure {'of a study of type' if of_study else 'type'} {type_name!r}"
+        message = f"figure {name}: there is no {kind}{did_you_mean(type_name, list(known))}"
+        problems.add(message, written.position, f"valid types: {', '.join(sorted(known))}")
         return None
     parameters, owner = declared_parameters(cls), "" if of_study else f"{cls.__name__}."
     for key, value in values.items():

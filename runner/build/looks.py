@@ -111,12 +111,9 @@ class Looks(View):
             if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
                 names = [each.name for each in dataclasses.fields(source.type)]
                 if fields[0] not in names:
-                    self._problem(
-                        f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}"
-                        f"{did_you_mean(fields[0], names)}",
-                        position,
-                        f"its fields: {', '.join(names)}",
-                    )
+                    near = did_you_mean(fields[0], names)
+                    message = f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}{near}"
+                    self._problem(message, position, f"its fields: {', '.join(names)}")
                     return False
         return True
 
@@ -142,8 +139,6 @@ def without_port(keys: tuple[str, ...], times: FiringTime, actors: Iterable[str]
     inputs = dict.fromkeys(port for path in actors for port in graph.actors[path].inputs)
     for port in times if isinstance(times, Mapping) and inputs else ():
         if port not in inputs:
-            yield (
-                f"{': '.join(keys)}: no actor that this is for has an input {port!r}{did_you_mean(port, inputs)}",
-                (*keys, port),
-                f"their inputs: {', '.join(inputs)}",
-            )
+            near = did_you_mean(port, inputs)
+            message = f"{': '.join(keys)}: no actor that this is for has an input {port!r}{near}"
+            yield message, (*keys, port), f"their inputs: {', '.join(inputs)}"

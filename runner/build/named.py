@@ -39,8 +39,7 @@ class Holder(Protocol):
 
     path: str
 
-    def remove(self, name: str) -> None:
-        """Take out a part."""
+    def remove(self, name: str) -> None: ...
 
 
 @contextmanager
@@ -152,10 +151,8 @@ class Named:
         if scope == self._scope:
             return path[len(self._start) :]
         there = f"in {scope}" if scope else "at the top of the model"
-        self._tell(
-            f"{path} cannot be connected in {inside}",
-            f"connect it {there}, where {owner} is; ports of composites lead in and out",
-        )
+        hint = f"connect it {there}, where {owner} is; ports of composites lead in and out"
+        self._tell(f"{path} cannot be connected in {inside}", hint)
         return None
 
     def _place(self, place: object, cls: type[Aspect]) -> str | None:

@@ -112,11 +112,8 @@ class Scope:
         """
         position = call_site()
         if isinstance(part, Actor) and part.is_part:
-            raise mistake(
-                f"{part.path} is part of a model already, and an actor belongs to one model",
-                position,
-                f"make another one: {type(part).__name__}(...)",
-            )
+            message = f"{part.path} is part of a model already, and an actor belongs to one model"
+            raise mistake(message, position, f"make another one: {type(part).__name__}(...)")
         with raising() as problems:
             full = self._free(part.path, position, problems)
         made, aspects = self._made(part, full, position)
@@ -208,12 +205,9 @@ class Scope:
         match = _INSTANCE.match(name)
         full = self._full(name)
         if match is None:
-            problems.add(
-                f"{name!r} is not a name",
-                position,
-                "use letters, digits and _, no digit first; an element of an array is called 'name[0]'",
-                *(("what is inside of a composite is added to the composite",) if "." in name else ()),
-            )
+            hint = f"{NAMES_HAVE}; an element of an array is called 'name[0]'"
+            inside = ("what is inside of a composite is added to the composite",) if "." in name else ()
+            problems.add(f"{name!r} is not a name", position, hint, *inside)
             return full
         base, index = match.groups()
         graph = self._model.graph
@@ -289,10 +283,8 @@ class Scope:
         for link in links.found:
             source, target = (graph.ports.nodes[path]["port"] for path in (link.source, link.destination))
             if source is not None and target is not None and not accepts(target.type, source.type):
-                problems.add(
-                    f"{source.path} sends {type_name(source.type)}, but {target.path} takes {type_name(target.type)}",
-                    link.position,
-                )
+                taken = f"{target.path} takes {type_name(target.type)}"
+                problems.add(f"{source.path} sends {type_name(source.type)}, but {taken}", link.position)
             if target is None or target.multi:
                 continue
             before = next(iter(graph.incoming(link.destination)), None) or new.get(link.destination)
@@ -364,11 +356,8 @@ class Scope:
         full, model = self._full(name), self._model
         known = [woven.name for woven in model.aspects]
         if full not in known:
-            raise mistake(
-                f"the model has no aspect {full!r}{did_you_mean(full, known)}",
-                call_site(),
-                f"its aspects: {', '.join(known) or 'none'}",
-            )
+            hint = f"its aspects: {', '.join(known) or 'none'}"
+            raise mistake(f"the model has no aspect {full!r}{did_you_mean(full, known)}", call_site(), hint)
         woven = model.aspects[known.index(full)]
         if woven.model is not None:  # its composite is of no use without it
             model.forget(woven.model.path)

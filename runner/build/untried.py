@@ -48,12 +48,9 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
         names = (
             f"{untried[0]} is" if len(untried) == 1 else f"{untried[0]} and {counted(len(untried) - 1, 'other')} are"
         )
-        problems.warn(
-            f"{names} not checked in full: the model has no instance of such a class, and to try all that it has none "
-            f"of takes more than {most:,} actors and composites",
-            known.composites[untried[0]].position,
-            RAISE_IT,
-        )
+        why = f"to try all that it has none of takes more than {most:,} actors and composites"
+        message = f"{names} not checked in full: the model has no instance of such a class, and {why}"
+        problems.warn(message, known.composites[untried[0]].position, RAISE_IT)
 
 
 def _try(composite: CompositeText, made: Unfolding) -> bool:

@@ -86,11 +86,9 @@ class Weaving(View):
             return []
         fitting = [port for port in found if self._fits(port)]
         if found and not fitting:
-            self._problem(
-                f"{self.kind} stands at {' or '.join(sorted(self.cls.stands_at))} ports, "
-                f"but {found[0]} is an {self.graph.direction(found[0])} port",
-                pointcut,
-            )
+            where = " or ".join(sorted(self.cls.stands_at))
+            other = f"{found[0]} is an {self.graph.direction(found[0])} port"
+            self._problem(f"{self.kind} stands at {where} ports, but {other}", pointcut)
         return fitting
 
     def _stands_at_parameters(self, pointcut: PointcutText) -> bool:
@@ -183,11 +181,9 @@ class Weaving(View):
         found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
         if not found:
             names = sorted({path.rpartition(".")[2] for path in ports})
-            self._problem(
-                f"no {_asked(pointcut)} has a port {pointcut.port.text!r}{did_you_mean(pointcut.port.text, names)}",
-                pointcut.port,
-                f"their ports: {', '.join(names) or 'none'}",
-            )
+            near = did_you_mean(pointcut.port.text, names)
+            message = f"no {_asked(pointcut)} has a port {pointcut.port.text!r}{near}"
+            self._problem(message, pointcut.port, f"their ports: {', '.join(names) or 'none'}")
             return None
         return found
 
@@ -306,11 +302,8 @@ class Weaving(View):
             return []
         if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
             known = [f"{hop.source} -> {hop.destination}" for *_, hop in self.graph.ports.edges(data="hop")]
-            self._problem(
-                f"{pointcut.text!r} matches no connection"
-                f"{did_you_mean(f'{self._full(left)} -> {self._full(right)}', known)}",
-                pointcut,
-            )
+            near = did_you_mean(f"{self._full(left)} -> {self._full(right)}", known)
+            self._problem(f"{pointcut.text!r} matches no connection{near}", pointcut)
         return found
 
     def _excuses(self, pattern: str) -> bool:

@@ -286,11 +286,8 @@ class DimensionReader(NodeReader):
             self.problems.add(f"the range of {name!r}: {error}", at)
             return None
         if not is_distinct:
-            self.problems.add(
-                f"the range of {name!r} has values that cannot be told apart as floats: "
-                f"from {start} to {end} in steps of {step}",
-                at,
-            )
+            reach = f"from {start} to {end} in steps of {step}"
+            self.problems.add(f"the range of {name!r} has values that cannot be told apart as floats: {reach}", at)
             return None
         return found
 
@@ -386,33 +383,15 @@ DIMENSIONS = Shape(
 
 def dimension_schema() -> Schema:
     """What editors know of one of the forms in which a study says what values something takes."""
-    some = {"type": "object", "minProperties": 1}
-    forms = (
-        (
-            "zip",
-            {**some, "additionalProperties": {"type": "array", "minItems": 1}},
-            "Parameters that go together: 'path: [value, ...]', all of one length.",
-        ),
-        (
-            "cases",
-            {**some, "additionalProperties": {"type": ["object", "null"]}},
-            "Named sets of values: 'name: {path: value}'.",
-        ),
-        ("latin_hypercube", HYPERCUBE.schema, "Points that fill a box evenly."),
-    )
+    lists: Schema = {"type": "object", "minProperties": 1, "additionalProperties": {"type": "array", "minItems": 1}}
+    sets: Schema = {**lists, "additionalProperties": {"type": ["object", "null"]}}
+    forms = {
+        "zip": Key(node_as(lists), "Parameters that go together: 'path: [value, ...]', all of one length."),
+        "cases": Key(node_as(sets), "Named sets of values: 'name: {path: value}'."),
+        "latin_hypercube": Key(node_as(HYPERCUBE.schema), "Points that fill a box evenly."),
+    }
+    single = (Construct("", {key: each}, type="object", required=[key]).schema for key, each in forms.items())
     return {
         "description": "The values of a parameter, or of several that go together.",
-        "anyOf": [
-            {"type": "array", "minItems": 1},
-            RANGE.schema,
-            *(
-                {
-                    "type": "object",
-                    "properties": {key: {**schema, "description": description}},
-                    "required": [key],
-                    "additionalProperties": False,
-                }
-                for key, schema, description in forms
-            ),
-        ],
+        "anyOf": [{"type": "array", "minItems": 1}, RANGE.schema, *single],
     }
