@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,9 @@ from ..text import (
     data_file,
     describe,
     did_you_mean,
+    in_general,
     nearest,
+    node_of,
     raised_at,
 )
 from .draft import Draft
@@ -54,6 +57,7 @@ class Settler:
         self.problems = problems
         self.values = values or Values(problems)
         self._settable: dict[str, None] = {}
+        self._wrong: set[tuple[Position, str]] = set()  # settings that are wrong for a parameter, in all of an array
 
     def parameters(
         self,
@@ -73,17 +77,19 @@ class Settler:
         later: Collection[str]
         for name, declared in valid.items():
             full = f"{path}.{name}" if path else name
-            node, known, later = declared.value, names, valid.keys()
+            node, known, later, scope = declared.value, names, valid.keys(), path
             if name in given:
                 node, known, later = given[name].value, outer, ()
             if (setting := self._setting(full)) is not None:
-                node, known, later = setting.node, self.values.outside, ()
+                node, known, later, scope = setting.node, self.values.outside, (), ""
             if node is None:
                 self._tell_missing(kind if path else label, name, declared.doc, position or declared.position, path)
                 names[name] = self.values.missing
             else:
-                value = self.values.of(node, known, full, path, later)
-                names[name] = self.values.declared(full, declared, value, node.position, path)
+                value = self.values.of(node, known, full, scope, later)
+                names[name] = self.values.declared(full, declared, value, node.position, scope)
+                if setting is not None and names[name] is self.values.missing:
+                    self._wrong.add((setting.position, in_general(full)))
         return names
 
     def _as_meant(
@@ -103,10 +109,13 @@ class Settler:
         self.problems.add(f"{who} needs a value for {name!r}", position, *hints, scope=path)
 
     def _setting(self, full: str) -> Setting | None:
-        """The setting for a parameter, if there is one."""
+        """The setting for a parameter, if there is one; what is wrong with it is told for one instance of an array."""
         self._settable[full] = None
         try:
-            return self.settings.find(full)
+            found = self.settings.find(full)
+            if found is not None and (found.position, in_general(full)) in self._wrong:
+                return replace(found, node=node_of(self.values.missing, found.position))
+            return found
         except TooManyError as error:
             self.problems.stop(f"{full}: {error}", self.settings.position, RAISE_IT)
 
@@ -134,28 +143,31 @@ class Settler:
         declared = declared_parameters(cls)
         before, complete = len(self.problems), True
         result: dict[str, object] = {}
+        outside: dict[str, Position] = {}  # what is set from there
         given = self._as_meant(given, declared, path, lambda key: f"{label}: {unknown_parameter(cls, key)}")
         for name, parameter in declared.items():
-            node, known = given[name].value if name in given else None, names
+            node, known, scope = given[name].value if name in given else None, names, path
             if (setting := self._setting(f"{path}.{name}")) is not None:
-                node, known = setting.node, self.values.outside
+                node, known, scope = setting.node, self.values.outside, ""
+                outside[name] = setting.position
             if node is None:
                 if parameter.required:
                     self._tell_missing(f"{label}: {cls.__name__}", name, parameter.doc, position, path)
                 continue
-            value = self.values.of(node, known, f"{label}.{name}", path)
+            value = self.values.of(node, known, f"{label}.{name}", scope)
             if value is self.values.missing:
                 complete = False
                 continue
             try:
-                result[name] = parameter.convert(value)
-                if parameter.type is Path and result[name] is not None:
-                    result[name] = data_file(Path(value), node.position)
+                found = parameter.convert(value)
+                is_file = parameter.type is Path and found is not None
+                result[name] = data_file(Path(value), node.position) if is_file else found
             except ParameterError as error:
                 place = place_of(node, error.keys, of_key=error.of_key)
-                self.problems.add(f"{label}.{name}: {error}", place, scope=path)
+                self.problems.add(f"{label}.{name}: {error}", place, scope=scope)
             except Exception as error:  # of a class of a user's
-                self.blame(f"{label}.{name}", error, node.position, path)
+                self.blame(f"{label}.{name}", error, node.position, scope)
+        self._wrong |= {(at, in_general(f"{path}.{name}")) for name, at in outside.items() if name not in result}
         return result if complete and len(self.problems) == before else None
 
     def is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
