@@ -162,7 +162,7 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     for said in _about_others(results):
         complain(said)
     tell(f"wrote {outcome.table}")
-    if outcome.is_good:
+    if not outcome.failed:
         return DONE
     failures = results.failures()
     for row in failures[:SHOWN]:
@@ -260,14 +260,14 @@ def replay(options: argparse.Namespace) -> int:
     row = open_study(options.folder).find(options.run_key)
     plan = plan_of_folder(options.folder)
     folder = options.out or options.folder / "replays" / row["run"][:12]
-    model, results, simulation, error = again(plan, plan.condition(row["condition"]), row["seed"])
+    model, results, error = again(plan, plan.condition(row["condition"]), row["seed"])
     errors = [] if error is None else [error]
     figures = {} if errors else figures_of(model, Problems())
     if replaced := check_folder(folder, model.name, options.given):
         complain(replaced)
     written = write_folder(folder, results, options.given, "".join(map(str, errors)))
     written.append(folder / "log.parquet")
-    write_log(simulation.log.records, written[-1])
+    write_log(results.log.records, written[-1])
     drawn, failed = draw_figures(folder, results, figures)
     console().print(summary_table(model, results))
     for path in [*drawn, *written]:

@@ -9,8 +9,8 @@ from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
 
 from ...language import Factor, Selection, Study
-from ..plan import index_of
-from ..run import OK
+from ..plan.plan import index_of
+from ..run.backlog import OK
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -17,8 +17,10 @@ from ...language import Factor
 from ...tables import pandas_module
 from ...text import did_you_mean
 from ..inference import LEVEL, holm, mean, paired_difference
-from ..plan import Plan
-from ..run import BEST_FIRST, OK, Store, StoreError, replace_file
+from ..plan.plan import Plan
+from ..run.backlog import OK
+from ..run.manifest import StoreError
+from ..run.store import BEST_FIRST, Store, replace_file
 from .claims import Judgement, Standing, judge, ranked
 from .guideline import Recommendation, recommend
 from .samples import Samples

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..inference import half_width
-from ..plan import Condition, Plan
+from ..plan.plan import Condition, Plan
 
 OK, FAILED, TIMEOUT, KILLED = "ok", "failed", "timeout", "killed"
 RETRIED = (TIMEOUT, KILLED)  # what hangs on the machine, not on the model alone
