@@ -69,24 +69,14 @@ def recommend(samples: Samples, level: float = LEVEL) -> list[Recommendation]:
     if guideline is None:
         return []
     (home,) = samples.homes([guideline.choose])
-    choices = samples.choices({})
-    found = []
-    for rest in samples.places(choices, [home]):
-        places = [(*rest[:home], index, *rest[home + 1 :]) for index in choices[home]]
-        where = samples.values(rest, [each for each in range(len(rest)) if each != home])
-        levels = [samples.level(home, index, guideline.choose) for index in choices[home]]
-        found.append(_recommended(guideline, where, levels, places, samples, level))
-    return found
+    rests = samples.places(samples.choices({}), [home])
+    return [_recommended(guideline, home, rest, samples, level) for rest in rests]
 
 
-def _recommended(
-    guideline: Guideline,
-    where: Levels,
-    levels: list[Factor],
-    places: list[Place],
-    samples: Samples,
-    level: float,
-) -> Recommendation:
+def _recommended(guideline: Guideline, home: int, rest: Place, samples: Samples, level: float) -> Recommendation:
+    indices = range(samples.dimensions[home].size)
+    levels = [samples.level(home, index, guideline.choose) for index in indices]
+    places = [(*rest[:home], index, *rest[home + 1 :]) for index in indices]
     sign = -1.0 if guideline.greatest else 1.0
     metric = guideline.metric.text
     numbers = [samples.numbers(place, metric) for place in places]
@@ -118,7 +108,7 @@ def _recommended(
         if option.is_not_worse or (option.is_fit and option.behind.value <= guideline.tolerance)
     ]
     return Recommendation(
-        where,
+        samples.values(rest, [each for each in range(len(rest)) if each != home]),
         guideline.choose,
         metric,
         None if best is None else levels[best],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache, cached_property
 from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
@@ -40,7 +40,11 @@ class Samples:
 
     def choices(self, where: Selection) -> list[list[int]]:
         """The levels of each dimension that a selection allows."""
-        return [[index for index, values in enumerate(levels) if _fits(values, where)] for levels in self._levels]
+
+        def fits(values: Levels) -> bool:
+            return all(values[factor] in levels for factor, levels in where.items() if factor in values)
+
+        return [[index for index, values in enumerate(levels) if fits(values)] for levels in self._levels]
 
     def homes(self, factors: Iterable[str]) -> list[int]:
         """The dimensions by which factors are varied, in the order of the study."""
@@ -95,9 +99,13 @@ class Samples:
     def rows(self, place: Place, metrics: Iterable[str]) -> list[dict[str, float | None] | None]:
         """The metrics of each run that is over, None for what is no number; None for a run that failed."""
         columns = {name: self._column(name) for name in metrics}
-        rows = self._at(place).values()
+
+        def number(value: float | None) -> float | None:
+            return None if value is None or math.isnan(value) else value
+
         return [
-            None if row is None else {name: _number(column[row]) for name, column in columns.items()} for row in rows
+            None if row is None else {name: number(column[row]) for name, column in columns.items()}
+            for row in self._at(place).values()
         ]
 
     def _at(self, place: Place) -> dict[int, int | None]:
@@ -107,11 +115,3 @@ class Samples:
 def has_enough(count: int, missing: int) -> bool:
     """Whether so few numbers are missing that their mean says something."""
     return count > 1 and missing <= MISSING * (count + missing)
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or math.isnan(value) else value
-
-
-def _fits(values: Mapping[str, Factor], where: Selection) -> bool:
-    return all(values[factor] in levels for factor, levels in where.items() if factor in values)
