@@ -219,20 +219,19 @@ class Cluster:
         for task, (what, told) in zip(batch, outcomes, strict=True):
             if what == DONE:
                 told, why_not = told
-                self._check(task, why_not)
+                if why_not is not None and self._is_right_here(task):
+                    raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
                 self._seconds += 0.2 * (told["wall_time"] - self._seconds)
             self._keeper.settle(task, (what, told))
 
-    def _check(self, task: Task, why_not: str | None) -> None:
-        """A model that cannot be loaded there must not be loaded here, either."""
-        if why_not is None:
-            return
+    def _is_right_here(self, task: Task) -> bool:
+        """Whether the model of a run can be loaded on this machine."""
         plan = self._backlog.plan
         try:
             plan.load(plan.condition(task.condition))
         except EpicycleError:
-            return
-        raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
+            return False
+        return True
 
 
 def _name(function: Callable[..., object]) -> str:
