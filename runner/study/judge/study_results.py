@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 from collections import Counter
 from dataclasses import asdict
@@ -20,7 +19,7 @@ from ..inference import LEVEL, holm, mean, paired_difference
 from ..plan.plan import Plan
 from ..run.backlog import OK
 from ..run.manifest import StoreError
-from ..run.store import BEST_FIRST, Store, replace_file
+from ..run.store import BEST_FIRST, Store, parquet_of, replace_file
 from .claims import Judgement, Standing, judge, ranked
 from .guideline import Recommendation, recommend
 from .samples import Samples
@@ -250,10 +249,7 @@ class StudyResults:
 
     def write_table(self) -> Path:
         """Write ``table.parquet``."""
-        import pyarrow.parquet as pq
-
-        table = self.table()
-        replace_file(self.path, lambda aside: pq.write_table(table, aside))
+        replace_file(self.path, parquet_of(self.table()))
         return self.path
 
     def is_written(self) -> bool:
@@ -261,14 +257,14 @@ class StudyResults:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        buffer = io.BytesIO()
-        pq.write_table(self.table(), buffer)
+        table = self.table()
+        ours = parquet_of(table)
         try:
-            if (data := read_regular(self.path)) == buffer.getvalue():
+            if (data := read_regular(self.path)) == ours:
                 return True
             file = pq.ParquetFile(pa.BufferReader(data))
-            is_of_another = file.metadata.created_by != pq.read_metadata(buffer).created_by
-            return is_of_another and bool(file.read().equals(self.table()))
+            is_of_another = file.metadata.created_by != pq.read_metadata(pa.BufferReader(ours)).created_by
+            return is_of_another and bool(file.read().equals(table))
         except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it that is no UTF-8
             return False
 
