@@ -135,14 +135,9 @@ def outlook(elapsed: float, now: float, end: float) -> str:
 @contextmanager
 def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None]]:
     """A bar on a terminal's standard error, and notices of what takes long."""
-    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeElapsedColumn
-    from rich.text import Text
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    class ModelTime(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            now = f"{task.completed:.1f}" if task.completed >= 1.0 else f"{task.completed:.3g}"
-            return Text(f"{task.description} {now} s of model time")
-
+    end = until if until is not None else model.stop
     latest = -math.inf
 
     def look(now: float) -> None:
@@ -150,28 +145,23 @@ def progress(model: Model, until: float | None) -> Iterator[Callable[[float], No
         if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing of the run
             watch.start()
         latest = now
+        bar.update(task, completed=now, now=f"{now:.1f}" if now >= 1.0 else f"{now:.3g}")
 
     def judge() -> None:
         if end is not None and (text := outlook(PATIENCE, latest, end)):
             complain(text)
 
-    end = until if until is not None else model.stop
     terminal = console(stderr=True)
+    about = TextColumn("{task.description} {task.fields[now]} s of model time", markup=False)
+    bar = Progress(
+        about, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True, disable=not terminal.is_terminal
+    )
     # One step of the run may take for ever, so it is looked at from outside.
     watch = threading.Timer(PATIENCE, judge)
     watch.daemon = True
     try:
-        with notices(terminal):
-            if not terminal.is_terminal:
-                yield look
-                return
-            with Progress(ModelTime(), BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
-                task = bar.add_task(model.name, total=end)
-
-                def show(now: float) -> None:
-                    look(now)
-                    bar.update(task, completed=now)
-
-                yield show
+        with notices(terminal), bar:
+            task = bar.add_task(model.name, total=end, now="0")
+            yield look
     finally:
         watch.cancel()

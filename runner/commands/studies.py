@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import re
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -289,13 +287,20 @@ def replay(options: argparse.Namespace) -> int:
 )
 def report(options: argparse.Namespace) -> int:
     """Write report.html, one file that holds all, and its figures; the study need not be finished."""
+    from rich.progress import Progress
+
     from ..show.report import write_report
     from ..study import available_cores, open_study
 
-    results = open_study(options.folder)
-    with _repeating() as told:
-        folder, jobs = options.out or options.folder, options.jobs or available_cores()
-        report = write_report(results, folder, jobs=jobs, tell=told)
+    results, terminal = open_study(options.folder), console(stderr=True)
+    folder, jobs = options.out or options.folder, options.jobs or available_cores()
+    with Progress(console=terminal, transient=True, disable=not terminal.is_terminal) as bar:
+        task = bar.add_task("repeating runs for their signals", total=None)
+
+        def tell_of(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        report = write_report(results, folder, jobs=jobs, tell=tell_of)
     for path in report.files:
         tell(f"wrote {path}")
     if report.verdicts:
@@ -303,16 +308,3 @@ def report(options: argparse.Namespace) -> int:
     for problem in report.problems:
         complain(f"error: {problem}")
     return FAILED if report.problems else DONE
-
-
-@contextmanager
-def _repeating() -> Iterator[Callable[[int, int], None]]:
-    """A bar on a terminal while runs are repeated."""
-    if not sys.stderr.isatty():
-        yield lambda done, total: None
-        return
-    from rich.progress import Progress
-
-    with Progress(console=console(stderr=True), transient=True) as bar:
-        task = bar.add_task("repeating runs for their signals", total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
