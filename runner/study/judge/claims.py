@@ -222,7 +222,7 @@ def _comparisons(claim: Claim, where: Selection, samples: Samples, level: float)
 
 def _contrasts(
     claim: Claim, where: Selection, samples: Samples
-) -> Iterator[tuple[dict[Place, float], tuple[Levels, Levels, Levels]]]:
+) -> Iterator[tuple[dict[int, float], tuple[Levels, Levels, Levels]]]:
     """What a claim compares, at every combination of the dimensions that it says nothing of.
 
     Each is a weighed sum of conditions, with the levels that these share, those of one side, and those of the other.
@@ -237,7 +237,7 @@ def _contrasts(
     for rest in samples.places(choices, homes):
         for this, that in pairs:
             weights = {
-                _with(rest, homes, (*levels, *inner)): sign * weight
+                samples.at(_with(rest, homes, (*levels, *inner))): sign * weight
                 for sign, levels in ((1.0, this), (-1.0, that))
                 for inner, weight in slope.items()
                 if weight
@@ -280,16 +280,16 @@ def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, floa
 
 def _finding(
     metric: str,
-    weights: dict[Place, float],
+    weights: dict[int, float],
     levels: tuple[Levels, Levels, Levels],
     samples: Samples,
     level: float,
 ) -> Finding:
     """The mean of a contrast over the replications in which all its conditions have a number."""
-    numbers = {place: samples.numbers(place, metric) for place in weights}
-    over = set.intersection(*(samples.over(place) for place in numbers))
+    numbers = {each: samples.numbers(each, metric) for each in weights}
+    over = set.intersection(*(set(samples.over(each)) for each in weights))
     pairs = sorted(set.intersection(*(set(each) for each in numbers.values())))
-    terms = [[weight * numbers[place][each] for place, weight in weights.items()] for each in pairs]
+    terms = [[weight * numbers[at][each] for at, weight in weights.items()] for each in pairs]
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
     found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
     bootstrap = bootstrap_mean(values, level, resamples=RESAMPLES)
@@ -318,7 +318,7 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float)
             return None
 
     for place in samples.places(samples.choices(where)):
-        answers = [is_true(row) for row in samples.rows(place, formula.names)]
+        answers = [is_true(row) for row in samples.rows(samples.at(place), formula.names)]
         holds, missing = answers.count(True), answers.count(None)
         found = rate(holds, len(answers) - missing, level)
         finding = Finding(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)

@@ -76,11 +76,11 @@ def recommend(samples: Samples, level: float = LEVEL) -> list[Recommendation]:
 def _recommended(guideline: Guideline, home: int, rest: Place, samples: Samples, level: float) -> Recommendation:
     indices = range(samples.dimensions[home].size)
     levels = [samples.level(home, index, guideline.choose) for index in indices]
-    places = [(*rest[:home], index, *rest[home + 1 :]) for index in indices]
+    conditions = [samples.at((*rest[:home], index, *rest[home + 1 :])) for index in indices]
     sign = -1.0 if guideline.greatest else 1.0
     metric = guideline.metric.text
-    numbers = [samples.numbers(place, metric) for place in places]
-    missing = [len(samples.over(place)) - len(each) for place, each in zip(places, numbers, strict=True)]
+    numbers = [samples.numbers(each, metric) for each in conditions]
+    missing = [len(samples.over(at)) - len(each) for at, each in zip(conditions, numbers, strict=True)]
     fit = [index for index, each in enumerate(numbers) if has_enough(len(each), missing[index])]
     means = [mean(list(each.values()), level) for each in numbers]
     best = min(fit, key=lambda index: sign * means[index].value, default=None)

@@ -155,7 +155,7 @@ class StudyResults:
         """The numbers of a metric by condition and replication; runs that are not ``ok`` or have none are left out."""
         self._check("metric", metric, self.metrics)
         samples = self._samples()
-        return {condition: samples.numbers_of(condition, metric) for condition in samples.runs()}
+        return {condition: samples.numbers(condition, metric) for condition in samples.runs}
 
     def means(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
         """A row for each condition: what was varied, the mean with its standard error and interval, how many runs.
@@ -167,10 +167,10 @@ class StudyResults:
         return [
             {
                 **self.plan.condition(condition).values,
-                **asdict(mean(list(samples.numbers_of(condition, metric).values()), level)),
-                "runs": runs,
+                **asdict(mean(list(samples.numbers(condition, metric).values()), level)),
+                "runs": len(runs),
             }
-            for condition, runs in samples.runs().items()
+            for condition, runs in samples.runs.items()
         ]
 
     def differences(self, metric: str, over: str, level: float = LEVEL) -> list[dict[str, Any]]:
