@@ -173,17 +173,15 @@ def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
     )
 
 
-def judge(samples: Samples, level: float = LEVEL) -> list[Judgement]:
+def judge(samples: Samples) -> list[Judgement]:
     """Judge all claims of a study, one after the other; those of another study at each level of what that has not."""
     questions = samples.study.questions
-    return [
-        _judged(claim, apart, samples, level) for apart in samples.levels(questions.apart) for claim in questions.claims
-    ]
+    return [_judged(claim, apart, samples) for apart in samples.levels(questions.apart) for claim in questions.claims]
 
 
-def _judged(claim: Claim, apart: Levels, samples: Samples, level: float) -> Judgement:
+def _judged(claim: Claim, apart: Levels, samples: Samples) -> Judgement:
     where: Selection = {**claim.where, **{factor: (value,) for factor, value in apart.items()}}
-    found = (_occurrences if claim.form == ALWAYS else _comparisons)(claim, where, samples, level)
+    found = (_occurrences if claim.form == ALWAYS else _comparisons)(claim, where, samples)
     findings = [
         replace(each, where={name: value for name, value in each.where.items() if name not in apart}) for each in found
     ]
@@ -192,9 +190,8 @@ def _judged(claim: Claim, apart: Levels, samples: Samples, level: float) -> Judg
 
 def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
     """What the outcomes of all comparisons mean for their claim."""
-    count = len(findings)
-    confirmed = sum(each.outcome == CONFIRMED for each in findings)
-    turned = sum(each.outcome == REVERSED for each in findings)
+    outcomes = [each.outcome for each in findings]
+    count, confirmed, turned = len(outcomes), outcomes.count(CONFIRMED), outcomes.count(REVERSED)
     if claim.form in (RISES, FALLS):
         if turned:
             return NOT_REPRODUCED
@@ -209,13 +206,13 @@ def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
 # -- comparisons ------------------------------------------------------------------------------------------------------
 
 
-def _comparisons(claim: Claim, where: Selection, samples: Samples, level: float) -> Iterator[Finding]:
+def _comparisons(claim: Claim, where: Selection, samples: Samples) -> Iterator[Finding]:
     """A comparison counts if so much is hardly chance, and few numbers are missing."""
     contrasts = list(_contrasts(claim, where, samples))
-    findings = [_finding(metric.text, *each, samples, level) for metric in claim.metrics for each in contrasts]
+    findings = [_finding(metric.text, *each, samples) for metric in claim.metrics for each in contrasts]
     for each, p in zip(findings, holm([finding.p for finding in findings]), strict=True):
         outcome = UNDECIDED
-        if each.has_enough and p < 1 - level:
+        if each.has_enough and p < 1 - LEVEL:
             outcome = CONFIRMED if _sign(claim) * each.value > 0 else REVERSED
         yield replace(each, p_holm=p, outcome=outcome)
 
@@ -279,11 +276,7 @@ def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, floa
 
 
 def _finding(
-    metric: str,
-    weights: dict[int, float],
-    levels: tuple[Levels, Levels, Levels],
-    samples: Samples,
-    level: float,
+    metric: str, weights: dict[int, float], levels: tuple[Levels, Levels, Levels], samples: Samples
 ) -> Finding:
     """The mean of a contrast over the replications in which all its conditions have a number."""
     numbers = {each: samples.numbers(each, metric) for each in weights}
@@ -291,8 +284,8 @@ def _finding(
     pairs = sorted(set.intersection(*(set(each) for each in numbers.values())))
     terms = [[weight * numbers[at][each] for at, weight in weights.items()] for each in pairs]
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
-    found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
-    bootstrap = bootstrap_mean(values, level, resamples=RESAMPLES)
+    found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)))
+    bootstrap = bootstrap_mean(values, resamples=RESAMPLES)
     return Finding(
         metric,
         *levels,
@@ -304,7 +297,7 @@ def _finding(
     )
 
 
-def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float) -> Iterator[Finding]:
+def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[Finding]:
     """How often a condition holds, at every combination of levels."""
     formula = Formula(claim.condition)
     may_be_none = asks_for_none(claim.condition)
@@ -320,7 +313,7 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float)
     for place in samples.places(samples.choices(where)):
         answers = [is_true(row) for row in samples.rows(samples.at(place), formula.names)]
         holds, missing = answers.count(True), answers.count(None)
-        found = rate(holds, len(answers) - missing, level)
+        found = rate(holds, len(answers) - missing)
         finding = Finding(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)
         yield replace(finding, outcome=_outcome_of_rate(claim, finding, holds))
 

@@ -202,17 +202,17 @@ class StudyResults:
             told = f"{self.folder} has no {what} {name!r}{did_you_mean(name, known)}"
             raise StoreError(f"{told}; it has {', '.join(known) or 'none'}")
 
-    def claims(self, level: float = LEVEL) -> list[Judgement]:
+    def claims(self) -> list[Judgement]:
         """What came of the claims of the study's file; those of another study, at each level of what that has not."""
-        return judge(self._samples(), level)
+        return judge(self._samples())
 
-    def standings(self, level: float = LEVEL) -> list[Standing]:
+    def standings(self) -> list[Standing]:
         """How much speaks for each level that claims are judged apart for, the best first."""
-        return ranked(self.claims(level))
+        return ranked(self.claims())
 
-    def guideline(self, level: float = LEVEL) -> list[Recommendation]:
+    def guideline(self) -> list[Recommendation]:
         """What the study's guideline recommends, at every combination of the factors that are not to be chosen."""
-        return recommend(self._samples(), level)
+        return recommend(self._samples())
 
     def find(self, run: str) -> dict[str, Any]:
         """The row of a run, by the beginning of its key; raises ``StoreError``."""
