@@ -84,13 +84,19 @@ def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:
 
 
 def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, EpicycleError | None]:
-    """A run once more, alone, with all that the model records and the whole event log; and what it raised."""
+    """A run once more, alone, with all that the model records and the whole event log; and what made it fail."""
     model = plan.load(condition)
     simulation = Simulation(model, seed=seed, keep_log=LogFilter({}))
     try:
-        return model, simulation.run(), None
+        results = simulation.run()
     except EpicycleError as error:
         return model, simulation.results("failed"), error
+    try:
+        for metric in plan.metrics:
+            value_of(metric, results)
+    except EpicycleError as error:
+        return model, results, error
+    return model, results, None
 
 
 class ReplayError(EpicycleError):
