@@ -93,17 +93,20 @@ def study(options: argparse.Namespace) -> int:
     from ..study import Plan, available_cores, check_size
 
     _check_session(options)
-    types = map(Path, options.types)
-    study = read_study(
-        options.study, set=options.set, types=types, replications=options.replications, seed=options.seed
+    found = read_study(
+        options.study,
+        set=options.set,
+        types=map(Path, options.types),
+        replications=options.replications,
+        seed=options.seed,
     )
-    if options.replications is not None and study.until is not None:
-        complain(f"{study.name} decides itself how many replications it needs: --replications counts for nothing")
-    plan = Plan.made(study)
+    if options.replications is not None and found.until is not None:
+        complain(f"{found.name} decides itself how many replications it needs: --replications counts for nothing")
+    plan = Plan.made(found)
     check_figures(plan)
     if not options.yes:
         check_size(plan, options.jobs or available_cores())
-    return _session(plan, options.out or Path("results") / study.name, options)
+    return _session(plan, options.out or Path("results") / found.name, options)
 
 
 @command("resume a study", FOLDER, *SESSION)
@@ -300,11 +303,11 @@ def report(options: argparse.Namespace) -> int:
         def tell_of(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
 
-        report = write_report(results, folder, jobs=jobs, tell=tell_of)
-    for path in report.files:
+        written = write_report(results, folder, jobs=jobs, tell=tell_of)
+    for path in written.files:
         tell(f"wrote {path}")
-    if report.verdicts:
-        tell("claims: " + ", ".join(f"{number} {verdict}" for verdict, number in sorted(report.verdicts.items())))
-    for problem in report.problems:
+    if written.verdicts:
+        tell("claims: " + ", ".join(f"{number} {verdict}" for verdict, number in sorted(written.verdicts.items())))
+    for problem in written.problems:
         complain(f"error: {problem}")
-    return FAILED if report.problems else DONE
+    return FAILED if written.problems else DONE

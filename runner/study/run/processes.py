@@ -58,9 +58,10 @@ class _Process:
     def __init__(self, begin: Callable[..., Bench], arguments: tuple[object, ...], folder: str) -> None:
         self._folder = folder
         environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
-        # No multiprocessing: the processes of Dask are daemons, which may have no children by it.
+        # No multiprocessing: the processes of Dask are daemons, which may have no children by it.  With -P they import
+        # what this process would, and no module of that name that happens to lie in the working directory.
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import serve; serve()"],
+            [sys.executable, "-P", "-c", f"from {__name__} import serve; serve()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,

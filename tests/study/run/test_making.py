@@ -137,3 +137,11 @@ def test_a_metric_that_cannot_be_calculated_is_told_by_replay_too(
     said = capsys.readouterr()
     assert said.err == f"error: {row['error']}\n"
     assert "ended by no events left" in said.out
+
+
+def test_modules_in_the_working_directory_do_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path)
+    for name in ("pickle", "queue", "simpy"):
+        (tmp_path / f"{name}.py").write_text("raise RuntimeError('somebody else')\n")
+    monkeypatch.chdir(tmp_path)
+    assert study(tmp_path, "--replications", 1) == 0
