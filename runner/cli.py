@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from .collection import seldom_collecting
 from .commands import COMMANDS
@@ -18,14 +18,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:  # as a program, not called by one
         return leave(main(sys.argv[1:]))
     open_streams()
-    given = list(arguments)
-    options = parser().parse_args(given)
-    command: Callable[[argparse.Namespace, list[str]], int] = options.command
+    options = parser().parse_args(arguments)
+    options.given = ["epicycle", *arguments]
     from epicycle.actors import EpicycleError
 
     try:
         with seldom_collecting():
-            code = command(options, given)
+            code: int = options.run(options)
         sys.stdout.flush()  # here, where it can be told that it fails
         return code
     except EpicycleError as error:
@@ -54,12 +53,12 @@ def parser() -> argparse.ArgumentParser:
         prog="epicycle", description="Discrete-event simulation of actor models that are written in YAML."
     )
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for module in COMMANDS:
-        name = module.__name__.rpartition(".")[2]
-        command = commands.add_parser(name, help=module.__doc__, description=module.DESCRIPTION)
-        module.add(command)
+    for each in COMMANDS:
+        command = commands.add_parser(each.name, help=each.summary, description=each.description)
+        for add in each.options:
+            add(command)
         command.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
-        command.set_defaults(command=module.run)
+        command.set_defaults(run=each.run)
     return top
 
 

@@ -13,15 +13,18 @@ from typing import Any
 PACKAGES = ("epicycle", "simpy", "numpy", "scipy", "numba", "filterpy", "networkx", "pyyaml", "pyarrow")
 
 
-def versions() -> dict[str, Any]:
+def version_of(package: str) -> str | None:
+    """The version of an installed package; None if it is not there, or is run from its folder."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def versions() -> dict[str, str | None]:
     """The versions of Python and of all that takes part in a run."""
-    found: dict[str, Any] = {"python": platform.python_version(), "platform": sys.platform}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = None
-    return found
+    found = {"python": platform.python_version(), "platform": sys.platform}
+    return {**found, **{package: version_of(package) for package in PACKAGES}}
 
 
 def machine() -> dict[str, Any]:

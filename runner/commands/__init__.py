@@ -1,13 +1,21 @@
-"""The commands of the command line, one a module.
+"""The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-The docstring of a module is what ``epicycle --help`` says of it; ``add`` declares its options, ``run`` does it and
-returns the exit code.  Nothing heavy is imported before ``run``, so that ``--help`` answers at once.
-"""
+from . import describe, run, studies, trace
 
-from __future__ import annotations
-
-from . import actors, aspects, graph, models, replay, report, resume, run, schema, status, study, trace, validate
-
-COMMANDS = (run, study, resume, status, replay, report, trace, validate, graph, models, actors, aspects, schema)
+COMMANDS = (
+    run.run,
+    studies.study,
+    studies.resume,
+    studies.status,
+    studies.replay,
+    studies.report,
+    trace.trace,
+    describe.validate,
+    describe.graph,
+    describe.models,
+    describe.actors,
+    describe.aspects,
+    describe.schema,
+)
 
 __all__ = ["COMMANDS"]

@@ -1,4 +1,4 @@
-"""The options that several commands share, and what they mean."""
+"""What a command is, the options that several commands share, and what these mean."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import argparse
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from operator import methodcaller
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..printing import complain, complain_traceback
 
@@ -18,67 +20,32 @@ if TYPE_CHECKING:
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
+Option = Callable[[argparse.ArgumentParser], object]
+Run = Callable[[argparse.Namespace], int]
 
-def add_model(command: argparse.ArgumentParser) -> None:
-    """The options that say which model is meant, and what to change in it."""
-    command.add_argument("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model")
-    add_changes(command)
-
-
-def add_changes(command: argparse.ArgumentParser) -> None:
-    """The options that change a model."""
-    add_several(
-        command,
-        "--set",
-        "PATH=VALUE",
-        "set a parameter, such as observers=3 or 'observer[*].sensor.max_range=5 m'; may be repeated",
-    )
-    add_several(
-        command,
-        "--overrides",
-        "FILE",
-        "set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
-    )
-    add_several(
-        command,
-        "--disturb",
-        "NAME or FILE",
-        "add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
-        "--aspect and --without count after it",
-    )
-    add_several(
-        command,
-        "--aspect",
-        "NAME=TYPE,KEY=VALUE,...",
-        "add an aspect, or put it in the place of the one of that name; may be repeated",
-    )
-    add_several(command, "--without", "NAME", "remove an aspect; may be repeated")
-    command.add_argument(
-        "--max-actors",
-        metavar="N",
-        type=whole(1, 10**9 - 1),
-        help="how many actors and composites are not taken for a mistake, and a fifth of how many connections "
-        "(default: 20,000)",
-    )
-    add_types(command)
+option: Callable[..., Option] = partial(methodcaller, "add_argument")  # an option or argument, as argparse takes it
+several: Callable[..., Option] = partial(option, action="append", default=[])  # one with a value each time it is given
 
 
-def add_several(command: argparse.ArgumentParser, flag: str, metavar: str, about: str) -> None:
-    """An option that may be given more than once, with a value each time."""
-    command.add_argument(flag, metavar=metavar, action="append", default=[], help=about)
+class Command(NamedTuple):
+    """A command: its name, what ``epicycle --help`` and its own ``--help`` say of it, its options, and what it does.
+
+    ``run`` returns the exit code.  Nothing heavy is imported before it runs, so that ``--help`` answers at once.
+    """
+
+    name: str
+    summary: str
+    description: str | None
+    options: tuple[Option, ...]
+    run: Run
 
 
-def add_types(command: argparse.ArgumentParser) -> None:
-    """The option that makes types of the user's own known."""
-    about = "a Python file with actors and aspects of your own, whose code is run; may be repeated"
-    add_several(command, "--types", "FILE", about)
+def command(summary: str, *options: Option) -> Callable[[Run], Command]:
+    """Make a command of a function, which has its name and whose docstring describes it."""
+    return lambda run: Command(run.__name__, summary, run.__doc__, options, run)
 
 
-def own_types(options: argparse.Namespace) -> list[type]:
-    """The types of the files that ``--types`` names."""
-    from ..catalogue import types_of_file
-
-    return [each for file in options.types for each in types_of_file(Path(file))]
+# -- what options say -------------------------------------------------------------------------------------------------
 
 
 def whole(first: int, last: int | None = None, most: str = "") -> Callable[[str], int]:
@@ -94,44 +61,83 @@ def whole(first: int, last: int | None = None, most: str = "") -> Callable[[str]
     return read
 
 
-count = whole(1, 10**9, "1e9")
-
-
-def seed(text: str, last: int | None = None) -> int:
-    """A seed: a whole number from 0 on, and up to ``last`` where others follow it."""
+def seed(text: str) -> int:
+    """A seed: a whole number from 0 on."""
     from ..text import MAX_SEED
 
-    return whole(0, MAX_SEED if last is None else last)(text)
+    return whole(0, MAX_SEED)(text)
 
 
-def positive_seconds(text: str) -> float:
-    """A number of seconds of real time."""
+def number(text: str) -> float:
+    """The number that a text is; NaN if it is none."""
     try:
-        number = float(text)
+        return float(text)
     except ValueError:
-        number = math.nan
-    if not 0.0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
-    return number
+        return math.nan
 
 
-def seconds(option: str, text: str) -> float:
+def seconds(flag: str, text: str | None) -> float | None:
     """A model time that an option gives, in seconds or with a unit."""
     from epicycle.actors import EpicycleError, convert
 
+    if text is None:
+        return None
     time = convert(text, "s")
     if not 0.0 <= time < 1e9:
-        raise EpicycleError(f"{option} {text}: expected a time from 0 s to 1e9 s")
+        raise EpicycleError(f"{flag} {text}: expected a time from 0 s to 1e9 s")
     return time
 
 
-def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) -> int:
-    """Say what went wrong after a run; the exit code."""
-    for error in errors:
-        if options.debug:
-            complain_traceback(error)
-        complain(f"error: {error}")
-    return FAILED if errors else DONE
+# -- options ----------------------------------------------------------------------------------------------------------
+
+COUNT = whole(1, 10**9, "1e9")
+SEED = option("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
+JSON = option("--json", action="store_true", help="print JSON")
+TYPES = several(
+    "--types",
+    metavar="FILE",
+    help="a Python file with actors and aspects of your own, whose code is run; may be repeated",
+)
+CHANGES = (  # to a model
+    several(
+        "--set",
+        metavar="PATH=VALUE",
+        help="set a parameter, such as observers=3 or 'observer[*].sensor.max_range=5 m'; may be repeated",
+    ),
+    several(
+        "--overrides",
+        metavar="FILE",
+        help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
+    ),
+    several(
+        "--disturb",
+        metavar="NAME or FILE",
+        help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
+        "--aspect and --without count after it",
+    ),
+    several(
+        "--aspect",
+        metavar="NAME=TYPE,KEY=VALUE,...",
+        help="add an aspect, or put it in the place of the one of that name; may be repeated",
+    ),
+    several("--without", metavar="NAME", help="remove an aspect; may be repeated"),
+    option(
+        "--max-actors",
+        metavar="N",
+        type=whole(1, 10**9 - 1),
+        help="how many actors and composites are not taken for a mistake, and a fifth of how many connections "
+        "(default: 20,000)",
+    ),
+    TYPES,
+)
+MODEL = (option("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"), *CHANGES)
+
+
+def own_types(options: argparse.Namespace) -> list[type]:
+    """The types of the files that ``--types`` names."""
+    from ..catalogue import types_of_file
+
+    return [each for file in options.types for each in types_of_file(Path(file))]
 
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
@@ -149,9 +155,17 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
         types=own_types(options),
         **({} if options.max_actors is None else {"max_actors": options.max_actors}),
     )
-    if not strict:
-        for warning in model.warnings:
-            complain(str(warning))
-    elif model.warnings:
+    if strict and model.warnings:
         raise ModelError(replace(warning, severity="error") for warning in model.warnings)
+    for warning in model.warnings:
+        complain(str(warning))
     return model
+
+
+def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) -> int:
+    """Say what went wrong after a run; the exit code."""
+    for error in errors:
+        if options.debug:
+            complain_traceback(error)
+        complain(f"error: {error}")
+    return FAILED if errors else DONE

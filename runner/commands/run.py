@@ -11,71 +11,60 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, console, notices, tell, tell_json
-from .options import add_model, add_several, complain_of, load, seconds, seed
+from .options import MODEL, SEED, command, complain_of, load, number, option, seconds, several
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ..build import Model
 
-DESCRIPTION = "Run a model once and report what came of it."
-
-
 PATIENCE = 5.0  # s after which a run can be judged
 LONG = 600.0  # s that are worth a word
 NOTICEABLE = 0.05  # s by which a run may be late without our saying so: the operating system alone takes as much
-
-
-def add(command: argparse.ArgumentParser) -> None:
-    """The options of ``epicycle run``."""
-    add_model(command)
-    command.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
-    command.add_argument("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)")
-    command.add_argument(
-        "--realtime",
-        metavar="FACTOR",
-        type=factor,
-        nargs="?",
-        const=1.0,
-        help="let FACTOR seconds of model time pass in a second of the wall clock (default: 1), and no more",
-    )
-    command.add_argument(
-        "--out",
-        metavar="DIR",
-        type=Path,
-        help="folder for manifest, signals and figures (default: results/MODEL; with --json: none)",
-    )
-    command.add_argument(
-        "--log", metavar="FILE", type=Path, help="write the event log to FILE (.parquet, .csv or .jsonl)"
-    )
-    add_several(
-        command,
-        "--log-where",
-        "COLUMN=PATTERN",
-        "write only what fits, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
-        "actor='observer[*].**' or port=plan; of several for one column one must fit, and each column",
-    )
-    command.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
 
 
 def factor(text: str) -> float:
     """How many seconds of model time pass in a second."""
     from ..engine import SLOWEST
 
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not SLOWEST <= number < math.inf:
+    if not SLOWEST <= (found := number(text)) < math.inf:
         # The model, perhaps, which stands behind the option.
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a number of {SLOWEST:g} or more (write MODEL before --realtime)"
         )
-    return number
+    return found
 
 
-def run(options: argparse.Namespace, given: list[str]) -> int:
-    """Run the model, report and write what was asked for."""
+@command(
+    "run a model",
+    *MODEL,
+    SEED,
+    option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
+    option(
+        "--realtime",
+        metavar="FACTOR",
+        type=factor,
+        nargs="?",
+        const=1.0,
+        help="let FACTOR seconds of model time pass in a second of the wall clock (default: 1), and no more",
+    ),
+    option(
+        "--out",
+        metavar="DIR",
+        type=Path,
+        help="folder for manifest, signals and figures (default: results/MODEL; with --json: none)",
+    ),
+    option("--log", metavar="FILE", type=Path, help="write the event log to FILE (.parquet, .csv or .jsonl)"),
+    several(
+        "--log-where",
+        metavar="COLUMN=PATTERN",
+        help="write only what fits, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
+        "actor='observer[*].**' or port=plan; of several for one column one must fit, and each column",
+    ),
+    option("--json", action="store_true", help="print one JSON object instead of the table"),
+)
+def run(options: argparse.Namespace) -> int:
+    """Run a model once and report what came of it."""
     from epicycle.actors import EpicycleError
 
     from ..build import figures_of
@@ -88,14 +77,13 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
     if log is None and options.log_where:
         raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, to which the log is written")
     log_filter = LogFilter.of(options.log_where)
-    until = seconds("--until", options.until) if options.until is not None else None
+    until = seconds("--until", options.until)
     model = load(options)
     figures = figures_of(model, Problems())
     folder = options.out or (None if options.json else Path("results") / model.name)
     if folder is not None and folder.exists() and not folder.is_dir():
         raise EpicycleError(f"--out {folder} is a file, not a folder")
-    command = ["epicycle", *given]
-    replaced = "" if folder is None else check_folder(folder, model.name, command)
+    replaced = "" if folder is None else check_folder(folder, model.name, options.given)
     keep_log, log_to = (False, None) if log is None else (log_filter, log.add)
     simulation = Simulation(model, seed=options.seed, keep_log=keep_log, log_to=log_to)
     if replaced:  # and nothing is wrong with what was asked for
@@ -110,11 +98,11 @@ def run(options: argparse.Namespace, given: list[str]) -> int:
             interrupted = isinstance(error, KeyboardInterrupt)
             results = simulation.results("interrupted" if interrupted else "failed")
             if folder is not None:
-                write_folder(folder, results, command, "interrupted" if interrupted else str(error))
+                write_folder(folder, results, options.given, "interrupted" if interrupted else str(error))
                 complain(f"what was recorded until then is in {folder}")
             raise
         # Before the log is closed, which may fail.
-        saved = [] if folder is None else write_folder(folder, results, command)
+        saved = [] if folder is None else write_folder(folder, results, options.given)
     if pace is not None and pace.worst > NOTICEABLE:
         complain(
             f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
@@ -147,14 +135,9 @@ def outlook(elapsed: float, now: float, end: float) -> str:
 @contextmanager
 def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None]]:
     """A bar on a terminal's standard error, and notices of what takes long."""
-    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeElapsedColumn
-    from rich.text import Text
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    class ModelTime(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            now = f"{task.completed:.1f}" if task.completed >= 1.0 else f"{task.completed:.3g}"
-            return Text(f"{task.description} {now} s of model time")
-
+    end = until if until is not None else model.stop
     latest = -math.inf
 
     def look(now: float) -> None:
@@ -162,28 +145,23 @@ def progress(model: Model, until: float | None) -> Iterator[Callable[[float], No
         if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing of the run
             watch.start()
         latest = now
+        bar.update(task, completed=now, now=f"{now:.1f}" if now >= 1.0 else f"{now:.3g}")
 
     def judge() -> None:
         if end is not None and (text := outlook(PATIENCE, latest, end)):
             complain(text)
 
-    end = until if until is not None else model.stop
     terminal = console(stderr=True)
+    about = TextColumn("{task.description} {task.fields[now]} s of model time", markup=False)
+    bar = Progress(
+        about, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True, disable=not terminal.is_terminal
+    )
     # One step of the run may take for ever, so it is looked at from outside.
     watch = threading.Timer(PATIENCE, judge)
     watch.daemon = True
     try:
-        with notices(terminal):
-            if not terminal.is_terminal:
-                yield look
-                return
-            with Progress(ModelTime(), BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
-                task = bar.add_task(model.name, total=end)
-
-                def show(now: float) -> None:
-                    look(now)
-                    bar.update(task, completed=now)
-
-                yield show
+        with notices(terminal), bar:
+            task = bar.add_task(model.name, total=end, now="0")
+            yield look
     finally:
         watch.cancel()

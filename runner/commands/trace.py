@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..printing import console, notices, tell, tell_json_text
-from .options import DONE, add_model, add_several, load, seconds, seed
+from .options import DONE, MODEL, SEED, command, load, option, seconds, several
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Tag
@@ -17,29 +17,30 @@ if TYPE_CHECKING:
     from ..engine import Firing
     from ..graph import ModelGraph
 
-DESCRIPTION = "Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."
 WIDEST = 80  # characters of a token
 
 
-def add(command: argparse.ArgumentParser) -> None:
-    """The options of ``epicycle trace``."""
-    add_model(command)
-    about = "actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)"
-    add_several(command, "--actor", "PATTERN", about)
-    command.add_argument("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
-    command.add_argument("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'")
-    command.add_argument("--to", metavar="TIME", help="end there (default: the end of the run)")
-    command.add_argument("--json", action="store_true", help="print one JSON object a line")
-
-
-def run(options: argparse.Namespace, given: list[str]) -> int:
-    """Run the model as far as it is asked for, and print as it goes."""
+@command(
+    "say who fired when, and why",
+    *MODEL,
+    several(
+        "--actor",
+        metavar="PATTERN",
+        help="actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)",
+    ),
+    SEED,
+    option("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'"),
+    option("--to", metavar="TIME", help="end there (default: the end of the run)"),
+    option("--json", action="store_true", help="print one JSON object a line"),
+)
+def trace(options: argparse.Namespace) -> int:
+    """Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."""
     from epicycle.actors import to_nanoseconds
 
     from ..engine import Simulation, Tracer
 
-    start = to_nanoseconds(seconds("--from", options.start)) if options.start is not None else 0
-    end = seconds("--to", options.to) if options.to is not None else None
+    start = to_nanoseconds(seconds("--from", options.start) or 0.0)
+    end = seconds("--to", options.to)
     model = load(options)
     actors = _actors(options.actor, model)
     show = _as_json if options.json else _as_text(actors, model.graph)

@@ -1,12 +1,12 @@
 """What a run leaves: the event log and its digest, signals, metrics, and the files that hold them."""
 
+from .arrow import write_signals
 from .encoding import TokenError, canonical, cell, leaves, plain
 from .log import EventLog, LogError, Record, Write
 from .log_file import LogFile, check_log_path, write_log
 from .outcome import Interval, Outcome
 from .results import Results
 from .signal import Past, Signal, SignalError
-from .signal_file import write_signals
 
 __all__ = [
     "EventLog",

@@ -4,35 +4,18 @@
 """
 
 from .inference import Estimate, half_width, mean
-from .judge import (
-    CONFIRMED,
-    NOT_REPRODUCED,
-    REPRODUCED,
-    REVERSED,
-    UNDECIDED,
-    Finding,
-    Judgement,
-    Recommendation,
-    StudyResults,
-    open_study,
-    ranked,
-)
-from .plan import Column, Condition, MetricError, Plan
-from .run import (
-    OK,
-    Backlog,
-    Replay,
-    ReplayError,
-    StoreError,
-    WorkerError,
-    WriteError,
-    again,
-    is_running,
-    progress,
-    repeat,
-    replace_file,
-)
-from .session import Outcome, TooManyRunsError, available_cores, check_size, plan_of_folder, run_study
+from .judge.claims import CONFIRMED, NOT_REPRODUCED, REPRODUCED, REVERSED, UNDECIDED, Finding, Judgement, ranked
+from .judge.guideline import Recommendation
+from .judge.study_results import StudyResults, open_study
+from .plan.columns import Column
+from .plan.plan import Plan
+from .run.backlog import OK
+from .run.manifest import StoreError
+from .run.processes import WorkerError
+from .run.pulse import progress
+from .run.runner import Replay, ReplayError, again, repeat
+from .run.store import WriteError, is_running, replace_file
+from .session import available_cores, check_size, plan_of_folder, run_study
 
 __all__ = [
     "CONFIRMED",
@@ -41,21 +24,16 @@ __all__ = [
     "REPRODUCED",
     "REVERSED",
     "UNDECIDED",
-    "Backlog",
     "Column",
-    "Condition",
     "Estimate",
     "Finding",
     "Judgement",
-    "MetricError",
-    "Outcome",
     "Plan",
     "Recommendation",
     "Replay",
     "ReplayError",
     "StoreError",
     "StudyResults",
-    "TooManyRunsError",
     "WorkerError",
     "WriteError",
     "again",

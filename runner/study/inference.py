@@ -90,30 +90,25 @@ def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:
     import numpy as np
 
     known, sums = np.asarray(values, float), np.zeros(number)
-    for start, draws in _draws(len(values), number):
+    count = len(values)
+    for start, draws in _few_draws(count, number) if count * number <= 2_000_000 else _draws(count, number):
         part = sums[start : start + draws.shape[1]]
         for chosen in draws:
             part += known[chosen]
     return sums
 
 
-def _draws(count: int, number: int) -> Iterable[tuple[int, NDArray[np.int64]]]:
+def _draws(count: int, number: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
     """Which values bootstrap samples take, a million of choices at a time: (choice, sample), from the first one on."""
-    return _few_draws(count, number) if count * number <= 2_000_000 else _all_draws(count, number)
-
-
-@lru_cache(maxsize=2)
-def _few_draws(count: int, number: int) -> list[tuple[int, NDArray[np.int64]]]:
-    return list(_all_draws(count, number))
-
-
-def _all_draws(count: int, number: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
     import numpy as np
 
     stream, rows = random_stream(0, "resampling"), max(1, 1_000_000 // count)
     for start in range(0, number, rows):
         size = (min(rows, number - start), count)
         yield start, np.ascontiguousarray(stream.integers(count, size=size).T)
+
+
+_few_draws = lru_cache(maxsize=2)(lambda count, number: list(_draws(count, number)))
 
 
 def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:

@@ -14,22 +14,15 @@ from epicycle.actors import EpicycleError, counted
 
 from ..engine import Simulation
 from ..provenance import git_revision, machine, versions
-from .judge import StudyResults
-from .plan import Plan, epicycle_version
-from .run import (
-    FORMAT,
-    LOCAL,
-    RETRIED,
-    Backlog,
-    StoreError,
-    check_executor,
-    duration,
-    lock,
-    make_runs,
-    prepare,
-    read_manifest,
-)
+from .judge.study_results import StudyResults
+from .plan.plan import Plan, epicycle_version
+from .run.backlog import RETRIED, Backlog
+from .run.making import Keeper, keeping, make_here
+from .run.manifest import FORMAT, StoreError, read_manifest
+from .run.pulse import duration
+from .run.store import lock, prepare
 
+LOCAL, DASK = "local", "dask"  # executors
 MANY = 100_000  # runs that nobody asks for by mistake
 _TRIAL = 5.0  # s that are spent at most to find out how long a run takes
 
@@ -48,11 +41,6 @@ class Outcome:
     stopped_early: int
     table: Path
 
-    @property
-    def is_good(self) -> bool:
-        """Whether all runs are ok."""
-        return self.failed == 0
-
 
 def run_study(
     plan: Plan,
@@ -65,29 +53,39 @@ def run_study(
     executor: str = LOCAL,
     scheduler: str | None = None,
 ) -> Outcome:
-    """Make all runs of a plan that are not in the folder yet.
+    """Make all runs of a plan that are not in the folder yet, in ``jobs`` processes at a time (default: one a core).
 
-    ``retry``: also those that took too long or whose process died.  ``executor``: ``local``, or ``dask`` for the
-    workers of the Dask ``scheduler`` at that address, or for a cluster of its own on this machine.  Raises
-    ``StoreError`` and ``WorkerError``, and ``EpicycleError`` where Dask is wanted and not installed.
+    A run that raises gets a row with the status ``failed``, one that takes longer than ``timeout`` seconds a row
+    ``timeout``.  One whose process dies is tried again, and after three times gets a row ``killed``; ``retry`` makes
+    both of these anew.  ``tell`` is called now and then.  ``executor``: ``local``, or ``dask`` for the workers of the
+    Dask ``scheduler`` at that address, or for a cluster of its own on this machine.
+    Raises ``StoreError`` and ``WorkerError``, and ``EpicycleError`` where Dask is wanted and not installed.
     """
-    check_executor(executor)  # before anything is written
+    make = _maker(executor, scheduler)  # before anything is written
     with lock(folder):
         store = prepare(folder, manifest_of(plan))
         known = store.known(plan.decides)
         backlog = Backlog(plan, {key: done for key, done in known.items() if not (retry and done.status in RETRIED)})
-        make_runs(
-            store,
-            backlog,
-            lambda: None if tell is None else tell(backlog),
-            jobs=jobs or available_cores(),
-            timeout=timeout,
-            executor=executor,
-            scheduler=scheduler,
-        )
+        with keeping(store, backlog, timeout) as keeper:
+            make(keeper, jobs or available_cores(), lambda: None if tell is None else tell(backlog))
         table = StudyResults(folder).write_table()
-        made, there = backlog.made.total(), backlog.there.total()
-        return Outcome(made, there, backlog.failed, backlog.stopped_early, table)
+    made, there = backlog.made.total(), backlog.there.total()
+    return Outcome(made, there, backlog.failed, backlog.stopped_early, table)
+
+
+def _maker(executor: str, scheduler: str | None) -> Callable[[Keeper, int, Callable[[], None]], None]:
+    """What makes all runs of a backlog, so many at a time, and calls now and then what it is given last.
+
+    Raises ``EpicycleError`` if what an executor needs is not installed.
+    """
+    if executor != DASK:
+        return make_here
+    # Here, and not with this package, which several threads of a Dask worker may import at once: whoever asks for
+    # `parcel` first must not find that the package waits for it.
+    from .run.cluster import Cluster, distributed_module
+
+    distributed_module()
+    return lambda keeper, jobs, tell: Cluster(keeper, jobs, scheduler).run(tell)
 
 
 def manifest_of(plan: Plan) -> dict[str, Any]:
@@ -141,28 +139,17 @@ def check_size(plan: Plan, jobs: int) -> None:
     )
 
 
-class _Enough(Exception):  # noqa: N818  it is no error
-    pass
-
-
 def seconds_of_a_run(plan: Plan) -> float:
     """How long the first run takes, or seems to take after a few seconds of it."""
     condition = plan.condition(0)
     model = plan.load(condition)
     started = time.perf_counter()
-    reached = 0.0
-
-    def watch(now: float) -> None:
-        nonlocal reached
-        reached = now
-        if time.perf_counter() - started > _TRIAL:
-            raise _Enough
-
     try:
-        Simulation(model, seed=plan.seed(condition, 0)).run(progress=watch)
-    except _Enough:
-        if model.stop and reached:
-            return _TRIAL * model.stop / reached
+        simulation = Simulation(model, seed=plan.seed(condition, 0))
+        while simulation.step():
+            if (taken := time.perf_counter() - started) > _TRIAL:
+                reached = simulation.tag.seconds
+                return taken * model.stop / reached if model.stop and reached else taken
     except EpicycleError:
         pass  # the first run fails; others may not
     return time.perf_counter() - started

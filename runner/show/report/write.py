@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -71,14 +70,10 @@ def write_report(
     texts["report.html"] = report_page(data, pictures, judgements, recommendations)
     for name, text in texts.items():
         path = folder / name
-        replace_file(path, partial(_write, text))
+        replace_file(path, text.encode())
         report.files.append(path)
     report.verdicts = Counter(each.verdict for each in judgements)
     return report
-
-
-def _write(text: str, path: Path) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def _picture(

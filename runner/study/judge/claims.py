@@ -113,9 +113,7 @@ class Judgement:
             "form": claim.form,
             "where": self.where,
             "verdict": self.verdict,
-            "confirmed": self.counts(CONFIRMED),
-            "reversed": self.counts(REVERSED),
-            "undecided": self.counts(UNDECIDED),
+            **{outcome: self.counts(outcome) for outcome in (CONFIRMED, REVERSED, UNDECIDED)},
             "agreeing": self.agreeing,
             "missing": self.missing,
             "weakest": None if weakest is None else finite(asdict(weakest)),
@@ -173,36 +171,25 @@ def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
     )
 
 
-def judge(samples: Samples, level: float = LEVEL) -> list[Judgement]:
+def judge(samples: Samples) -> list[Judgement]:
     """Judge all claims of a study, one after the other; those of another study at each level of what that has not."""
     questions = samples.study.questions
-    return [
-        _judged(claim, apart, samples, level) for apart in samples.levels(questions.apart) for claim in questions.claims
-    ]
+    return [_judged(claim, apart, samples) for apart in samples.levels(questions.apart) for claim in questions.claims]
 
 
-def _judged(claim: Claim, apart: Levels, samples: Samples, level: float) -> Judgement:
+def _judged(claim: Claim, apart: Levels, samples: Samples) -> Judgement:
     where: Selection = {**claim.where, **{factor: (value,) for factor, value in apart.items()}}
-    if claim.form == ALWAYS:
-        findings = list(_occurrences(claim, where, samples, level))
-    else:
-        contrasts = list(_contrasts(claim, where, samples))
-        findings = [_finding(metric.text, each, samples, level) for metric in claim.metrics for each in contrasts]
-        corrected = holm([finding.p for finding in findings])
-        findings = [replace(each, p_holm=p) for each, p in zip(findings, corrected, strict=True)]
-        findings = [replace(each, outcome=_outcome(claim, each, level)) for each in findings]
+    found = (_occurrences if claim.form == ALWAYS else _comparisons)(claim, where, samples)
     findings = [
-        replace(each, where={name: value for name, value in each.where.items() if name not in apart})
-        for each in findings
+        replace(each, where={name: value for name, value in each.where.items() if name not in apart}) for each in found
     ]
     return Judgement(claim, apart, verdict(claim, findings), tuple(findings))
 
 
 def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
     """What the outcomes of all comparisons mean for their claim."""
-    count = len(findings)
-    confirmed = sum(each.outcome == CONFIRMED for each in findings)
-    turned = sum(each.outcome == REVERSED for each in findings)
+    outcomes = [each.outcome for each in findings]
+    count, confirmed, turned = len(outcomes), outcomes.count(CONFIRMED), outcomes.count(REVERSED)
     if claim.form in (RISES, FALLS):
         if turned:
             return NOT_REPRODUCED
@@ -217,38 +204,41 @@ def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
 # -- comparisons ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Contrast:
-    """A weighed sum of conditions."""
+def _comparisons(claim: Claim, where: Selection, samples: Samples) -> Iterator[Finding]:
+    """A comparison counts if so much is hardly chance, and few numbers are missing."""
+    contrasts = list(_contrasts(claim, where, samples))
+    findings = [_finding(metric.text, *each, samples) for metric in claim.metrics for each in contrasts]
+    for each, p in zip(findings, holm([finding.p for finding in findings]), strict=True):
+        outcome = UNDECIDED
+        if each.has_enough and p < 1 - LEVEL:
+            outcome = CONFIRMED if _sign(claim) * each.value > 0 else REVERSED
+        yield replace(each, p_holm=p, outcome=outcome)
 
-    weights: Mapping[Place, float]
-    where: Levels
-    level: Levels
-    against: Levels
 
+def _contrasts(
+    claim: Claim, where: Selection, samples: Samples
+) -> Iterator[tuple[dict[int, float], tuple[Levels, Levels, Levels]]]:
+    """What a claim compares, at every combination of the dimensions that it says nothing of.
 
-def _contrasts(claim: Claim, where: Selection, samples: Samples) -> Iterator[_Contrast]:
-    """What a claim compares, at every combination of the dimensions that it says nothing of."""
+    Each is a weighed sum of conditions, with the levels that these share, those of one side, and those of the other.
+    """
     choices = samples.choices(where)
     ordered = claim.form in (RISES, FALLS)
     compared = samples.homes([claim.over] if ordered else claim.at)
     slope = _slope(claim, choices, samples) if claim.per else {(): 1.0}
     homes = [*compared, *(samples.homes([claim.per]) if claim.per else ())]
+    others = [home for home in range(len(choices)) if home not in homes]
     pairs = list(_steps(claim, choices, samples) if ordered else _pairs(claim, choices, compared, samples))
     for rest in samples.places(choices, homes):
         for this, that in pairs:
             weights = {
-                _with(rest, homes, (*levels, *inner)): sign * weight
+                samples.at(_with(rest, homes, (*levels, *inner))): sign * weight
                 for sign, levels in ((1.0, this), (-1.0, that))
                 for inner, weight in slope.items()
                 if weight
             }
-            yield _Contrast(
-                weights,
-                samples.values(rest, [home for home in range(len(choices)) if home not in homes]),
-                samples.values(_with(rest, compared, this), compared),
-                samples.values(_with(rest, compared, that), compared),
-            )
+            here, there = (samples.values(_with(rest, compared, side), compared) for side in (this, that))
+            yield weights, (samples.values(rest, others), here, there)
 
 
 def _pairs(claim: Claim, choices: Choices, homes: Sequence[int], samples: Samples) -> Iterator[tuple[Place, Place]]:
@@ -283,20 +273,20 @@ def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, floa
     return {(index,): (each - center) / spread for index, each in at.items()}
 
 
-def _finding(metric: str, contrast: _Contrast, samples: Samples, level: float) -> Finding:
+def _finding(
+    metric: str, weights: dict[int, float], levels: tuple[Levels, Levels, Levels], samples: Samples
+) -> Finding:
     """The mean of a contrast over the replications in which all its conditions have a number."""
-    numbers = {place: samples.numbers(place, metric) for place in contrast.weights}
-    over = set.intersection(*(samples.over(place) for place in numbers))
+    numbers = {each: samples.numbers(each, metric) for each in weights}
+    over = set.intersection(*(set(samples.over(each)) for each in weights))
     pairs = sorted(set.intersection(*(set(each) for each in numbers.values())))
-    terms = [[weight * numbers[place][each] for place, weight in contrast.weights.items()] for each in pairs]
+    terms = [[weight * numbers[at][each] for at, weight in weights.items()] for each in pairs]
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
-    found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)), level)
-    bootstrap = bootstrap_mean(values, level, resamples=RESAMPLES)
+    found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)))
+    bootstrap = bootstrap_mean(values, resamples=RESAMPLES)
     return Finding(
         metric,
-        contrast.where,
-        contrast.level,
-        contrast.against,
+        *levels,
         **asdict(found.estimate),
         missing=len(over) - len(pairs),
         bootstrap_low=bootstrap.low,
@@ -305,7 +295,7 @@ def _finding(metric: str, contrast: _Contrast, samples: Samples, level: float) -
     )
 
 
-def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float) -> Iterator[Finding]:
+def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[Finding]:
     """How often a condition holds, at every combination of levels."""
     formula = Formula(claim.condition)
     may_be_none = asks_for_none(claim.condition)
@@ -319,21 +309,11 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples, level: float)
             return None
 
     for place in samples.places(samples.choices(where)):
-        answers = [is_true(row) for row in samples.rows(place, formula.names)]
+        answers = [is_true(row) for row in samples.rows(samples.at(place), formula.names)]
         holds, missing = answers.count(True), answers.count(None)
-        found = rate(holds, len(answers) - missing, level)
+        found = rate(holds, len(answers) - missing)
         finding = Finding(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)
         yield replace(finding, outcome=_outcome_of_rate(claim, finding, holds))
-
-
-# -- outcomes ---------------------------------------------------------------------------------------------------------
-
-
-def _outcome(claim: Claim, finding: Finding, level: float) -> str:
-    """A comparison counts if so much is hardly chance, and few numbers are missing."""
-    if not finding.has_enough or not finding.p_holm < 1 - level:
-        return UNDECIDED
-    return CONFIRMED if _sign(claim) * finding.value > 0 else REVERSED
 
 
 def _outcome_of_rate(claim: Claim, finding: Finding, holds: int) -> str:
@@ -363,9 +343,6 @@ def _support(claim: Claim, finding: Finding) -> float:
     if finding.error == 0:
         return math.copysign(math.inf, value) if value else 0.0
     return value / finding.error
-
-
-# -- small things -----------------------------------------------------------------------------------------------------
 
 
 def _with(place: Place, homes: Sequence[int], levels: Sequence[int]) -> Place:

@@ -63,90 +63,68 @@ class Recommendation:
         return {**found, "not_worse": self.not_worse}
 
 
-def recommend(samples: Samples, level: float = LEVEL) -> list[Recommendation]:
+def recommend(samples: Samples) -> list[Recommendation]:
     """The recommended level of the factor to choose, for every combination of the others."""
     guideline = samples.study.questions.guideline
     if guideline is None:
         return []
     (home,) = samples.homes([guideline.choose])
-    choices = samples.choices({})
-    found = []
-    for rest in samples.places(choices, [home]):
-        places = [(*rest[:home], index, *rest[home + 1 :]) for index in choices[home]]
-        where = samples.values(rest, [each for each in range(len(rest)) if each != home])
-        levels = [samples.level(home, index, guideline.choose) for index in choices[home]]
-        found.append(_recommended(guideline, where, levels, places, samples, level))
-    return found
+    return [_recommended(guideline, home, rest, samples) for rest in samples.places(samples.choices({}), [home])]
 
 
-def _recommended(
-    guideline: Guideline,
-    where: Levels,
-    levels: list[Factor],
-    places: list[Place],
-    samples: Samples,
-    level: float,
-) -> Recommendation:
-    sign = -1.0 if guideline.greatest else 1.0
-    metric = guideline.metric.text
-    numbers = [samples.numbers(place, metric) for place in places]
-    missing = [len(samples.over(place)) - len(each) for place, each in zip(places, numbers, strict=True)]
+def _recommended(guideline: Guideline, home: int, rest: Place, samples: Samples) -> Recommendation:
+    indices = range(samples.dimensions[home].size)
+    levels = [samples.level(home, index, guideline.choose) for index in indices]
+    conditions = [samples.at((*rest[:home], index, *rest[home + 1 :])) for index in indices]
+    metric, sign = guideline.metric.text, -1.0 if guideline.greatest else 1.0
+    numbers = [samples.numbers(each, metric) for each in conditions]
+    costs = [{one: sign * value for one, value in each.items()} for each in numbers]
+    missing = [len(samples.over(at)) - len(each) for at, each in zip(conditions, numbers, strict=True)]
     fit = [index for index, each in enumerate(numbers) if has_enough(len(each), missing[index])]
-    means = [mean(list(each.values()), level) for each in numbers]
-    best = min(fit, key=lambda index: sign * means[index].value, default=None)
-    confidence = _confidence([numbers[index] for index in fit], sign)
-    options = []
-    for index, factor in enumerate(levels):
-        behind = mean([], level)
-        if best is not None:
-            gaps = paired_difference(numbers[best], numbers[index], level).estimate
-            behind = gaps if sign > 0 else Estimate(-gaps.value, gaps.error, -gaps.high, -gaps.low, gaps.count)
-        options.append(
-            Option(
-                factor,
-                means[index],
-                behind,
-                missing[index],
-                index in fit,
-                index in fit and _is_not_worse(index, fit, numbers, sign, level),
-                confidence[fit.index(index)] if index in fit else 0.0,
-            )
+    best = min(fit, key=lambda index: mean(list(costs[index].values())).value, default=None)
+    confidence = dict(zip(fit, _confidence([costs[index] for index in fit]), strict=True))
+    options = [
+        Option(
+            factor,
+            mean(list(numbers[index].values())),
+            mean([]) if best is None else paired_difference(costs[best], costs[index]).estimate,
+            missing[index],
+            index in fit,
+            index in fit and _is_not_worse(index, fit, costs),
+            confidence.get(index, 0.0),
         )
+        for index, factor in enumerate(levels)
+    ]
     enough = [
-        option
+        option.level
         for option in options
         if option.is_not_worse or (option.is_fit and option.behind.value <= guideline.tolerance)
     ]
     return Recommendation(
-        where,
+        samples.values(rest, [each for each in range(len(rest)) if each != home]),
         guideline.choose,
         metric,
         None if best is None else levels[best],
-        enough[0].level if enough else None,
-        0.0 if best is None else options[best].confidence,
+        enough[0] if enough else None,
+        0.0 if best is None else confidence[best],
         tuple(options),
     )
 
 
-def _is_not_worse(index: int, fit: list[int], numbers: list[dict[int, float]], sign: float, level: float) -> bool:
+def _is_not_worse(index: int, fit: list[int], costs: list[dict[int, float]]) -> bool:
     """Whether no other level is better by a one-sided test, at a level that is shared by all of them."""
-    for other in fit:
-        if other != index:
-            found = paired_difference(numbers[other], numbers[index], level)
-            if sign * found.estimate.value > 0 and found.p / 2 * (len(fit) - 1) < 1 - level:
-                return False
-    return True
+    found = [paired_difference(costs[other], costs[index]) for other in fit if other != index]
+    return not any(each.estimate.value > 0 and each.p / 2 * (len(fit) - 1) < 1 - LEVEL for each in found)
 
 
-def _confidence(numbers: list[dict[int, float]], sign: float) -> list[float]:
+def _confidence(costs: list[dict[int, float]]) -> list[float]:
     """How often each is the best if the replications that all of them have are drawn anew; ties are shared."""
-    common = sorted(set.intersection(*(set(each) for each in numbers))) if numbers else []
+    common = sorted(set.intersection(*(set(each) for each in costs))) if costs else []
     if not common:
-        return [0.0] * len(numbers)
+        return [0.0] * len(costs)
     import numpy as np
 
-    values = ([sign * each[replication] for replication in common] for each in numbers)
-    sums = np.array([resampled_sums(each, RESAMPLES) for each in values])
+    sums = np.array([resampled_sums([each[one] for one in common], RESAMPLES) for each in costs])
     means = np.round(sums / len(common), 12)
     is_best = means == means.min(axis=0)
     ties = np.count_nonzero(is_best, axis=0)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache, cached_property
 from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
 
 from ...language import Factor, Selection, Study
-from ..plan import index_of
-from ..run import OK
+from ..plan.plan import index_of
+from ..run.backlog import OK
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -27,10 +27,10 @@ class Samples:
         self.study = study
         self.dimensions = study.dimensions
         self._column = cache(lambda name: table[name].to_pylist())
-        self._rows: dict[int, dict[int, int | None]] = {}
+        self.runs: dict[int, dict[int, int | None]] = {}  # rows, by condition and replication
         statuses = zip(*(table[name].to_pylist() for name in ("condition", "replication", "status")), strict=True)
         for row, (condition, replication, status) in enumerate(statuses):
-            self._rows.setdefault(condition, {})[replication] = row if status == OK else None
+            self.runs.setdefault(condition, {})[replication] = row if status == OK else None
 
     @cached_property
     def _levels(self) -> list[list[Levels]]:
@@ -40,7 +40,11 @@ class Samples:
 
     def choices(self, where: Selection) -> list[list[int]]:
         """The levels of each dimension that a selection allows."""
-        return [[index for index, values in enumerate(levels) if _fits(values, where)] for levels in self._levels]
+
+        def fits(values: Levels) -> bool:
+            return all(values[factor] in levels for factor, levels in where.items() if factor in values)
+
+        return [[index for index, values in enumerate(levels) if fits(values)] for levels in self._levels]
 
     def homes(self, factors: Iterable[str]) -> list[int]:
         """The dimensions by which factors are varied, in the order of the study."""
@@ -73,45 +77,33 @@ class Samples:
 
     # -- numbers --------------------------------------------------------------------------------------------------
 
-    def runs(self) -> dict[int, int]:
-        """How many runs are over, by the number of their condition."""
-        return {condition: len(rows) for condition, rows in self._rows.items()}
+    def at(self, place: Place) -> int:
+        """The condition with these levels, by its number."""
+        return index_of(place, self.dimensions)
 
-    def over(self, place: Place) -> set[int]:
-        """The replications that are over, whatever came of them."""
-        return set(self._at(place))
+    def over(self, condition: int) -> dict[int, int | None]:
+        """The rows of the runs of a condition that are over, by replication; None for those that failed."""
+        return self.runs.get(condition, {})
 
-    def numbers(self, place: Place, metric: str) -> dict[int, float]:
+    def numbers(self, condition: int, metric: str) -> dict[int, float]:
         """The finite numbers of a metric by replication."""
-        return self.numbers_of(index_of(place, self.dimensions), metric)
-
-    def numbers_of(self, condition: int, metric: str) -> dict[int, float]:
-        """The same of a condition by its number."""
         column = self._column(metric)
-        rows = self._rows.get(condition, {}).items()
-        values = {replication: None if row is None else column[row] for replication, row in rows}
+        values = {one: None if row is None else column[row] for one, row in self.over(condition).items()}
         return {one: value for one, value in values.items() if value is not None and math.isfinite(value)}
 
-    def rows(self, place: Place, metrics: Iterable[str]) -> list[dict[str, float | None] | None]:
+    def rows(self, condition: int, metrics: Iterable[str]) -> list[dict[str, float | None] | None]:
         """The metrics of each run that is over, None for what is no number; None for a run that failed."""
         columns = {name: self._column(name) for name in metrics}
-        rows = self._at(place).values()
-        return [
-            None if row is None else {name: _number(column[row]) for name, column in columns.items()} for row in rows
-        ]
 
-    def _at(self, place: Place) -> dict[int, int | None]:
-        return self._rows.get(index_of(place, self.dimensions), {})
+        def number(value: float | None) -> float | None:
+            return None if value is None or math.isnan(value) else value
+
+        return [
+            None if row is None else {name: number(column[row]) for name, column in columns.items()}
+            for row in self.over(condition).values()
+        ]
 
 
 def has_enough(count: int, missing: int) -> bool:
     """Whether so few numbers are missing that their mean says something."""
     return count > 1 and missing <= MISSING * (count + missing)
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or math.isnan(value) else value
-
-
-def _fits(values: Mapping[str, Factor], where: Selection) -> bool:
-    return all(values[factor] in levels for factor, levels in where.items() if factor in values)

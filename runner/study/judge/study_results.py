@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 from collections import Counter
 from dataclasses import asdict
@@ -17,8 +16,10 @@ from ...language import Factor
 from ...tables import pandas_module
 from ...text import did_you_mean
 from ..inference import LEVEL, holm, mean, paired_difference
-from ..plan import Plan
-from ..run import BEST_FIRST, OK, Store, StoreError, replace_file
+from ..plan.plan import Plan
+from ..run.backlog import OK
+from ..run.manifest import StoreError
+from ..run.store import BEST_FIRST, Store, parquet_of, replace_file
 from .claims import Judgement, Standing, judge, ranked
 from .guideline import Recommendation, recommend
 from .samples import Samples
@@ -43,12 +44,11 @@ class StudyResults:
         self._store = Store(folder)
         self.manifest = self._store.manifest
         self.plan = Plan.of_manifest(self.manifest)
-        self._frozen: pa.Table | None = None
-        self._left_out = 0
+        self._frozen: tuple[pa.Table, int] | None = None
 
     def freeze(self) -> StudyResults:
         """Keep to the rows that are there now, however many may come; reading is quicker then.  Returns itself."""
-        self._frozen = self.table(times=True)
+        self._frozen = self._read()
         return self
 
     @property
@@ -68,22 +68,25 @@ class StudyResults:
         beyond those that the study asks for now are in it, too.  Runs of another seed, model or study than the folder
         is of now are left out; ``left_out`` counts them.
         """
-        table = self._frozen if self._frozen is not None else self._read()
+        table, _ = self._read()
         return table if times else table.drop_columns(list(TIMES))
 
-    def _read(self) -> pa.Table:
+    def _read(self) -> tuple[pa.Table, int]:
+        """The table, and how many runs are left out of it."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        batches = list(self._store.rows())
-        table = pa.Table.from_batches(batches, self._store.schema)
-        order = self._order(table)
+        if self._frozen is not None:
+            return self._frozen
+        table = pa.Table.from_batches(list(self._store.rows()), self._store.schema)
+        # The numbers of the plan's conditions by their keys; a plan may be too large to be gone through.
+        known = table.group_by(["condition", *self.factors], use_threads=False).aggregate([]).to_pylist()
+        order = {row["condition"]: self.plan.find(row["condition"], row) for row in known}
         at = pc.index_in(table["condition"], value_set=pa.array(order, pa.string()))
         places = pc.take(pa.array(order.values(), pa.int64()), at)
         ranks = pc.index_in(table["status"], value_set=pa.array(BEST_FIRST))
-        table = table.set_column(table.schema.get_field_index("condition"), "condition", places)
-        table = table.append_column("_rank", ranks)
         runs = pc.count_distinct(table["run"]).as_py()
+        table = _with(table, "condition", places).append_column("_rank", ranks)
         table = self._replicated(table.filter(pc.is_valid(places))).sort_by(
             [(name, "ascending") for name in ("condition", "replication", "_rank", "run")]
         )
@@ -93,19 +96,14 @@ class StudyResults:
                 for name in ("condition", "replication")
             )
             table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
-        self._left_out = runs - table.num_rows
-        return self._described(table.drop_columns(["_rank"]).combine_chunks())
-
-    def _described(self, table: pa.Table) -> pa.Table:
-        """The table with the unit and the doc of each column as metadata of its field."""
-        import pyarrow as pa
-
-        about = self.plan.columns
-        fields = []
-        for each in table.schema:
-            said = {} if (column := about.get(each.name)) is None else {"unit": column.unit, "doc": column.doc}
-            fields.append(each.with_metadata({key: text for key, text in said.items() if text}))
-        return table.cast(pa.schema(fields))
+        columns = {name: asdict(column).items() for name, column in self.plan.columns.items()}
+        fields = [
+            each.with_metadata({key: text for key, text in columns.get(each.name, ()) if text})
+            for each in table.schema
+            if each.name != "_rank"
+        ]
+        left = runs - table.num_rows
+        return table.drop_columns(["_rank"]).combine_chunks().cast(pa.schema(fields)), left
 
     def _replicated(self, table: pa.Table) -> pa.Table:
         """The rows whose seeds are the plan's, by the replications that these seeds have there."""
@@ -121,16 +119,7 @@ class StudyResults:
         # Another seed in the study's file moves the replications; those beyond what is asked for are of this seed.
         now = pc.subtract(table["seed"], study.seed)
         is_meant = pc.or_(pc.less(now, self.plan.replications), pc.equal(now, before))
-        table = table.set_column(table.schema.get_field_index("replication"), "replication", now)
-        return table.filter(pc.and_(pc.greater_equal(now, 0), is_meant))
-
-    def _order(self, table: pa.Table) -> dict[str, int]:
-        """The numbers of the plan's conditions by their keys; a plan may be too large to be gone through."""
-        found: dict[str, int] = {}
-        for row in table.group_by(["condition", *self.factors], use_threads=False).aggregate([]).to_pylist():
-            if (index := self.plan.find(row["condition"], row)) is not None:
-                found[row["condition"]] = index
-        return found
+        return _with(table, "replication", now).filter(pc.and_(pc.greater_equal(now, 0), is_meant))
 
     def digest(self) -> str:
         """SHA-256 of all rows, by which tables are told apart: the same wherever and however often they are made."""
@@ -143,9 +132,8 @@ class StudyResults:
     @property
     def left_out(self) -> int:
         """How many runs of the folder are not of the study as it is now, and so not in the table."""
-        if self._frozen is None:
-            self._read()
-        return self._left_out
+        _, left = self._read()
+        return left
 
     def beyond(self) -> int:
         """How many runs of the table are replications beyond those that the study asks for now."""
@@ -167,7 +155,7 @@ class StudyResults:
         """The numbers of a metric by condition and replication; runs that are not ``ok`` or have none are left out."""
         self._check("metric", metric, self.metrics)
         samples = self._samples()
-        return {condition: samples.numbers_of(condition, metric) for condition in samples.runs()}
+        return {condition: samples.numbers(condition, metric) for condition in samples.runs}
 
     def means(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
         """A row for each condition: what was varied, the mean with its standard error and interval, how many runs.
@@ -179,10 +167,10 @@ class StudyResults:
         return [
             {
                 **self.plan.condition(condition).values,
-                **asdict(mean(list(samples.numbers_of(condition, metric).values()), level)),
-                "runs": runs,
+                **asdict(mean(list(samples.numbers(condition, metric).values()), level)),
+                "runs": len(runs),
             }
-            for condition, runs in samples.runs().items()
+            for condition, runs in samples.runs.items()
         ]
 
     def differences(self, metric: str, over: str, level: float = LEVEL) -> list[dict[str, Any]]:
@@ -214,17 +202,17 @@ class StudyResults:
             told = f"{self.folder} has no {what} {name!r}{did_you_mean(name, known)}"
             raise StoreError(f"{told}; it has {', '.join(known) or 'none'}")
 
-    def claims(self, level: float = LEVEL) -> list[Judgement]:
+    def claims(self) -> list[Judgement]:
         """What came of the claims of the study's file; those of another study, at each level of what that has not."""
-        return judge(self._samples(), level)
+        return judge(self._samples())
 
-    def standings(self, level: float = LEVEL) -> list[Standing]:
+    def standings(self) -> list[Standing]:
         """How much speaks for each level that claims are judged apart for, the best first."""
-        return ranked(self.claims(level))
+        return ranked(self.claims())
 
-    def guideline(self, level: float = LEVEL) -> list[Recommendation]:
+    def guideline(self) -> list[Recommendation]:
         """What the study's guideline recommends, at every combination of the factors that are not to be chosen."""
-        return recommend(self._samples(), level)
+        return recommend(self._samples())
 
     def find(self, run: str) -> dict[str, Any]:
         """The row of a run, by the beginning of its key; raises ``StoreError``."""
@@ -261,10 +249,7 @@ class StudyResults:
 
     def write_table(self) -> Path:
         """Write ``table.parquet``."""
-        import pyarrow.parquet as pq
-
-        table = self.table()
-        replace_file(self.path, lambda aside: pq.write_table(table, aside))
+        replace_file(self.path, parquet_of(self.table()))
         return self.path
 
     def is_written(self) -> bool:
@@ -272,16 +257,21 @@ class StudyResults:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        buffer = io.BytesIO()
-        pq.write_table(self.table(), buffer)
+        table = self.table()
+        ours = parquet_of(table)
         try:
-            if (data := read_regular(self.path)) == buffer.getvalue():
+            if (data := read_regular(self.path)) == ours:
                 return True
             file = pq.ParquetFile(pa.BufferReader(data))
-            is_of_another = file.metadata.created_by != pq.read_metadata(buffer).created_by
-            return is_of_another and bool(file.read().equals(self.table()))
+            is_of_another = file.metadata.created_by != pq.read_metadata(pa.BufferReader(ours)).created_by
+            return is_of_another and bool(file.read().equals(table))
         except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it that is no UTF-8
             return False
+
+
+def _with(table: pa.Table, name: str, values: Any) -> pa.Table:
+    """A table with other values in one of its columns."""
+    return table.set_column(table.schema.get_field_index(name), name, values)
 
 
 def open_study(folder: str | Path) -> StudyResults:

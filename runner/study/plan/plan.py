@@ -7,8 +7,6 @@ import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -19,9 +17,9 @@ from epicycle.actors.expression import ExpressionError
 from ...build import Model, load_model
 from ...catalogue import types_of_file
 from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
+from ...provenance import version_of
 from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
-from .described import Column, columns_of
-from .metrics import check_metric
+from .columns import Column, check_metric, columns_of
 
 _LOGGER = logging.getLogger("epicycle")
 
@@ -32,14 +30,7 @@ Sources = dict[str, str]  # SHA-256 by the name of a file, and versions by 'pack
 
 def epicycle_version() -> str:
     """The version of which results are: another one may give other ones."""
-    try:
-        return version("epicycle")
-    except PackageNotFoundError:  # run from its folder, without an install
-        return "unknown"
-
-
-class PlanError(EpicycleError):
-    """A manifest of which no plan can be made."""
+    return version_of("epicycle") or "unknown"
 
 
 @dataclass(frozen=True)
@@ -56,33 +47,21 @@ class Condition:
         return self.level.values
 
 
+@dataclass(frozen=True, eq=False)
 class Plan:
     """A study that has been tried: every level of every dimension loads.
 
     ``made`` does so; ``of_manifest`` takes over from a results folder what was found then.
     """
 
-    def __init__(
-        self,
-        study: Study,
-        metrics: list[StudyMetric],
-        sources: Sources,
-        extra: list[dict[int, Sources]],
-        texts: dict[str, str],
-        columns: dict[str, Column],
-        made_with: str,
-        files: Iterable[str] = (),
-    ) -> None:
-        self.study = study
-        self.metrics = metrics
-        self.sources = sources
-        self.texts = texts  # the YAML of the model and of all that belongs to it
-        self.files = tuple(files)  # all that were read, by the names by which they were
-        self.columns = columns
-        self.made_with = made_with  # the version of Epicycle
-        self._extra = extra  # by dimension, the files that single levels read beside the others
-        self.conditions = prod(dimension.size for dimension in study.dimensions)
-        self._condition = lru_cache(16)(self._worked_out)  # runs of one follow each other
+    study: Study
+    metrics: list[StudyMetric]
+    sources: Sources
+    extra: list[dict[int, Sources]]  # by dimension, the files that single levels read beside the others
+    texts: dict[str, str]  # the YAML of the model and of all that belongs to it
+    columns: dict[str, Column]
+    made_with: str  # the version of Epicycle
+    files: Iterable[str] = ()  # all that were read, by the names by which they were
 
     # -- making one -----------------------------------------------------------------------------------------------
 
@@ -98,7 +77,8 @@ class Plan:
         sources = _tried(study, firsts, read, problems)
         extra: list[dict[int, Sources]] = [{} for _ in study.dimensions]
         for number, dimension in enumerate(study.dimensions):
-            for index in _spread(dimension.size):
+            few = min(dimension.size, MAX_TRIED)  # from end to end
+            for index in sorted({step * (dimension.size - 1) // (few - 1) for step in range(1, few)}):
                 indices = [*firsts[:number], index, *firsts[number + 1 :]]
                 found = _tried(study, indices, read, problems)
                 if more := {name: digest for name, digest in found.items() if sources.get(name) != digest}:
@@ -135,7 +115,7 @@ class Plan:
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
         """The plan of a results folder; no file but the manifest is needed.
 
-        Raises ``ModelError``, and ``PlanError`` if what the manifest says does not fit together.
+        Raises ``ModelError``, and ``EpicycleError`` if what the manifest says does not fit together.
         """
         study = study_of_text(
             manifest["text"],
@@ -151,18 +131,22 @@ class Plan:
             metrics = [said.get(each) or StudyMetric(*each) for each in manifest["metrics"].items()]
             extra = [{int(index): found for index, found in each.items()} for each in manifest["level_sources"]]
         except (ValueError, ExpressionError) as error:
-            raise PlanError(f"the manifest of {study.name} is damaged: {error}") from error
+            raise EpicycleError(f"the manifest of {study.name} is damaged: {error}") from error
+        said_metrics, names = manifest["metrics"], [metric.name for metric in metrics]
+        declared = {each.name: each.source for each in study.metrics or ()} or {name: name for name in names}
         unlike = {
             "study": study.name != manifest["study"],
             "factors": study.factors != manifest["factors"],
-            "metrics": not _are_metrics(manifest["metrics"], study),
+            "metrics": list(said_metrics.items()) != list(declared.items())
+            or bool(said_metrics.keys() & {*RESERVED, *study.factors})
+            or (study.until is not None and study.until.metric not in names),
             "level_sources": len(extra) != len(study.dimensions),
         }
         if wrong := [name for name, is_wrong in unlike.items() if is_wrong]:
             found = ", ".join(map(repr, wrong))
-            raise PlanError(f"the manifest of {study.name} is damaged: {found} is not as its study's text says")
+            raise EpicycleError(f"the manifest of {study.name} is damaged: {found} is not as its study's text says")
         problems = Problems()
-        study.questions.check([metric.name for metric in metrics], problems)
+        study.questions.check(names, problems)
         problems.raise_if_any()
         columns = {name: Column(**said) for name, said in manifest["columns"].items()}
         return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
@@ -185,10 +169,15 @@ class Plan:
             "columns": {name: asdict(column) for name, column in self.columns.items()},
             "model": self.texts,
             "sources": self.sources,
-            "level_sources": [{str(index): found for index, found in each.items()} for each in self._extra],
+            "level_sources": [{str(index): found for index, found in each.items()} for each in self.extra],
         }
 
     # -- what it holds --------------------------------------------------------------------------------------------
+
+    @property
+    def conditions(self) -> int:
+        """How many conditions there are."""
+        return prod(dimension.size for dimension in self.study.dimensions)
 
     @property
     def replications(self) -> int:
@@ -206,20 +195,16 @@ class Plan:
         return None if self.study.until is None else self.study.until.metric
 
     def __iter__(self) -> Iterator[Condition]:
-        index = 0
-        while index < self.conditions:
-            yield self.condition(index)
-            index += 1
+        return map(self.condition, range(self.conditions))
 
     def condition(self, index: int) -> Condition:
         """A condition by its number; the last dimension changes fastest."""
-        return self._condition(index)
-
-    def _worked_out(self, index: int) -> Condition:
-        place = place_of(index, self.study.dimensions)
+        place, rest = [0] * len(self.study.dimensions), index
+        for number, dimension in reversed(list(enumerate(self.study.dimensions))):
+            rest, place[number] = divmod(rest, dimension.size)
         level = _together(self.study, place)
         sources = dict(self.sources)
-        for extra, at in zip(self._extra, place, strict=True):
+        for extra, at in zip(self.extra, place, strict=True):
             sources.update(extra.get(at, {}))
         identity = {
             "epicycle": self.made_with,
@@ -254,7 +239,7 @@ class Plan:
 
     def unlike(self, noted: Noted) -> list[str]:
         """What of this was not read when the plan was tried, or was not the same then."""
-        known = [self.sources, *(found for each in self._extra for found in each.values())]
+        known = [self.sources, *(found for each in self.extra for found in each.values())]
         digests = {digest for found in known for digest in found.values()}
         files = [name for name, digest in noted.files.items() if digest not in digests]
         packages = [(f"package {name}", version) for name, version in noted.packages.items()]
@@ -265,27 +250,9 @@ class Plan:
         return _load(self.study, condition.level)
 
 
-def _are_metrics(found: Mapping[str, str], study: Study) -> bool:
-    """Whether these can be the metrics of a study, which declares some or takes those of its model."""
-    declared = (
-        {name: name for name in found} if not study.metrics else {each.name: each.source for each in study.metrics}
-    )
-    decides = study.until is None or study.until.metric in found
-    return decides and list(found.items()) == list(declared.items()) and not found.keys() & {*RESERVED, *study.factors}
-
-
 def _hash(value: object) -> str:
     text = json.dumps(value, ensure_ascii=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-def place_of(index: int, dimensions: Sequence[Dimension]) -> list[int]:
-    """The levels of a condition, by dimension."""
-    found = []
-    for dimension in reversed(dimensions):
-        index, level = divmod(index, dimension.size)
-        found.append(level)
-    return found[::-1]
 
 
 def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
@@ -294,13 +261,6 @@ def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
     for dimension, level in zip(dimensions, place, strict=True):
         found = found * dimension.size + level
     return found
-
-
-def _spread(size: int) -> list[int]:
-    """All indices but the first, or some of them from end to end."""
-    if size <= MAX_TRIED:
-        return list(range(1, size))
-    return sorted({index * (size - 1) // (MAX_TRIED - 1) for index in range(1, MAX_TRIED)})
 
 
 def _together(study: Study, place: Iterable[int]) -> Level:

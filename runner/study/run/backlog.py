@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 from ..inference import half_width
-from ..plan import Condition, Plan
+from ..plan.plan import Condition, Plan
 
 OK, FAILED, TIMEOUT, KILLED = "ok", "failed", "timeout", "killed"
 RETRIED = (TIMEOUT, KILLED)  # what hangs on the machine, not on the model alone
@@ -34,17 +35,6 @@ class Task:
     attempt: int = 1
 
 
-@dataclass(eq=False)
-class _Open:
-    """A condition whose runs are being made."""
-
-    condition: Condition
-    limit: int  # replications that are wanted so far
-    next: int = 0
-    running: int = 0
-    values: dict[int, float] = field(default_factory=dict)
-
-
 class Backlog:
     """Hands out the runs of a plan that are not there yet, condition by condition.
 
@@ -55,14 +45,14 @@ class Backlog:
     def __init__(self, plan: Plan, known: Mapping[str, Done]) -> None:
         self.plan = plan
         self.known = known
-        self.until = plan.study.until
         self.there: Counter[str] = Counter()  # the runs that were there already, by status
         self.made: Counter[str] = Counter()  # and those that were made
         self.stopped_early = 0  # runs that were not needed
-        self._open: deque[_Open] = deque()
+        self._conditions = iter(plan)  # that are still to come
+        self._open: dict[int, Iterator[Task | None]] = {}  # the runs of conditions that are begun
+        self._running: Counter[int] = Counter()  # how many, by condition
+        self._values: dict[int, list[float]] = {}  # of the metric that decides, by condition
         self._again: deque[Task] = deque()
-        self._running: dict[tuple[int, int], _Open] = {}
-        self._next = 0
 
     @property
     def total(self) -> int:
@@ -89,24 +79,15 @@ class Backlog:
         """How many of the runs that are known the plan asks for; in a folder there may be others, too."""
         if not self.known:
             return 0
-        conditions = map(self.plan.condition, range(self.plan.conditions))
-        return sum(
-            self.plan.key(each, one) in self.known for each in conditions for one in range(self.plan.replications)
-        )
+        replications = range(self.plan.replications)
+        return sum(self.plan.key(each, one) in self.known for each in self.plan for one in replications)
 
     def next(self) -> Task | None:
         """The next run; None if there is none now, or ever."""
         if self._again:
             return self._again.popleft()
-        for opened in list(self._open):
-            if (task := self._next_of(opened)) is not None:
-                return task
-        while self._next < self.plan.conditions:
-            limit = self.plan.replications if self.until is None else self.until.batch
-            opened = _Open(self.plan.condition(self._next), min(limit, self.plan.replications))
-            self._next += 1
-            self._open.append(opened)
-            if (task := self._next_of(opened)) is not None:
+        for runs in chain(list(self._open.values()), map(self._begin, self._conditions)):
+            if (task := next(runs, None)) is not None:
                 return task
         return None
 
@@ -117,40 +98,34 @@ class Backlog:
 
     def finished(self, task: Task, done: Done) -> None:
         """A run is over."""
-        opened = self._running.pop((task.condition, task.replication))
-        opened.running -= 1
-        self._note(opened, task.replication, done, self.made)
-        self._has_more(opened)
+        self._running[task.condition] -= 1
+        self._note(task.condition, done, self.made)
 
-    def _next_of(self, opened: _Open) -> Task | None:
-        """The next run of a condition; None if it waits for others, or is closed."""
-        index = opened.condition.index
-        while self._has_more(opened):
-            replication = opened.next
-            opened.next += 1
-            key = self.plan.key(opened.condition, replication)
-            if (done := self.known.get(key)) is None:
-                opened.running += 1
-                self._running[index, replication] = opened
-                return Task(index, replication, self.plan.seed(opened.condition, replication), key)
-            self._note(opened, replication, done, self.there)
-        return None
+    def _begin(self, condition: Condition) -> Iterator[Task | None]:
+        runs = self._open[condition.index] = self._runs(condition)
+        return runs
 
-    def _note(self, opened: _Open, replication: int, done: Done, counts: Counter[str]) -> None:
+    def _runs(self, condition: Condition) -> Iterator[Task | None]:
+        """The runs of a condition that are not there; None while the end of a batch is waited for."""
+        index, most, until = condition.index, self.plan.replications, self.plan.study.until
+        values = self._values[index] = []
+        batch = most if until is None else until.batch
+        for start in range(0, most, batch):
+            for replication in range(start, min(start + batch, most)):
+                key = self.plan.key(condition, replication)
+                if (done := self.known.get(key)) is not None:
+                    self._note(index, done, self.there)
+                else:
+                    self._running[index] += 1
+                    yield Task(index, replication, self.plan.seed(condition, replication), key)
+            while self._running[index]:
+                yield None
+            if until is not None and not half_width(values) >= until.half_width:
+                self.stopped_early += max(0, most - start - batch)
+                break
+        del self._open[index], self._values[index], self._running[index]
+
+    def _note(self, condition: int, done: Done, counts: Counter[str]) -> None:
         counts[done.status] += 1
-        if self.until is not None and done.status == OK and done.value is not None and math.isfinite(done.value):
-            opened.values[replication] = done.value
-
-    def _has_more(self, opened: _Open) -> bool:
-        """Whether there is a run to be made; if all of a batch is over, the next begins, or the condition is closed."""
-        if opened.next < opened.limit or opened.running:
-            return opened.next < opened.limit
-        most = self.plan.replications
-        if self.until is not None and opened.limit < most:
-            values = [opened.values[each] for each in sorted(opened.values)]
-            if half_width(values) >= self.until.half_width:
-                opened.limit = min(opened.limit + self.until.batch, most)
-                return True
-            self.stopped_early += most - opened.limit
-        self._open.remove(opened)
-        return False
+        if done.status == OK and done.value is not None and math.isfinite(done.value):
+            self._values[condition].append(done.value)

@@ -17,10 +17,9 @@ from uuid import uuid4
 
 from epicycle.actors import EpicycleError
 
-from . import host
 from .backlog import Task
-from .keeper import Keeper
-from .parcel import SENT, differences, fitness, pack, unfit
+from .making import Keeper
+from .parcel import SENT, fitness, make_on_worker, pack, parcel_key, unfit
 from .processes import DONE, Outcome, WorkerError
 
 CONNECT = 10.0  # s in which a scheduler has to answer
@@ -74,7 +73,7 @@ class Cluster:
     async def _run(self, first: list[Task], tell: Callable[[], None]) -> None:
         async with self._client() as client:
             try:
-                self._parcel = pack(self._keeper.plan)
+                self._parcel = pack(self._backlog.plan)
                 await self._look(client)
                 self._begin(client, first)
                 self._fill(client)
@@ -150,11 +149,11 @@ class Cluster:
             if isinstance(there, ImportError | AttributeError):
                 raise WorkerError(f"the Dask worker {address} {_without(there)}")
         for address, there in (await self._asked(client.run(fitness, **options))).items():
-            if isinstance(there, dict) and (unlike := differences(there, fitness())):
-                raise WorkerError(f"the Dask worker {address} {unfit(unlike)}")
+            if isinstance(there, dict) and (unlike := unfit(there, fitness())):
+                raise WorkerError(f"the Dask worker {address} {unlike}")
         # To each its own, that they have before they have any work: nobody is preferred as he has it, or waited for.
         for address in workers:
-            parcel = {host.parcel_key(self._study, address): self._parcel}
+            parcel = {parcel_key(self._study, address): self._parcel}
             self._sent[address] = await self._asked(client.scatter(parcel, workers=[address]))
 
     async def _asked(self, question: Any) -> Any:
@@ -192,7 +191,7 @@ class Cluster:
         """Send a batch.  All that the scheduler sees of it is Python's own: it need not know Epicycle."""
         self._batches += 1
         key = f"{self._study}-{self._batches}"
-        make = (resolve_name, _name(host.make))
+        make = (resolve_name, _name(make_on_worker))
         tasks = [astuple(each) for each in batch]
         given = {"study": self._study, "timeout": self._keeper.timeout, "tasks": tasks}
         (future,) = client.get({key: (call, make, json.dumps(given))}, [key], sync=False)
@@ -220,20 +219,19 @@ class Cluster:
         for task, (what, told) in zip(batch, outcomes, strict=True):
             if what == DONE:
                 told, why_not = told
-                self._check(task, why_not)
+                if why_not is not None and self._is_right_here(task):
+                    raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
                 self._seconds += 0.2 * (told["wall_time"] - self._seconds)
             self._keeper.settle(task, (what, told))
 
-    def _check(self, task: Task, why_not: str | None) -> None:
-        """A model that cannot be loaded there must not be loaded here, either."""
-        if why_not is None:
-            return
-        plan = self._keeper.plan
+    def _is_right_here(self, task: Task) -> bool:
+        """Whether the model of a run can be loaded on this machine."""
+        plan = self._backlog.plan
         try:
             plan.load(plan.condition(task.condition))
         except EpicycleError:
-            return
-        raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
+            return False
+        return True
 
 
 def _name(function: Callable[..., object]) -> str:

@@ -1,64 +1,72 @@
-"""Making the runs of a backlog, in processes of this machine or on a cluster."""
+"""Making the runs of a backlog in processes of this machine, and keeping what comes of each, wherever it was made."""
 
 from __future__ import annotations
 
 import queue
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
 
-from .backlog import Backlog, Task
-from .keeper import ATTEMPTS, Keeper
-from .processes import DEAD, Outcome, Processes
-from .runner import Runner
-from .store import Store
+from .backlog import KILLED, TIMEOUT, Backlog, Done, Task
+from .processes import DEAD, DONE, Outcome, Processes
+from .runner import Runner, empty_row
+from .store import Row, Store, Writer, writing
 
-LOCAL, DASK = "local", "dask"  # executors
 _LOOK = 0.5  # s between two looks at the clock
+ATTEMPTS = 3  # of a run whose process dies; memory runs out for what others take, too
 
 
-def make_runs(
-    store: Store,
-    backlog: Backlog,
-    tell: Callable[[], None],
-    *,
-    jobs: int,
-    timeout: float | None = None,
-    executor: str = LOCAL,
-    scheduler: str | None = None,
-) -> None:
-    """Make all runs of a backlog, in ``jobs`` processes at a time or on the workers of a Dask scheduler.
+@dataclass
+class Keeper:
+    """Keeps the rows of runs that are over, whoever has made them, and sees to it that the others are made again."""
 
-    A run that raises gets a row with the status ``failed``, one that takes longer than ``timeout`` seconds a row
-    ``timeout``.  One whose process dies is tried again, and after three times gets a row ``killed``.  ``tell`` is
-    called now and then.  Raises ``WriteError`` and ``WorkerError``.
-    """
-    with Keeper(store, backlog, timeout) as keeper:
-        if executor == DASK:
-            # Here, and not with this package, which several threads of a Dask worker may import at once: whoever asks
-            # for `parcel` or `host` first must not find that the package waits for it.
-            from .cluster import Cluster
+    store: Store
+    backlog: Backlog
+    timeout: float | None
+    _writer: Writer
 
-            Cluster(keeper, jobs, scheduler).run(tell)
+    def settle(self, task: Task, outcome: Outcome) -> None:
+        """See what has become of a run."""
+        what, told = outcome
+        if what == DONE:
+            self._keep(task, told)
+        elif what == DEAD:
+            self.again(task, f"its process ended {ATTEMPTS} times (exit code {told})")
         else:
-            _make_here(keeper, jobs, tell)
+            self._give_up(task, TIMEOUT, f"it took longer than {self.timeout:g} s")
+
+    def again(self, task: Task, error: str) -> None:
+        """A run whose process has died is made again, or given up with this ``error``."""
+        if task.attempt < ATTEMPTS:
+            self.backlog.again(task)
+        else:
+            self._give_up(task, KILLED, error)
+
+    def _give_up(self, task: Task, status: str, error: str) -> None:
+        plan = self.backlog.plan
+        self._keep(task, empty_row(plan, plan.condition(task.condition), task) | {"status": status, "error": error})
+
+    def _keep(self, task: Task, row: Row) -> None:
+        with writing(self.store.folder):
+            self._writer.add(row)
+        decides = self.backlog.plan.decides
+        self.backlog.finished(task, Done(row["status"], row[decides] if decides else None))
 
 
-def check_executor(name: str) -> None:
-    """Raise ``EpicycleError`` if what an executor needs is not installed."""
-    if name == DASK:
-        from .cluster import distributed_module
-
-        distributed_module()
-
-
-def _make(processes: Processes, task: Task, timeout: float | None) -> Outcome:
-    """Make a run, and at once again if its process dies: who kills processes when rows come would hit it each time."""
-    while (outcome := processes.make(task, timeout))[0] == DEAD and task.attempt < ATTEMPTS:
-        task.attempt += 1
-    return outcome
+@contextmanager
+def keeping(store: Store, backlog: Backlog, timeout: float | None) -> Iterator[Keeper]:
+    """What was interrupted leaves its journal, which the next to open the folder makes a part of."""
+    writer = Writer(store)
+    try:
+        yield Keeper(store, backlog, timeout, writer)
+        with writing(store.folder):
+            writer.flush()
+    finally:
+        writer.close()
 
 
-def _make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
+def make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
     """Make the runs in processes of this machine."""
     backlog, tasks = keeper.backlog, dict[Future[Outcome], Task]()
     over: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
@@ -77,3 +85,10 @@ def _make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
             except queue.Empty:
                 pass
             tell()
+
+
+def _make(processes: Processes, task: Task, timeout: float | None) -> Outcome:
+    """Make a run, and at once again if its process dies: who kills processes when rows come would hit it each time."""
+    while (outcome := processes.make(task, timeout))[0] == DEAD and task.attempt < ATTEMPTS:
+        task.attempt += 1
+    return outcome

@@ -53,20 +53,19 @@ _SHAPE: dict[str, Any] = {
 
 
 def _fits(value: Any, shape: Any) -> bool:
-    if isinstance(shape, tuple):
-        return any(_fits(value, each) for each in shape)
-    if isinstance(shape, list):
-        if not isinstance(value, list) or (len(shape) > 1 and len(value) != len(shape)):
-            return False
-        return all(_fits(each, shape[0]) for each in value)
-    if isinstance(shape, dict):
-        if not isinstance(value, dict) or (str not in shape and value.keys() != shape.keys()):
-            return False
-        return all(_fits(each, shape.get(str) or shape[name]) for name, each in value.items())
-    if isinstance(shape, range):
-        return type(value) is int and value in shape  # of anything else it would ask every number
-    if isinstance(shape, frozenset):
-        return type(value) is str and value in shape
+    match shape:
+        case tuple():
+            return any(_fits(value, each) for each in shape)
+        case list():
+            has_length = isinstance(value, list) and len(shape) in (1, len(value))
+            return has_length and all(_fits(each, shape[0]) for each in value)
+        case dict():
+            has_keys = isinstance(value, dict) and (str in shape or value.keys() == shape.keys())
+            return has_keys and all(_fits(each, shape.get(str) or shape[name]) for name, each in value.items())
+        case range():
+            return type(value) is int and value in shape  # of anything else it would ask every number
+        case frozenset():
+            return type(value) is str and value in shape
     return value is None if shape is None else type(value) is shape
 
 
@@ -107,6 +106,11 @@ def _checksum_of(manifest: Mapping[str, Any]) -> str:
 def read_manifest(folder: Path) -> dict[str, Any]:
     """What a results folder says of itself; raises ``StoreError``, and ``DamagedError`` for what we did not write."""
     path = folder / "manifest.json"
+
+    def damaged(what: object) -> DamagedError:
+        told = f"'epicycle study STUDY --out {folder}' writes it anew, and keeps the runs that are there"
+        return DamagedError(f"{path} {what}\n   help: {told}")
+
     if not folder.is_dir():
         raise StoreError(f"there is no folder {folder}")
     try:
@@ -114,26 +118,22 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise StoreError(f"{folder} holds no results of a study: it has no manifest.json") from None
     except OSError as error:
-        raise DamagedError(f"{path} cannot be read: {error.strerror}{_help(folder)}") from error
-    except (ValueError, RecursionError) as error:
-        reason = "it is nested too deep" if isinstance(error, RecursionError) else error
-        raise DamagedError(f"{path} is damaged: {reason}{_help(folder)}") from error
+        raise damaged(f"cannot be read: {error.strerror}") from error
+    except RecursionError as error:
+        raise damaged("is damaged: it is nested too deep") from error
+    except ValueError as error:
+        raise damaged(f"is damaged: {error}") from error
     if not isinstance(manifest, dict) or not manifest.keys() & {"level_sources", "checksum"}:
         raise StoreError(f"{folder} holds other results, not those of a study")
     if "checksum" in manifest and manifest["checksum"] != _checksum_of(manifest):
-        raise DamagedError(f"{path} is damaged: it is not what was written{_help(folder)}")
+        raise damaged("is damaged: it is not what was written")
     if (found := manifest.get("format")) != FORMAT:
         raise StoreError(
             f"{folder} has format {found}, this Epicycle reads format {FORMAT}\n"
             f"   help: its table.parquet can be read with pandas; make its runs anew in another folder"
         )
-    if missing := [name for name in (*_SHAPE, "checksum") if name not in manifest]:
-        raise DamagedError(f"{path} is damaged: it has no {', '.join(map(repr, missing))}{_help(folder)}")
-    if unlike := [name for name, shape in _SHAPE.items() if not _fits(manifest[name], shape)]:
-        found = ", ".join(map(repr, unlike))
-        raise DamagedError(f"{path} is damaged: {found} cannot be what was written{_help(folder)}")
+    if missing := [repr(name) for name in (*_SHAPE, "checksum") if name not in manifest]:
+        raise damaged(f"is damaged: it has no {', '.join(missing)}")
+    if unlike := [repr(name) for name, shape in _SHAPE.items() if not _fits(manifest[name], shape)]:
+        raise damaged(f"is damaged: {', '.join(unlike)} cannot be what was written")
     return manifest
-
-
-def _help(folder: Path) -> str:
-    return f"\n   help: 'epicycle study STUDY --out {folder}' writes it anew, and keeps the runs that are there"

@@ -1,25 +1,32 @@
-"""A parcel: a plan with all files that it reads, for machines that share no file system with this one."""
+"""A parcel: a plan with all files that it reads, for machines that share no file system with this one.
+
+There a Dask worker hands the runs to processes of its own, and ends those that hang.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import pickle
 import platform
+import threading
+import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any
 
-from ...provenance import versions
+from ...provenance import version_of, versions
 from ...text import ModelError, noting
-from ..plan import Plan
+from ..plan.plan import Plan
 from .backlog import Task
-from .processes import WorkerError
+from .processes import Outcome, Processes, UnwantedError, WorkerError
 from .runner import Runner
 from .store import Row
 
@@ -30,6 +37,8 @@ SENT = (
 _CODE = ("epicycle.actors", "epicycle.aspects", "epicycle.runner")
 _NO_MATTER = ("pyarrow",)  # workers write no files
 _OPTIONAL = ("casadi",)  # which takes part in runs, where it is installed
+_SOON = 0.05  # s
+_IDLE = 20.0  # s after which processes without work are ended: their study is over
 
 
 def pack(plan: Plan) -> bytes:
@@ -55,8 +64,8 @@ def unpack(parcel: bytes, root: Path) -> Plan:
     ``WorkerError`` on a machine where a seed may give another run.
     """
     found: dict[str, Any] = pickle.loads(zlib.decompress(parcel))
-    if unlike := differences(fitness(), found["fitness"]):
-        raise WorkerError(unfit(unlike))
+    if unlike := unfit(fitness(), found["fitness"]):
+        raise WorkerError(unlike)
     manifest = found["manifest"]
     for name, content in found["files"].items():
         path = below(root, name)
@@ -68,6 +77,67 @@ def unpack(parcel: bytes, root: Path) -> Plan:
     os.chdir(folder)
     types = [str(below(root, name)) for name in manifest["types"]]
     return Plan.of_manifest(manifest | {"file": str(study), "types": types})
+
+
+def below(root: Path, name: str) -> Path:
+    """Where a file lies whose place was below the root of a file system, or of a drive."""
+    path = Path(name)
+    return root.joinpath(path.drive.rstrip(":"), *path.parts[1:]) if path.anchor else root / path
+
+
+def _modules(types: Iterable[Path]) -> Iterator[str]:
+    """The Python files that own types import from beside their file."""
+    for file in types:
+        folder = file.resolve().parent
+        finder = ModuleFinder(path=[str(folder)])
+        finder.run_script(str(file.resolve()))
+        for module in finder.modules.values():
+            if (name := getattr(module, "__file__", None)) is not None:
+                yield name
+
+
+# -- who may take part ------------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=1)
+def fitness() -> dict[str, str | None]:
+    """What has to be the same wherever a seed is to give the same run."""
+    found = {name: each for name, each in versions().items() if name not in _NO_MATTER}
+    found |= {name: version_of(name) for name in _OPTIONAL}
+    found["python"] = ".".join(platform.python_version_tuple()[:2])
+    found["code"] = _code()
+    return found
+
+
+def unfit(worker: Mapping[str, str | None], client: Mapping[str, str | None]) -> str:
+    """What is said of a worker, after its name, that is not like the machine that wants it to work; empty if it is."""
+    told = [
+        f"{name} {worker.get(name) or 'is missing'} there, {wanted or 'none'} here"
+        for name, wanted in client.items()
+        if name != "code" and wanted != worker.get(name)
+    ]
+    if not told and worker.get("code") != client["code"]:
+        told = ["the code of Epicycle is not the same"]
+    if not told:
+        return ""
+    return (
+        f"is not like this machine: {'; '.join(told)}\n"
+        "   help: the same seed is to give the same run, so install the same there"
+    )
+
+
+def _code() -> str:
+    """A hash of Epicycle's code: while it is worked on, the version says little."""
+    digest = hashlib.sha256()
+    for package in _CODE:
+        for folder in map(Path, import_module(package).__path__):
+            for path in sorted(folder.rglob("*.py"), key=lambda path: path.relative_to(folder).parts):
+                digest.update(f"{package}/{path.relative_to(folder).as_posix()}\n".encode())
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+# -- on a worker ------------------------------------------------------------------------------------------------------
 
 
 class Guest:
@@ -103,65 +173,75 @@ class Guest:
         return text.replace(self._root, "")
 
 
-def below(root: Path, name: str) -> Path:
-    """Where a file lies whose place was below the root of a file system, or of a drive."""
-    path = Path(name)
-    return root.joinpath(path.drive.rstrip(":"), *path.parts[1:]) if path.anchor else root / path
+@dataclass
+class _House:
+    """The processes of one study on this worker, how many batches they are at, and what ends them."""
+
+    processes: Processes
+    batches: int = 0
+    timer: threading.Timer | None = None
 
 
-def _modules(types: Iterable[Path]) -> Iterator[str]:
-    """The Python files that own types import from beside their file."""
-    for file in types:
-        folder = file.resolve().parent
-        finder = ModuleFinder(path=[str(folder)])
-        finder.run_script(str(file.resolve()))
-        for module in finder.modules.values():
-            if (name := getattr(module, "__file__", None)) is not None:
-                yield name
+_houses: dict[str, _House] = {}  # by study
+_guard = threading.Lock()
 
 
-# -- who may take part ------------------------------------------------------------------------------------------------
+def parcel_key(study: str, address: str) -> str:
+    """The name under which the worker at an address has the parcel of a study."""
+    return f"{study}-parcel-{address}"
 
 
-@lru_cache(maxsize=1)
-def fitness() -> dict[str, str | None]:
-    """What has to be the same wherever a seed is to give the same run."""
-    found = {name: each for name, each in versions().items() if name not in _NO_MATTER}
-    for name in _OPTIONAL:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = None
-    found["python"] = ".".join(platform.python_version_tuple()[:2])
-    found["code"] = _code()
-    return found
+def make_on_worker(batch: str) -> list[Outcome]:
+    """Make runs, on a Dask worker; raises ``WorkerError`` if it cannot.
+
+    What it gives are plain values, which a scheduler that knows nothing of Epicycle passes on.
+    """
+    from distributed import get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_wanted() -> bool:
+        state = worker.state.tasks.get(key)
+        return state is not None and state.state not in ("cancelled", "released")
+
+    given = json.loads(batch)
+    try:
+        while (parcel := worker.data.get(parcel_key(given["study"], worker.address))) is None:
+            if not is_wanted():
+                raise UnwantedError
+            time.sleep(_SOON)  # the parcel comes soon after a worker that has just come
+        with _at_work(given["study"], parcel, worker.local_directory) as processes:
+            return [processes.make(Task(*each), given["timeout"], is_wanted) for each in given["tasks"]]
+    except UnwantedError:
+        return []  # nobody will look at it
+    except WorkerError as error:
+        raise WorkerError(f"the Dask worker {worker.address} {error}") from None
 
 
-def differences(worker: Mapping[str, str | None], client: Mapping[str, str | None]) -> str:
-    """How the fitness of a worker differs from that of the machine that wants it to work; empty if it does not."""
-    told = [
-        f"{name} {worker.get(name) or 'is missing'} there, {wanted or 'none'} here"
-        for name, wanted in client.items()
-        if name != "code" and wanted != worker.get(name)
-    ]
-    if not told and worker.get("code") != client["code"]:
-        told = ["the code of Epicycle is not the same"]
-    return "; ".join(told)
+@contextmanager
+def _at_work(study: str, parcel: bytes, place: str) -> Iterator[Processes]:
+    """The processes of a study; they are ended when there has been no work for a while."""
+    with _guard:
+        if (house := _houses.get(study)) is None:
+            house = _houses[study] = _House(Processes(Guest, parcel, place=place))
+        if house.timer is not None:
+            house.timer.cancel()
+        house.batches += 1
+    try:
+        yield house.processes
+    finally:
+        with _guard:
+            house.batches -= 1
+            if not house.batches:
+                house.timer = threading.Timer(_IDLE, _close, (study,))
+                house.timer.daemon = True
+                house.timer.start()
 
 
-def unfit(unlike: str) -> str:
-    """What is said of a worker that differs, after its name."""
-    return (
-        f"is not like this machine: {unlike}\n   help: the same seed is to give the same run, so install the same there"
-    )
-
-
-def _code() -> str:
-    """A hash of Epicycle's code: while it is worked on, the version says little."""
-    digest = hashlib.sha256()
-    for package in _CODE:
-        for folder in map(Path, import_module(package).__path__):
-            for path in sorted(folder.rglob("*.py"), key=lambda path: path.relative_to(folder).parts):
-                digest.update(f"{package}/{path.relative_to(folder).as_posix()}\n".encode())
-                digest.update(path.read_bytes())
-    return digest.hexdigest()
+def _close(study: str) -> None:
+    with _guard:
+        if (house := _houses.get(study)) is None or house.batches:
+            return  # work has just come
+        del _houses[study]
+    house.processes.end()

@@ -1,4 +1,9 @@
-"""Processes that make runs for this one, some of which may hang, run out of memory or be killed."""
+"""Processes that make runs for this one, some of which may hang, run out of memory or be killed.
+
+Whoever wants the runs outlives those that hang or kill their process, and can end them.  Each process takes what makes
+a bench, and then one request after the other from standard input; it answers on what was standard output, and ends with
+its input.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +11,18 @@ import os
 import pickle
 import queue
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 from epicycle.actors import EpicycleError
+
+from ...collection import seldom_collecting
 
 MAX_STILLBORN = 5  # processes in a row that end before they can do anything
 _LOOK = 0.5  # s between two looks whether a run is still wanted
@@ -50,9 +58,10 @@ class _Process:
     def __init__(self, begin: Callable[..., Bench], arguments: tuple[object, ...], folder: str) -> None:
         self._folder = folder
         environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
-        # No multiprocessing: the processes of Dask are daemons, which may have no children by it.
+        # No multiprocessing: the processes of Dask are daemons, which may have no children by it.  With -P they import
+        # what this process would, and no module of that name that happens to lie in the working directory.
         self._process = subprocess.Popen(
-            [sys.executable, "-m", f"{__package__}.worker"],
+            [sys.executable, "-P", "-c", f"from {__name__} import serve; serve()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,
@@ -181,3 +190,47 @@ class Processes:
                 self._idle.append(process)
                 return
         process.end()
+
+
+# -- in such a process ------------------------------------------------------------------------------------------------
+
+
+def serve() -> None:
+    """Serve whoever has started this process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who waits for it decides what an interrupt means
+    requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for each in (0, 1):  # an actor that prints would break into the answers
+        os.dup2(nothing, each)
+    given: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(requests, given), daemon=True).start()
+
+    def tell(what: str, told: object = None) -> None:
+        replies.write(pickle.dumps((what, told)))
+        replies.flush()
+
+    try:
+        with seldom_collecting():
+            begin, arguments = given.get()
+            bench: Bench = begin(*arguments)
+            tell(READY)
+            while True:
+                request = given.get()
+                bench.prepare(request)
+                tell(BEGUN)
+                tell(DONE, bench.make(request))
+    except BrokenPipeError:
+        os._exit(1)
+    except EpicycleError as error:
+        tell(RAISED, error)
+    except Exception as error:
+        tell(RAISED, EpicycleError(f"{type(error).__name__}: {error}"))
+
+
+def _listen(requests: BinaryIO, given: queue.SimpleQueue[Any]) -> None:
+    """Take what comes; when who wants the runs has ended, however that was, end in the middle of a run."""
+    try:
+        while True:
+            given.put(pickle.load(requests))
+    except (EOFError, OSError):
+        os._exit(1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,13 +21,10 @@ class Pulse:
 
     def line(self, backlog: Backlog) -> str:
         """``120 of 6,000 runs, 2 failed, 3.1 runs/s, 32 min left``."""
-        made = backlog.made.total()
         parts = [f"{backlog.over:,} of {backlog.total:,} runs"]
         if backlog.failed:
             parts.append(f"{backlog.failed:,} failed")
-        seconds = time.monotonic() - self.started
-        if made and seconds > 0:
-            rate = made / seconds
+        if rate := backlog.made.total() / ((time.monotonic() - self.started) or math.inf):
             parts += [f"{rate:.3g} runs/s", f"{duration(backlog.left / rate)} left"]
         return ", ".join(parts)
 
@@ -36,30 +34,23 @@ def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
     """What a session calls now and then."""
     pulse = Pulse()
     terminal = console(stderr=True)
-    if terminal.is_terminal:
-        from rich.progress import BarColumn, Progress, TextColumn
+    if not terminal.is_terminal:
+        last = pulse.started
 
-        with Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TextColumn("{task.fields[line]}", markup=False),
-            console=terminal,
-            transient=True,
-        ) as bar:
-            task = bar.add_task(name, total=None, line="")
-            yield lambda backlog: bar.update(
-                task, total=backlog.total, completed=backlog.over, line=pulse.line(backlog)
-            )
+        def tell(backlog: Backlog) -> None:
+            nonlocal last
+            if time.monotonic() - last >= EVERY:
+                last = time.monotonic()
+                complain(f"{time.strftime('%H:%M:%S')} {name}: {pulse.line(backlog)}")
+
+        yield tell
         return
-    last = pulse.started
+    from rich.progress import BarColumn, Progress, TextColumn
 
-    def tell(backlog: Backlog) -> None:
-        nonlocal last
-        if time.monotonic() - last >= EVERY:
-            last = time.monotonic()
-            complain(f"{time.strftime('%H:%M:%S')} {name}: {pulse.line(backlog)}")
-
-    yield tell
+    texts = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[line]}"))
+    with Progress(next(texts), BarColumn(), next(texts), console=terminal, transient=True) as bar:
+        task = bar.add_task(name, total=None, line="")
+        yield lambda now: bar.update(task, total=now.total, completed=now.over, line=pulse.line(now))
 
 
 def duration(seconds: float) -> str:

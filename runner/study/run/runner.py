@@ -1,19 +1,23 @@
-"""One run of a study: from a task to its row."""
+"""Runs of a study: from a task to its row; and once more, for signals, which a study does not keep as runs repeat."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 from epicycle.actors import EpicycleError, readable
 
 from ...build import Model
 from ...engine import LogFilter, Results, Simulation
-from ..plan import Condition, Plan, value_of
+from ..plan.columns import value_of
+from ..plan.plan import Condition, Plan
 from .backlog import FAILED, OK, Task
 from .manifest import columns_of_rows
+from .processes import DONE, Processes
 from .store import Row
 
 _MODELS_KEPT = 4
@@ -24,7 +28,7 @@ class Runner:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self._model = lru_cache(_MODELS_KEPT)(self._load)
+        self._loaded = lru_cache(_MODELS_KEPT)(self._load)
 
     @classmethod
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Runner:
@@ -33,17 +37,17 @@ class Runner:
 
     def prepare(self, task: Task) -> None:
         """Load the model of the task's condition, unless it is there."""
-        self._model(task.condition)
+        self._loaded(task.condition)
 
     def why_not(self, task: Task) -> str | None:
         """Why the model of the task's condition cannot be loaded; None if it can."""
-        model = self._model(task.condition)
+        _, model = self._loaded(task.condition)
         return model if isinstance(model, str) else None
 
     def make(self, task: Task) -> Row:
         """The row of a run; whatever it raises is told there."""
-        model = self._model(task.condition)
-        row = empty_row(self.plan, task)
+        condition, model = self._loaded(task.condition)
+        row = empty_row(self.plan, condition, task)
         started = time.perf_counter()
         try:
             if isinstance(model, str):
@@ -53,35 +57,119 @@ class Runner:
             row |= {"status": OK, "events": results.events, "digest": results.digest}
         except Exception as error:
             told = str(error) if isinstance(error, EpicycleError) else f"{type(error).__name__}: {error}"
-            row |= dict.fromkeys((metric.name for metric in self.plan.metrics), None)
-            row |= {"status": FAILED, "error": readable(told)}
+            row = empty_row(self.plan, condition, task) | {"status": FAILED, "error": readable(told)}
         row["wall_time"] = time.perf_counter() - started
         return row
 
-    def _load(self, index: int) -> Model | str:
+    def _load(self, index: int) -> tuple[Condition, Model | str]:
+        condition = self.plan.condition(index)
         try:
-            model = self.plan.load(self.plan.condition(index))
+            model = self.plan.load(condition)
         except EpicycleError as error:
-            return str(error)
+            return condition, str(error)
         # Recording costs time and memory, and most studies need none of it.
         wanted = {signal for metric in self.plan.metrics for signal in metric.signals}
         model.recorded = [name for name in model.recorded if name in wanted]
-        return model
+        return condition, model
 
 
-def empty_row(plan: Plan, task: Task) -> Row:
+def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:
     """What a row holds before the run."""
-    condition = plan.condition(task.condition)
     known = {"run": task.key, "condition": condition.key, "replication": task.replication, "seed": task.seed}
     columns = columns_of_rows(plan.study.factors, (metric.name for metric in plan.metrics))
     return dict.fromkeys(columns) | known | condition.values
 
 
-def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, Simulation, EpicycleError | None]:
-    """A run once more, alone, with all that the model records and the whole event log; and what it raised."""
+# -- once more --------------------------------------------------------------------------------------------------------
+
+
+def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, EpicycleError | None]:
+    """A run once more, alone, with all that the model records and the whole event log; and what made it fail."""
     model = plan.load(condition)
     simulation = Simulation(model, seed=seed, keep_log=LogFilter({}))
     try:
-        return model, simulation.run(), simulation, None
+        results = simulation.run()
     except EpicycleError as error:
-        return model, simulation.results("failed"), simulation, error
+        return model, simulation.results("failed"), error
+    try:
+        for metric in plan.metrics:
+            value_of(metric, results)
+    except EpicycleError as error:
+        return model, results, error
+    return model, results, None
+
+
+class ReplayError(EpicycleError):
+    """A run that cannot be repeated, or does not give what it gave before."""
+
+
+class Reader(Protocol):
+    """What is wanted of a repeated run; has to be picklable."""
+
+    def ports(self, model: Model) -> tuple[str, ...]:
+        """The output ports to be recorded, as patterns."""
+
+    def extract(self, model: Model, results: Results) -> Any:
+        """What is kept, as plain data."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A run that is to be repeated, and who reads it, by name."""
+
+    condition: int
+    replication: int
+    seed: int
+    digest: str
+    readers: tuple[tuple[str, Reader], ...]
+
+
+def repeat(
+    plan: Plan, replays: Sequence[Replay], jobs: int, tell: Callable[[int], None] = lambda done: None
+) -> Iterator[tuple[Replay, dict[str, Any]]]:
+    """Repeat runs in ``jobs`` processes, in any order: each with what its readers took of it.
+
+    What a reader raises stands in the place of what it took, as an ``EpicycleError``.  Raises ``ReplayError``.
+    """
+    # Runs of one condition follow each other, so that a process loads few models.
+    ordered = sorted(replays, key=lambda each: (each.condition, each.replication))
+    with ThreadPoolExecutor(jobs) as threads, Processes(_Repeater, plan.manifest()) as processes:
+        futures = {threads.submit(processes.make, each): each for each in ordered}
+        for done, future in enumerate(as_completed(futures), start=1):
+            what, found = future.result()
+            if what != DONE:
+                raise ReplayError("a process that repeated runs has died; is there enough memory?")
+            yield futures[future], found
+            tell(done)
+
+
+class _Repeater:
+    """Repeats runs of a plan."""
+
+    def __init__(self, manifest: Mapping[str, Any]) -> None:
+        self._plan = Plan.of_manifest(manifest)
+        self._model = lru_cache(1)(lambda index: self._plan.load(self._plan.condition(index)))
+
+    def prepare(self, replay: Replay) -> None:
+        """Load the model."""
+        self._model(replay.condition)
+
+    def make(self, replay: Replay) -> dict[str, Any]:
+        """What the readers take of the run."""
+        model = self._model(replay.condition)
+        model.recorded = []
+        for _, reader in replay.readers:
+            model.record(*reader.ports(model))
+        results = Simulation(model, seed=replay.seed).run()
+        if results.digest != replay.digest:
+            raise ReplayError(
+                f"run {replay.replication} of condition {replay.condition} (seed {replay.seed}) does not repeat: "
+                f"its digest is {results.digest[:16]}..., but was {replay.digest[:16]}...; something has changed since"
+            )
+        found: dict[str, Any] = {}
+        for name, reader in replay.readers:
+            try:
+                found[name] = reader.extract(model, results)
+            except EpicycleError as error:
+                found[name] = EpicycleError(str(error))
+        return found

@@ -26,7 +26,7 @@ import json
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -71,16 +71,19 @@ class Store:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        for path in sorted((self.folder / "parts").glob("*.parquet")):
-            data = self._whole(path, *read_part(path))
+        for path in sorted(self.folder.glob("parts/*.parquet")):
+            data, damage = read_part(path)
+            self._check(path, damage)
             with pq.ParquetFile(pa.BufferReader(data)) as file:
                 if not file.schema_arrow.equals(self.schema):
                     told = f"{path} has not the columns of {self.folder}/manifest.json: it is of another study"
                     raise StoreError(told)
                 yield from file.iter_batches(columns=columns)
-        for path in sorted((self.folder / "journals").glob("*.jsonl")):
+        for path in sorted(self.folder.glob("journals/*.jsonl")):
             with suppress(FileNotFoundError):  # its writer has just made a part of it
-                if rows := self._whole(path, *read_journal(path)):
+                rows, damage = read_journal(path)
+                self._check(path, damage)
+                if rows:
                     yield pa.RecordBatch.from_pylist(rows, self.schema).select(columns or self.schema.names)
 
     def known(self, value: str | None = None) -> dict[str, Done]:
@@ -93,11 +96,10 @@ class Store:
                     found[key] = Done(status, *number)
         return found
 
-    def _whole(self, path: Path, contents: Any, damage: str) -> Any:
+    def _check(self, path: Path, damage: str) -> None:
         if damage:
             told = f"'epicycle resume {self.folder}' puts it aside and makes the runs anew that are lost with it"
             raise DamagedError(f"{path} {damage}\n   help: {told}")
-        return contents
 
 
 # -- opening it to write ----------------------------------------------------------------------------------------------
@@ -109,6 +111,7 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
     Raises ``StoreError``.  The caller holds the lock, so that whoever has left a journal behind is gone.
     """
     path = folder / "manifest.json"
+    another = "\n   help: choose another folder with --out"
     before: Mapping[str, Any] | None = None
     if path.exists():
         try:
@@ -121,27 +124,27 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
         each.name not in ("lock", "parts", "journals", "damaged") and not each.name.startswith(".manifest.json")
         for each in folder.iterdir()
     ):
-        raise StoreError(f"{folder} is not empty, and holds no results of a study{_ANOTHER}")
+        raise StoreError(f"{folder} is not empty, and holds no results of a study{another}")
     if before is not None:
         name = manifest["study"]
         if before["study"] != name:
-            raise StoreError(f"{folder} holds results of the study {before['study']!r}, not of {name!r}{_ANOTHER}")
+            raise StoreError(f"{folder} holds results of the study {before['study']!r}, not of {name!r}{another}")
         for what in ("factors", "metrics"):
             if list(before[what].items()) != list(manifest[what].items()):
                 had, has = _shown(before[what]), _shown(manifest[what])
-                raise StoreError(f"{folder} was made when {name} had other {what}: {had}, not {has}{_ANOTHER}")
+                raise StoreError(f"{folder} was made when {name} had other {what}: {had}, not {has}{another}")
     with writing(folder):
         for name in ("parts", "journals"):
             (folder / name).mkdir(exist_ok=True)
-        _replace(path, lambda aside: aside.write_text(manifest_text(manifest), encoding="utf-8"))
+        _replace(path, manifest_text(manifest).encode())
         for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*"):
             for aside in folder.glob(pattern):
                 aside.unlink()  # what somebody was writing when killed
         store = Store(folder)
-        for part in sorted((folder / "parts").glob("*.parquet")):
+        for part in sorted(folder.glob("parts/*.parquet")):
             if damage := read_part(part)[1]:
                 _put_aside(part, f"{damage}; its runs are made anew")
-        for journal in sorted((folder / "journals").glob("*.jsonl")):
+        for journal in sorted(folder.glob("journals/*.jsonl")):
             if kind := irregular(journal):
                 _put_aside(journal, f"is {kind}")
                 continue
@@ -153,9 +156,6 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
             else:
                 journal.unlink()
     return store
-
-
-_ANOTHER = "\n   help: choose another folder with --out"
 
 
 def _shown(columns: Mapping[str, str]) -> str:
@@ -275,26 +275,33 @@ class Writer:
 def write_part(store: Store, name: str, rows: list[Row]) -> None:
     """Add a part, which appears all at once."""
     import pyarrow as pa
+
+    data = parquet_of(pa.Table.from_pylist(rows, store.schema))
+    _replace(store.folder / "parts" / f"{name}-{checksum(data)}.parquet", data)
+
+
+def parquet_of(table: pa.Table) -> bytes:
+    """What a Parquet file holds."""
     import pyarrow.parquet as pq
 
     buffer = io.BytesIO()
-    pq.write_table(pa.Table.from_pylist(rows, store.schema), buffer)
-    data = buffer.getvalue()
-    _replace(store.folder / "parts" / f"{name}-{checksum(data)}.parquet", lambda aside: aside.write_bytes(data))
+    pq.write_table(table, buffer)
+    return buffer.getvalue()
 
 
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+def replace_file(path: Path, data: bytes) -> None:
     """Write a file of the folder so that it appears all at once; raises ``WriteError``."""
     with writing(path.parent):
-        _replace(path, write)
+        _replace(path, data)
 
 
-def _replace(path: Path, write: Callable[[Path], object]) -> None:
+def _replace(path: Path, data: bytes) -> None:
     """Write a file aside, bring it to the disk, and move it into its place."""
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        write(aside)
-        with aside.open("rb+") as file:
+        with aside.open("wb") as file:
+            file.write(data)
+            file.flush()
             os.fsync(file.fileno())
         os.replace(aside, path)
     except BaseException:

@@ -20,7 +20,7 @@ from epicycle.runner.show.report.figure import layout, roles
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
 from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
-from epicycle.runner.study.plan.described import si_unit
+from epicycle.runner.study.plan.columns import si_unit
 from epicycle.runner.study.run.manifest import manifest_text
 from epicycle.runner.text import Problems
 from tests.study.study_parts import STUDY, THIS, write

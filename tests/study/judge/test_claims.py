@@ -95,7 +95,7 @@ def grows(load: float, servers: int, random: np.random.Generator) -> float:
 def test_comparisons_are_scipys_paired_tests() -> None:
     found = one("less: wait, at: {servers: 2}, than: {servers: [3, 4]}, where: {load: 0.7}", grows)
     samples = table("", grows)
-    values = {at: list(samples.numbers_of(at, "wait").values()) for at in (5, 6, 7)}
+    values = {at: list(samples.numbers(at, "wait").values()) for at in (5, 6, 7)}
     expected = [stats.ttest_rel(values[5], values[at]) for at in (6, 7)]
     for finding, test in zip(found.findings, expected, strict=True):
         low, high = test.confidence_interval(0.95)
@@ -117,7 +117,7 @@ def test_slopes_are_scipys_regressions() -> None:
     samples = table("", grows)
 
     def slope(replication: int, load: int) -> float:
-        values = [samples.numbers_of(4 * load + servers, "wait")[replication] for servers in range(4)]
+        values = [samples.numbers(4 * load + servers, "wait")[replication] for servers in range(4)]
         return float(stats.linregress([1, 2, 3, 4], values).slope)
 
     for finding, (before, after) in zip(found.findings, ((0, 1), (1, 2)), strict=True):

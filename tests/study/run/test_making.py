@@ -120,3 +120,28 @@ def test_replay_gives_the_digest_of_the_row(done: Path, tmp_path: Path, capsys: 
         log = pq.read_table(tmp_path / "log.parquet")
         assert log.num_rows == row["events"]
         assert {"signals.parquet"} < {path.name for path in tmp_path.iterdir()}
+
+
+def test_a_metric_that_cannot_be_calculated_is_told_by_replay_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(
+        tmp_path,
+        STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]").replace("  place: place\n", "  place: 1 / (end - end)\n"),
+    )
+    assert study(tmp_path, "--replications", 1) == 1
+    (row,) = open_study(tmp_path / "out").failures()
+    assert row["error"] == "'1 / (end - end)': 1 / (end - end) divides by zero, with end = 9.0"
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path / "out"), row["run"][:12]]) == 1
+    said = capsys.readouterr()
+    assert said.err == f"error: {row['error']}\n"
+    assert "ended by no events left" in said.out
+
+
+def test_modules_in_the_working_directory_do_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path)
+    for name in ("pickle", "queue", "simpy"):
+        (tmp_path / f"{name}.py").write_text("raise RuntimeError('somebody else')\n")
+    monkeypatch.chdir(tmp_path)
+    assert study(tmp_path, "--replications", 1) == 0
