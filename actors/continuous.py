@@ -22,7 +22,7 @@ from .core import (
 from .expression import Formula, FormulaParameter, operand
 from .expression.enclosure import bounds_of
 from .integration import STEPPERS, Bounds, State
-from .solution import Crossing, Equations, Guard, Solution, sign_of
+from .solution import Guard, Solution, sign_of
 
 _MAX_STEPS = 10_000
 _AHEAD = 64  # parts of a step that are searched for crossings at once
@@ -148,7 +148,8 @@ class ODE(Actor):
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s: no rounding adds up over crossings."""
         self._time, self._fraction = time, fraction
         self._solution = Solution(
-            Equations(self._rates, self._bounds_of_rates),
+            self._rates,
+            self._bounds_of_rates,
             state,
             self._guards,
             method=self.method,
@@ -190,17 +191,14 @@ class ODE(Actor):
         now = self._elapsed()
         if self._guards:
             self._solution.search(now)
-        crossed = dict(self._jumps)
-        self._jumps.clear()
+        at, crossed, self._jumps = now, self._jumps, {}
         crossing = self._solution.crossing
         if crossing is not None and self._moment(crossing.time) <= self.tag.time:
-            crossed = {**crossed, **crossing.sides}
-            self._cross(crossing, crossed)
-        elif crossed:
-            self._cross(Crossing(now, crossed), crossed)
+            at, crossed = crossing.time, {**crossed, **crossing.sides}
+        if crossed:
+            self._cross(at, crossed)
         if crossed or self.trigger.present:
-            at = 0.0 if crossed else now
-            for name, value in zip(self._states, self._solution.at(at), strict=True):
+            for name, value in zip(self._states, self._solution.at(0.0 if crossed else now), strict=True):
                 self.outputs[name].send(value)
         self._take_inputs()
         self._plan()
@@ -213,9 +211,9 @@ class ODE(Actor):
         """The nanosecond that is nearest to a time of the present solution."""
         return self._time + round((self._fraction + at) * NANOSECONDS_PER_SECOND)
 
-    def _cross(self, crossing: Crossing, crossed: Mapping[int, int]) -> None:
+    def _cross(self, at: float, crossed: Mapping[int, int]) -> None:
         """Send the crossings, reset what they reset, and begin a new solution."""
-        at, state = crossing.time, self._solution.at(crossing.time)
+        state = self._solution.at(at)
         self._solution.rewind(at)
         before, names = self._signs(at, state), self._names(at, state)
         after = dict(zip(self._states, state, strict=True))
