@@ -10,10 +10,13 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
+from numpy.typing import NDArray
 
 from ...core import elementary
 from ...core.elementary.in_numba import register
 
+Array = NDArray[np.float64]  # the one array type of the kernels
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
