@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -130,7 +129,10 @@ class _MeasuredTimes:
     @cached_property
     def _times(self) -> dict[str, list[float]]:
         """The times of each actor; under no name, if they are for all."""
-        table = self._table()
+        try:
+            table = read_table(self.file)
+        except OSError as error:
+            raise self._error(str(error.strerror)) from None
         if "value" not in table.column_names:
             raise self._error(f"there is no column 'value'; columns: {', '.join(table.column_names)}")
         values = table.column("value").to_pylist()
@@ -147,12 +149,6 @@ class _MeasuredTimes:
         if is_for_all and not found:
             raise self._error("it has no rows")
         return found
-
-    def _table(self) -> Any:
-        try:
-            return read_table(self.file)
-        except OSError as error:
-            raise self._error(str(error.strerror)) from None
 
     def _error(self, reason: str) -> EpicycleError:
         return EpicycleError(f"the execution times in {self.file} cannot be used: {reason}")
@@ -227,7 +223,7 @@ class Processor(ExecutionAspect):
     )
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
-        given: FiringTime | None = self._of(self.times, "times", point)
+        given: FiringTime | None = self._of("times", point)
         seconds = time_needed(self.time if given is None else given, job, point.random)
         if seconds is None:
             self.pass_by(job, point)
@@ -259,22 +255,21 @@ class Processor(ExecutionAspect):
         return core
 
     def _task(self, job: Job, point: ActorPoint, duration: int) -> _Firing:
-        now, limit = point.tag.time, self._of(self.deadlines, "deadlines", point)
+        now, limit = point.tag.time, self._of("deadlines", point)
         deadline = float("inf") if limit is None else now + to_nanoseconds(limit)
         urgency = 0.0
         if self.policy == PRIORITY:
-            priority = self._of(self.priorities, "priorities", point)
+            priority = self._of("priorities", point)
             urgency = float("inf") if priority is None else priority
         elif self.policy == EDF:
             urgency = deadline
         return _Firing(urgency, job, point, duration, deadline)
 
-    @staticmethod
-    def _of(value: Mapping[str, Any], name: str, point: ActorPoint) -> Any:
-        known = point.memory.setdefault(name, {})
-        if "value" not in known:
-            known["value"] = ByActorParameter.of(value, point.selected(name), point.owner)
-        return known["value"]
+    def _of(self, name: str, point: ActorPoint) -> Any:
+        """What a parameter by actor says of this one."""
+        if name not in point.memory:
+            point.memory[name] = ByActorParameter.of(getattr(self, name), point.selected(name), point.owner)
+        return point.memory[name]
 
 
 @dataclass(order=True)
@@ -343,7 +338,7 @@ class CrashRestart(ExecutionAspect):
         now = unit.tag.time
         for time in sorted(to_nanoseconds(float(each)) for each in self.times):
             if time > now:
-                unit.later(to_seconds(time - now), self._crash_at, unit)
+                unit.later(to_seconds(time - now), self._crash, unit)
             else:
                 self._crash(unit)
         self._await_failure(unit)
@@ -365,18 +360,18 @@ class CrashRestart(ExecutionAspect):
     def _fail(self, what: tuple[Unit, int]) -> None:
         """A random failure, unless a crash at a given time came before it."""
         unit, crashes = what
-        if unit.memory["life"].crashes == crashes and not self._crash(unit):
-            self._await_failure(unit)
+        life: _Life = unit.memory["life"]
+        if life.crashes == crashes:
+            self._crash(unit)
+            if life.crashes == crashes:
+                self._await_failure(unit)
 
-    def _crash_at(self, unit: Unit) -> None:
-        self._crash(unit)
-
-    def _crash(self, unit: Unit) -> bool:
-        """Let it crash, if that can be now; whether it does."""
+    def _crash(self, unit: Unit) -> None:
+        """Let it crash, if that can be now."""
         life: _Life = unit.memory["life"]
         is_active = self.is_due(unit.tag.time) and (self.when is None or bool(unit.value_of(self.when)))
         if life.since is not None or not is_active:
-            return False
+            return
         life.crashes += 1
         life.since = unit.tag.time
         unit.act("crashed", None)
@@ -384,7 +379,6 @@ class CrashRestart(ExecutionAspect):
             unit.kill()
         unit.suspend(self._keeps)
         unit.later(drawn(self.repair, unit.random), self._restart, unit)
-        return True
 
     def _keeps(self, job: Job, point: ActorPoint) -> bool:
         """Whether a job that falls due while it is down waits for the repair; wake-ups always do."""

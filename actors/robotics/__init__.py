@@ -1,14 +1,12 @@
 """Robots that observe and avoid a moving obstacle: bodies, sensors, estimators, controllers, messages."""
 
-from .bodies import CircularMotion, Vehicle
-from .channel import BroadcastChannel, ChannelError
 from .controller import RobustController
 from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
 from .messages import BodyState, Estimate, Measurement, Plan
 from .monitors import DistanceMonitor, GoalMonitor, SeparationMonitor
 from .planning import Barrier, Casadi, Inform, Objective, ReachGoal, Solver
-from .sensor import Sensor
+from .world import BroadcastChannel, ChannelError, CircularMotion, Sensor, Vehicle
 
 __all__ = [
     "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "DistanceMonitor",

@@ -1,10 +1,25 @@
 """What every aspect is made of: its kinds, join points, and parameters that select and that take time."""
 
 from .aspect import Aspect, Decoration, class_decorations, decorations
-from .composite import CompositeAspect, CompositeExecutionAspect, FiringRequest, Request
-from .execution import ActorPoint, ExecutionAspect, Job, Unit
 from .fields import STAMP, FieldError, altered, field_of, numbers_in, stamped_as
 from .join_point import TOKEN, AspectContext, JoinPoint, JoinPointAspect, Reading, Selection, aspect_stream
+from .kinds import (
+    ActorPoint,
+    CommunicationAspect,
+    CompositeAspect,
+    CompositeExecutionAspect,
+    ExecutionAspect,
+    FiringRequest,
+    Job,
+    LossAspect,
+    MeasurementAspect,
+    ObservationAspect,
+    PortAspect,
+    RandomLoss,
+    Request,
+    Unit,
+    is_bad,
+)
 from .parameters import (
     ByActorParameter,
     Duration,
@@ -18,15 +33,6 @@ from .parameters import (
     drawn,
     law,
     time_needed,
-)
-from .port import (
-    CommunicationAspect,
-    LossAspect,
-    MeasurementAspect,
-    ObservationAspect,
-    PortAspect,
-    RandomLoss,
-    is_bad,
 )
 from .server import NEWEST, OLDEST, Server, Task, WaitingLine
 
