@@ -242,7 +242,7 @@ class Processor(ExecutionAspect):
         self._core(point).remove(point)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
-        core: _Core = shared.get("core", _Core())
+        core: Server = shared.get("core", Server())
         return {
             "utilisation": core.busy_until(end) / end if end else None,
             "mean_response": to_seconds(core.responses) / core.done if core.done else None,
@@ -250,8 +250,8 @@ class Processor(ExecutionAspect):
         }
 
     @staticmethod
-    def _core(point: ActorPoint) -> _Core:
-        core: _Core = point.shared.setdefault("core", _Core())
+    def _core(point: ActorPoint) -> Server:
+        core: Server = point.shared.setdefault("core", Server())
         return core
 
     def _task(self, job: Job, point: ActorPoint, duration: int) -> _Firing:
@@ -278,26 +278,12 @@ class _Firing(Task):
 
     deadline: float = field(compare=False)
 
-
-class _Core(Server[_Firing]):
-    """What is on a processor, and what has been; times in ns."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.done = 0  # firings
-        self.responses = 0  # of all of them
-        self.longest = 0
-
-    def release(self, task: _Firing, now: int) -> None:
-        response = now - task.came
-        self.done += 1
-        self.responses += response
-        self.longest = max(self.longest, response)
-        if response > 0:
-            task.point.act("delayed", to_seconds(response))
-        if now > task.deadline:
-            task.point.act("missed", to_seconds(now - round(task.deadline)))
-        task.point.forward(task.passing)
+    def release(self, now: int) -> None:
+        if now > self.came:
+            self.point.act("delayed", to_seconds(now - self.came))
+        if now > self.deadline:
+            self.point.act("missed", to_seconds(now - round(self.deadline)))
+        self.point.forward(self.passing)
 
 
 class CrashRestart(ExecutionAspect):

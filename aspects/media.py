@@ -83,14 +83,12 @@ class Message(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._release = self.point.hold(self.passing)
+        self._pass_on = self.point.hold(self.passing)
 
-    def arrive(self) -> None:
-        """Pass it on, and note how long it took."""
-        taken = self.point.tag.time - self.came
-        if taken > 0:
-            self.point.act("delayed", self.passing, to_seconds(taken))
-        self._release()
+    def release(self, now: int) -> None:
+        if now > self.came:
+            self.point.act("delayed", self.passing, to_seconds(now - self.came))
+        self._pass_on()
 
 
 class Bus(Medium):
@@ -114,7 +112,7 @@ class Bus(Medium):
     factor = Parameter(float, min=0.0, unit="s", doc="time that it takes to carry a message of length 1")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        bus: _Carrier = point.shared.setdefault("bus", _Carrier())
+        bus: Server = point.shared.setdefault("bus", Server())
         duration = to_nanoseconds(self.factor * self.length_of(token))
         if dropped := bus.arrive(
             Message(self.priority_of(token), token, point, duration), self.capacity, self.overflow
@@ -122,19 +120,12 @@ class Bus(Medium):
             dropped.point.act("dropped", dropped.passing)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
-        bus: _Carrier = shared.get("bus", _Carrier())
+        bus: Server = shared.get("bus", Server())
         return {
             "utilisation": bus.busy_until(end) / end if end else None,
             "mean_wait": to_seconds(bus.waited) / bus.begins if bus.begins else None,
             "mean_queue": bus.line.area(end) / end if end else None,
         }
-
-
-class _Carrier(Server[Message]):
-    """What is on a bus, and what has been."""
-
-    def release(self, task: Message, now: int) -> None:
-        task.arrive()
 
 
 class RadioMedium(Medium):
@@ -355,4 +346,4 @@ class _Air:
             self.arrivals += 1
             self.delays += now - frame.came
             self.useful += frame.duration
-            frame.arrive()
+            frame.release(now)
