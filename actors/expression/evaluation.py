@@ -206,7 +206,6 @@ class _Evaluation:
         return cut(self._source[node.col_offset : node.end_col_offset])
 
     def value(self, node: ast.expr) -> object:
-        """Return the value of a node."""
         self._budget.spend(1)
         match node:
             case ast.Constant():

@@ -54,7 +54,6 @@ Stages = list[State]  # three, state by state
 
 
 def _times(matrix: tuple[tuple[float, ...], ...], stages: Stages) -> Stages:
-    """A matrix of three by three times three stages."""
     return [combined(row, stages) for row in matrix]
 
 

@@ -87,7 +87,6 @@ class RungeKutta(Stepper):
 
 
 def _weighted(weights: Weights, rates: list[State]) -> State:
-    """The weighted sum of the derivatives at some stages."""
     return combined([weight for _, weight in weights], [rates[stage] for stage, _ in weights])
 
 

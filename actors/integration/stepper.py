@@ -43,17 +43,14 @@ def norm(values: Sequence[float], scale: Sequence[float]) -> float:
 
 
 def added(one: Sequence[float], other: Sequence[float]) -> State:
-    """The sum of two vectors."""
     return list(map(add, one, other))
 
 
 def taken(one: Sequence[float], other: Sequence[float]) -> State:
-    """The first of two vectors less the other."""
     return list(map(sub, one, other))
 
 
 def dot(one: Sequence[float], other: Sequence[float]) -> float:
-    """The sum of the products."""
     result: float = total(map(mul, one, other))
     return result
 

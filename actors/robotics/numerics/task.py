@@ -109,7 +109,6 @@ def move(task: Task, length: float) -> None:
 
 @borrower
 def take(task: Task) -> None:
-    """Take the controls tried."""
     plan = task.plan
     for s in range(plan.shape[0]):
         for c in range(2):
