@@ -107,9 +107,7 @@ class ODE(Actor):
         _same_names("held", self.held, "input", [name for name in self.inputs if name != "trigger"])
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
-        formulas: list[Formula] = [*self.derivatives.values(), *self.crossings.values()]
-        for reset in self.resets.values():
-            formulas += reset.values()
+        formulas: list[Mapping[str, Formula]] = [self.derivatives, self.crossings, *self.resets.values()]
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for state in self.initial:
             ports[state] = OutputPort(float, depends_on=("trigger",), doc="a state")
@@ -117,7 +115,7 @@ class ODE(Actor):
             if crossing in ports:
                 raise ParameterError(f"crossings: {crossing!r} is the name of a state, too")
             ports[crossing] = OutputPort(int, depends_on=(), doc="number of the zero crossing, from 0")
-        for formula in formulas:
+        for formula in (each for group in formulas for each in group.values()):
             for name in formula.names:
                 if name in self.crossings:
                     raise ParameterError(f"{formula} asks for {name!r}, which is a crossing and has no value")

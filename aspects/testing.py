@@ -141,7 +141,7 @@ def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequen
         raise AssertionError(f"{aspect!r} shares the random stream at {ports[shared.pop()]} with another of its kind")
     if not alone.shares:
         what = f"{aspect!r}: what it decides at a port depends on where else it stands"
-        acts = [event for event in acts if _port(event) in set(half)]
+        acts = [event for event in acts if ".".join(filter(None, (event.actor, event.port))) in half]
         _compare(what, acts, f"at {at}", acts_of_half, "at half of that")
 
 
@@ -161,10 +161,6 @@ def assert_order_of_unrelated_aspects_is_free(first: Woven, second: Woven, trial
 def _shared_generators() -> str:
     state = np.random.get_state(legacy=False)  # noqa: NPY002 (to see that nobody uses it)
     return repr((random.getstate(), state["state"]["key"].tolist(), state["state"]["pos"]))
-
-
-def _port(event: Event) -> str:
-    return f"{event.actor}.{event.port}" if event.port else event.actor
 
 
 def _acts(log: Sequence[Event]) -> list[Event]:
