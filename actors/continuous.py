@@ -22,7 +22,7 @@ from .core import (
 from .expression import Formula, FormulaParameter, operand
 from .expression.enclosure import bounds_of
 from .integration import STEPPERS, Bounds, State
-from .solution import Crossing, Equations, Guard, Solution, sign_of
+from .solution import Guard, Solution, sign_of
 
 _MAX_STEPS = 10_000
 _AHEAD = 64  # parts of a step that are searched for crossings at once
@@ -107,9 +107,7 @@ class ODE(Actor):
         _same_names("held", self.held, "input", [name for name in self.inputs if name != "trigger"])
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
-        formulas: list[Formula] = [*self.derivatives.values(), *self.crossings.values()]
-        for reset in self.resets.values():
-            formulas += reset.values()
+        formulas: list[Mapping[str, Formula]] = [self.derivatives, self.crossings, *self.resets.values()]
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for state in self.initial:
             ports[state] = OutputPort(float, depends_on=("trigger",), doc="a state")
@@ -117,7 +115,7 @@ class ODE(Actor):
             if crossing in ports:
                 raise ParameterError(f"crossings: {crossing!r} is the name of a state, too")
             ports[crossing] = OutputPort(int, depends_on=(), doc="number of the zero crossing, from 0")
-        for formula in formulas:
+        for formula in (each for group in formulas for each in group.values()):
             for name in formula.names:
                 if name in self.crossings:
                     raise ParameterError(f"{formula} asks for {name!r}, which is a crossing and has no value")
@@ -148,7 +146,8 @@ class ODE(Actor):
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s: no rounding adds up over crossings."""
         self._time, self._fraction = time, fraction
         self._solution = Solution(
-            Equations(self._rates, self._bounds_of_rates),
+            self._rates,
+            self._bounds_of_rates,
             state,
             self._guards,
             method=self.method,
@@ -190,17 +189,14 @@ class ODE(Actor):
         now = self._elapsed()
         if self._guards:
             self._solution.search(now)
-        crossed = dict(self._jumps)
-        self._jumps.clear()
+        at, crossed, self._jumps = now, self._jumps, {}
         crossing = self._solution.crossing
         if crossing is not None and self._moment(crossing.time) <= self.tag.time:
-            crossed = {**crossed, **crossing.sides}
-            self._cross(crossing, crossed)
-        elif crossed:
-            self._cross(Crossing(now, crossed), crossed)
+            at, crossed = crossing.time, {**crossed, **crossing.sides}
+        if crossed:
+            self._cross(at, crossed)
         if crossed or self.trigger.present:
-            at = 0.0 if crossed else now
-            for name, value in zip(self._states, self._solution.at(at), strict=True):
+            for name, value in zip(self._states, self._solution.at(0.0 if crossed else now), strict=True):
                 self.outputs[name].send(value)
         self._take_inputs()
         self._plan()
@@ -213,9 +209,9 @@ class ODE(Actor):
         """The nanosecond that is nearest to a time of the present solution."""
         return self._time + round((self._fraction + at) * NANOSECONDS_PER_SECOND)
 
-    def _cross(self, crossing: Crossing, crossed: Mapping[int, int]) -> None:
+    def _cross(self, at: float, crossed: Mapping[int, int]) -> None:
         """Send the crossings, reset what they reset, and begin a new solution."""
-        at, state = crossing.time, self._solution.at(crossing.time)
+        state = self._solution.at(at)
         self._solution.rewind(at)
         before, names = self._signs(at, state), self._names(at, state)
         after = dict(zip(self._states, state, strict=True))

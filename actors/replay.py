@@ -64,7 +64,10 @@ class Replay(Actor):
 
     def _read(self) -> tuple[list[int], list[Any]]:
         """The times in ns and the tokens."""
-        table = self._table()
+        try:
+            table = read_table(self.file)
+        except OSError as error:
+            raise self._error(str(error.strerror)) from None
         names = list(dict.fromkeys(table.column_names))
         if len(names) != table.num_columns:
             raise self._error(f"two columns have the same name: {', '.join(table.column_names)}")
@@ -80,12 +83,6 @@ class Replay(Actor):
         if len(columns) == 1:
             return times, values[0]
         return times, [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
-
-    def _table(self) -> Any:
-        try:
-            return read_table(self.file)
-        except OSError as error:
-            raise self._error(str(error.strerror)) from None
 
     def _check_times(self, times: list[Any]) -> list[int]:
         result: list[int] = []

@@ -9,13 +9,15 @@ the solution and its guards are sampled within ``WINDOW``.
 from __future__ import annotations
 
 import copy
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 from .core import EpicycleError
-from .integration import STEPPERS, Bounds, Derivative, Limits, Piece, State, root
+from .integration import STEPPERS, Bounds, Derivative, Limits, Piece, State
 
 WINDOW: Final = 1.0  # s, within which things may hide
 CELLS: Final = 8  # a window is searched for changes of sign in so many parts
@@ -23,6 +25,8 @@ LONGEST: Final = 1e6  # s, of a step
 _HALVINGS: Final = 12
 _NOISE: Final = 1e-11  # what counts as zero beside the value at the far end of a cell
 _MAX_PATIENCE: Final = 64
+_PRECISION: Final = sys.float_info.epsilon
+_BISECTIONS: Final = 200  # more than bisection alone needs to find a root
 
 
 @dataclass
@@ -43,31 +47,24 @@ class Guard:
         return self.rising if side > 0 else self.falling
 
 
-@dataclass(frozen=True)
-class Crossing:
+class Crossing(NamedTuple):
     """Where guards cross zero first: the time, and for each that does, its number and the side it crosses to."""
 
     time: float
     sides: dict[int, int]
 
 
-@dataclass(frozen=True)
-class Equations:
-    """The derivatives of the states at a time, and what they lie between, for times and states between bounds."""
-
-    rates: Derivative
-    bounds: Callable[[float, float, Sequence[Bounds]], list[Bounds]]
-
-
 class Solution:
     """A solution that starts at time 0 and is extended as far as it is asked for, or searched to the first crossing.
 
-    Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.
+    ``rates`` are the derivatives of the states at a time, ``bounds`` what they lie between, for times and states
+    between bounds.  Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.
     """
 
     def __init__(
         self,
-        equations: Equations,
+        rates: Derivative,
+        bounds: Callable[[float, float, Sequence[Bounds]], list[Bounds]],
         state: State,
         guards: Sequence[Guard],
         *,
@@ -75,13 +72,11 @@ class Solution:
         tolerance: tuple[float, float],
         max_step: float | None,
     ) -> None:
-        self._equations = equations
+        self._rates, self._bounds = rates, bounds
         self._watched = max_step is None
         self._window = WINDOW if max_step is None else max_step
         self._patience, self._taken = 1, 0  # so many steps must be taken before longer ones are tried; so many were
-        self._stepper = STEPPERS[method](
-            equations.rates, state, Limits(*tolerance, LONGEST if max_step is None else max_step)
-        )
+        self._stepper = STEPPERS[method](rates, state, Limits(*tolerance, LONGEST if max_step is None else max_step))
         self._guards = guards
         self._start = state
         self._piece: Piece | None = None
@@ -165,11 +160,11 @@ class Solution:
         states = [piece.at(start), *(piece.at(start + number * quarter) for number in (1, 2, 3)), piece.at(end)]
         places = [(start, states[0]), (end, states[4]), (start, lows), (end, highs), (end, mixed)]
         try:
-            found = [self._equations.rates(time, state) for time, state in places]
+            found = [self._rates(time, state) for time, state in places]
         except EpicycleError:  # a corner may lie where the derivatives are not defined
             return True
         found += [[(new - old) / quarter for old, new in zip(*pair, strict=True)] for pair in pairwise(states)]
-        possible = self._equations.bounds(start, end, bounds)
+        possible = self._bounds(start, end, bounds)
         for (low, high), values in zip(possible, zip(*found, strict=True), strict=True):
             least, most = min(values), max(values)
             margin = 2.0 * (most - least) + _NOISE * max(abs(least), abs(most))
@@ -190,7 +185,7 @@ class Solution:
             self.extend()
         left, right, numbers = self._ahead.pop()
         bounds = self._latest().bounds(left, right)
-        numbers = [number for number in numbers if not self._stays(number, left, right, bounds)]
+        numbers = [number for number in numbers if not self._stays(self._guards[number], left, right, bounds)]
         if numbers and right - left > self._window:
             middle = left + 0.5 * (right - left)
             self._ahead += [(middle, right, numbers), (left, middle, numbers)]
@@ -206,27 +201,24 @@ class Solution:
 
     def rewind(self, time: float) -> None:
         """Give guards the sides that they have at a time, which the search has passed: the solution is left there."""
-        state = self.at(time)
         for left, right, guard, side in reversed(self._turns):
             if right > time:
-                guard.side = side if left >= time else sign_of(guard.value(time, state)) or side
+                guard.side = side if left >= time else self._sign(guard, time) or side
         self._turns.clear()
 
-    def _turn(self, number: int, side: int, left: float, right: float) -> None:
+    def _turn(self, guard: Guard, side: int, left: float, right: float) -> None:
         """Take a guard to a side on which it is after a part of the search."""
-        guard = self._guards[number]
         if guard.side != side:
             self._turns.append((left, right, guard, guard.side))
             guard.side = side
 
-    def _stays(self, number: int, left: float, right: float, bounds: Sequence[Bounds]) -> bool:
+    def _stays(self, guard: Guard, left: float, right: float, bounds: Sequence[Bounds]) -> bool:
         """Whether a guard certainly keeps its side from one time to another."""
-        guard = self._guards[number]
         low, high = guard.bounds(left, right, bounds)
         side = 1 if low > 0.0 else -1 if high < 0.0 else 0
         if side == 0 or guard.side == -side:
             return False
-        self._turn(number, side, left, right)
+        self._turn(guard, side, left, right)
         return True
 
     def _cross(self, left: float, right: float, numbers: Sequence[int]) -> Crossing | None:
@@ -239,17 +231,17 @@ class Solution:
         }
         if not found:
             for number, (_, after, _) in sides.items():
-                self._turn(number, after, left, right)
+                self._turn(self._guards[number], after, left, right)
             return None
-        time = min(found.values())
-        crossed = {}
+        time, crossed = min(found.values()), {}
         for number, (before, after, _) in sides.items():
-            sign = self._sign(self._guards[number], time)
+            guard = self._guards[number]
+            sign = self._sign(guard, time)
             # Rounding may put one of two equal roots a hair behind the other: what has crossed by now is here, too.
             if number in found and (found[number] == time or sign == after):
                 crossed[number] = after
             elif number not in found:
-                self._turn(number, sign or before, left, right)
+                self._turn(guard, sign or before, left, right)
         return Crossing(time, crossed)
 
     def _side(self, guard: Guard, left: float, right: float) -> tuple[int, int, tuple[float, float] | None]:
@@ -258,37 +250,72 @@ class Solution:
         if before == 0:
             # It starts at zero, as after a bounce. It may go to one side and be back on the other within the cell.
             inner = self._excursion(guard, left, right, after)
-            if inner is None:
-                return before, after, None
-            return -after, after, inner
-        if after in (0, before):
-            return before, before, None
-        return before, after, (left, right)
+            return (before, after, None) if inner is None else (-after, after, inner)
+        return (before, before, None) if after in (0, before) else (before, after, (left, right))
 
     def _excursion(self, guard: Guard, left: float, right: float, after: int) -> tuple[float, float] | None:
         """Where a guard that starts at zero and ends on a side has been on the other one before."""
         if after == 0:
             return None
-        noise = _NOISE * abs(guard.value(right, self.at(right)))
+        noise = _NOISE * abs(self._value(guard, right))
         far, share = right, 1.0
         for _ in range(_HALVINGS):
             share *= 0.5
             near = left + (right - left) * share
-            if -after * guard.value(near, self.at(near)) > noise:
+            if -after * self._value(guard, near) > noise:
                 return near, far
             far = near
         return None
 
+    def _value(self, guard: Guard, time: float) -> float:
+        return guard.value(time, self.at(time))
+
     def _sign(self, guard: Guard, time: float) -> int:
-        return sign_of(guard.value(time, self.at(time)))
+        return sign_of(self._value(guard, time))
 
     def _root(self, guard: Guard, left: float, right: float) -> float:
-        def value(time: float) -> float:
-            return guard.value(time, self.at(time))
-
+        value = partial(self._value, guard)
         if value(left) == 0.0 or value(left) * value(right) > 0.0:
             return left  # it was at zero already, or beyond by rounding
         return root(value, left, right)
+
+
+def root(function: Callable[[float], float], left: float, right: float, least: float = 1e-15) -> float:
+    """Where a function that has different signs at both ends is zero, to the last bits or to ``least``.
+
+    T. R. Chandrupatla, Adv. Eng. Softw. 28 (1997) 145-149: inverse quadratic interpolation where three points allow
+    it, bisection elsewhere.
+    """
+    newest, other = left, right
+    at_newest, at_other = function(left), function(right)
+    share = 0.5
+    for _ in range(_BISECTIONS):
+        middle = newest + share * (other - newest)
+        at_middle = function(middle)
+        if (at_middle > 0.0) == (at_newest > 0.0):
+            third, at_third = newest, at_newest
+        else:
+            third, at_third = other, at_other
+            other, at_other = newest, at_newest
+        newest, at_newest = middle, at_middle
+        best = newest if abs(at_newest) < abs(at_other) else other
+        width = abs(other - newest)
+        tolerance = 2.0 * _PRECISION * abs(best) + 0.5 * least
+        if at_middle == 0.0 or 2.0 * tolerance >= width:
+            return middle if at_middle == 0.0 else best
+        share = 0.5
+        place = (newest - other) / (third - other)
+        height = (at_newest - at_other) / (at_third - at_other)
+        if height * height < place and (1.0 - height) * (1.0 - height) < 1.0 - place:
+            share = at_newest / (at_other - at_newest) * (at_third / (at_other - at_third))
+            share += (
+                (third - newest) / (other - newest)
+                * (at_newest / (at_third - at_newest))
+                * (at_other / (at_third - at_other))
+            )  # fmt: skip
+        least_share = tolerance / width
+        share = min(max(share, least_share), 1.0 - least_share)
+    return best
 
 
 def sign_of(value: float) -> int:

@@ -7,6 +7,7 @@ tokens the mean is as good as if the window were summed afresh.
 from __future__ import annotations
 
 import math
+import operator
 from collections import deque
 from fractions import Fraction
 
@@ -108,11 +109,9 @@ class MovingStatistics(_Window):
             self.number.send(number)
 
     def _rank(self, token: float) -> None:
-        while self._least and self._least[-1][1] >= token:
-            self._least.pop()
-        while self._greatest and self._greatest[-1][1] <= token:
-            self._greatest.pop()
-        for extremes in (self._least, self._greatest):
+        for extremes, beats in ((self._least, operator.le), (self._greatest, operator.ge)):
+            while extremes and beats(token, extremes[-1][1]):
+                extremes.pop()
             extremes.append((self._entered, token))
             while extremes[0][0] <= self._entered - len(self._values):
                 extremes.popleft()

@@ -53,7 +53,7 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "actors/robotics/messages.py": (("sum",), "only asks whether a sum is finite"),
     "actors/statistics.py": (("**",), FRACTIONS),
     "aspects/core/fields.py": (("sum",), WHOLE),
-    "aspects/execution/crash.py": (("sum",), WHOLE),
+    "aspects/execution.py": (("sum",), WHOLE),
     "runner/engine/statistic.py": (("sum",), WHOLE),
     "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/build/checks.py": (("sum",), WHOLE),

@@ -1,8 +1,7 @@
 """The expression language: what stands in the `${...}` of a model and in the parameters of actors that compute."""
 
 from .evaluation import check_names, evaluate, interpolate, names_in
-from .formula import Formula, FormulaParameter, operand
-from .port_formula import PortFormula, PortFormulaParameter, value_at
+from .formula import Formula, FormulaParameter, PortFormula, PortFormulaParameter, operand, value_at
 from .syntax import ExpressionError
 from .values import CONSTANTS, FUNCTIONS, Budget, BudgetError, text_of
 

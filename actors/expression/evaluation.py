@@ -206,7 +206,6 @@ class _Evaluation:
         return cut(self._source[node.col_offset : node.end_col_offset])
 
     def value(self, node: ast.expr) -> object:
-        """Return the value of a node."""
         self._budget.spend(1)
         match node:
             case ast.Constant():
@@ -226,7 +225,12 @@ class _Evaluation:
                 left, right = self.value(node.left), self.value(node.right)
                 return self._weighed(node, self.guard(node, BINARY[type(node.op)], left, right))
             case ast.BoolOp():
-                return self._bool(node)
+                decided: object = None
+                for item in node.values:
+                    decided = self.value(item)
+                    if bool(decided) is isinstance(node.op, ast.Or):
+                        break
+                return decided
             case ast.Compare():
                 return self._compare(node)
             case ast.IfExp():
@@ -280,15 +284,6 @@ class _Evaluation:
             result[key] = self.value(value_node)
         return result
 
-    def _bool(self, node: ast.BoolOp) -> object:
-        stop_at = isinstance(node.op, ast.Or)
-        result: object = None
-        for item in node.values:
-            result = self.value(item)
-            if bool(result) is stop_at:
-                break
-        return result
-
     def _compare(self, node: ast.Compare) -> bool:
         left = self._weighed(node.left, self.value(node.left))
         for sign, right_node in zip(node.ops, node.comparators, strict=True):
@@ -329,12 +324,11 @@ class _Evaluation:
         for item in source:
             self._budget.spend(1)
             if isinstance(generator.target, ast.Name):
-                scope[names[0]] = item
-            else:
-                if not isinstance(item, (list, tuple)) or len(item) != len(names):
-                    wanted = f"a list of {len(names)}"
-                    raise self._error(generator.iter, f"each element must be {wanted}, not {kind_of(item)}")
-                scope.update(zip(names, item, strict=True))
+                item = [item]
+            elif not isinstance(item, (list, tuple)) or len(item) != len(names):
+                wanted = f"a list of {len(names)}"
+                raise self._error(generator.iter, f"each element must be {wanted}, not {kind_of(item)}")
+            scope.update(zip(names, item, strict=True))
             if all(self.value(condition) for condition in generator.ifs):
                 self._comprehend(node, level + 1, items)
         self._bound.pop()

@@ -4,7 +4,7 @@ import ast
 import functools
 import re
 import warnings
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 from ..core import EpicycleError, did_you_mean
 from .values import FUNCTIONS, MAX_INT
@@ -35,6 +35,7 @@ _NODES: Final = (
     ast.Constant, ast.Name, ast.List, ast.Tuple, ast.Dict, ast.UnaryOp, ast.BinOp, ast.Compare, ast.BoolOp,
     ast.IfExp, ast.Subscript, ast.Slice, ast.Call, ast.ListComp, ast.comprehension,
 )  # fmt: skip
+_DETAILS: Final = (ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop)
 _REFUSED: Final[dict[type[ast.AST], str]] = {
     ast.Lambda: "'lambda'",
     ast.NamedExpr: "':='",
@@ -79,29 +80,26 @@ def parse(source: str) -> ast.expr:
         raise ExpressionError(f"nested deeper than {MAX_NESTING} levels", 0, len(source)) from None
     except (ValueError, Warning) as error:
         raise ExpressionError(f"this is not an expression: {error}", 0, len(source)) from None
-    _check(tree, code[indent:], indent)
     for node in ast.walk(tree):
-        if isinstance(node, ast.expr):
-            node.col_offset, node.end_col_offset = _extent(node, code[indent:], indent)
+        if isinstance(node, (ast.expr, ast.keyword)):
+            end = node.end_col_offset or 0
+            node.col_offset, node.end_col_offset = (_characters(code, each + indent) for each in (node.col_offset, end))
+    _check(tree)
     return tree
 
 
-def _extent(node: ast.AST, code: str, indent: int) -> tuple[int, int]:
-    """Return where a node starts and ends in the source, in characters; Python counts UTF-8 bytes."""
-    start, end = getattr(node, "col_offset", 0), getattr(node, "end_col_offset", 0)
-    if code.isascii():
-        return start + indent, end + indent
-    data = code.encode()
-    return len(data[:start].decode()) + indent, len(data[:end].decode()) + indent
+def _characters(code: str, count: int) -> int:
+    """How many characters so many bytes are, which Python counts."""
+    return count if code.isascii() else len(code.encode()[:count].decode(errors="ignore"))
 
 
-def _check(tree: ast.expr, code: str, indent: int) -> None:
+def _check(tree: ast.expr) -> None:
     """Refuse whatever is not on the whitelist, before anything is evaluated."""
 
-    def refuse(node: ast.AST, message: str) -> NoReturn:
+    def refuse(node: Any, message: str) -> NoReturn:
         # A comprehension's `for` has no place of its own in the tree.
-        start, end = _extent(node.target if isinstance(node, ast.comprehension) else node, code, indent)
-        raise ExpressionError(message, start, end - start)
+        place: Any = node.target if isinstance(node, ast.comprehension) else node
+        raise ExpressionError(message, place.col_offset, place.end_col_offset - place.col_offset)
 
     count = 0
     stack: list[tuple[ast.AST, int]] = [(tree, 1)]
@@ -114,49 +112,46 @@ def _check(tree: ast.expr, code: str, indent: int) -> None:
             refuse(node, f"nested deeper than {MAX_NESTING} levels")
         if problem := _objection(node):
             refuse(node, problem)
-        children = [child for child in ast.iter_child_nodes(node) if not _is_detail(child)]
+        # What qualifies its parent, such as an operator, is judged with that, and so is the function of a call.
+        children = [child for child in ast.iter_child_nodes(node) if not isinstance(child, _DETAILS)]
         if isinstance(node, ast.Call):
-            children.remove(node.func)  # judged with the call
+            children.remove(node.func)
         stack += [(child, depth + 1) for child in reversed(children)]
-
-
-def _is_detail(node: ast.AST) -> bool:
-    """True for nodes that only qualify their parent."""
-    return isinstance(node, (ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop))
 
 
 def _objection(node: ast.AST) -> str | None:
     """Return why a node, seen without its children, is refused; None if it is welcome."""
-    if isinstance(node, ast.Attribute):
-        return _objection_to_attribute(node)
-    if not isinstance(node, _NODES):
-        what = _REFUSED.get(type(node), f"'{type(node).__name__}'")
-        return f"{what} is not allowed in an expression: {_ALLOWED}"
-    if isinstance(node, ast.Name):
-        is_hidden = node.id.startswith("__")
-        return f"the name '{node.id}' is not allowed: it starts with '__'" if is_hidden else None
-    if isinstance(node, ast.Constant):
-        return _objection_to_constant(node.value)
-    if isinstance(node, ast.Call):
-        return _objection_to_call(node.func)
-    if isinstance(node, ast.Dict) and None in node.keys:
-        return f"'**' before a value is not allowed in an expression: {_ALLOWED}"
-    if isinstance(node, ast.comprehension) and (node.is_async or targets(node) is None):
-        return "a list comprehension needs plain names between 'for' and 'in'"
-    operators: list[ast.AST] = []
-    if isinstance(node, (ast.BinOp, ast.UnaryOp)):
-        operators = [node.op]
-    elif isinstance(node, ast.Compare):
-        operators = list(node.ops)
+    operators: list[Any] = []
+    match node:
+        case ast.Attribute(attr=name) | ast.Call(func=ast.Attribute(attr=name)):
+            hint = "" if name.startswith("_") else f" (an entry of a dict is written d['{name}'])"
+            return f"'.{name}' is not allowed in an expression{hint}: {_ALLOWED}"
+        case ast.Name(id=name):
+            return f"the name '{name}' is not allowed: it starts with '__'" if name.startswith("__") else None
+        case ast.Constant(value=value):
+            return _objection_to_constant(value)
+        case ast.Call(func=ast.Name(id=name)):
+            if name in FUNCTIONS:
+                return None
+            guess = did_you_mean(name, FUNCTIONS) or ","
+            return f"there is no function '{name}'{guess} known functions: {', '.join(sorted(FUNCTIONS))}"
+        case ast.Call():
+            return "only a function can be called, by its name"
+        case ast.Dict() if None in node.keys:
+            return f"'**' before a value is not allowed in an expression: {_ALLOWED}"
+        case ast.comprehension() if node.is_async or targets(node) is None:
+            return "a list comprehension needs plain names between 'for' and 'in'"
+        case ast.BinOp() | ast.UnaryOp():
+            operators = [node.op]
+        case ast.Compare():
+            operators = [*node.ops]
+        case _ if not isinstance(node, _NODES):
+            what = _REFUSED.get(type(node), f"'{type(node).__name__}'")
+            return f"{what} is not allowed in an expression: {_ALLOWED}"
     for used in operators:
         if sign := _OPERATOR_SIGNS.get(type(used)):
             return f"the operator '{sign}' is not allowed in an expression{_OPERATOR_HINTS.get(sign, '')}"
     return None
-
-
-def _objection_to_attribute(node: ast.Attribute) -> str:
-    hint = "" if node.attr.startswith("_") else f" (an entry of a dict is written d['{node.attr}'])"
-    return f"'.{node.attr}' is not allowed in an expression{hint}: {_ALLOWED}"
 
 
 def _objection_to_constant(value: object) -> str | None:
@@ -170,18 +165,6 @@ def _objection_to_constant(value: object) -> str | None:
         return None if is_bearable else "this number is too large"
     what = {bytes: "a bytes text", complex: "a complex number"}.get(type(value), "'...'")
     return f"{what} is not allowed in an expression: {_ALLOWED}"
-
-
-def _objection_to_call(function: ast.expr) -> str | None:
-    if isinstance(function, ast.Attribute):
-        return _objection_to_attribute(function)
-    if not isinstance(function, ast.Name):
-        return "only a function can be called, by its name"
-    if function.id not in FUNCTIONS:
-        known = ", ".join(sorted(FUNCTIONS))
-        guess = did_you_mean(function.id, FUNCTIONS)
-        return f"there is no function '{function.id}'{guess or ','} known functions: {known}"
-    return None
 
 
 def targets(generator: ast.comprehension) -> list[str] | None:

@@ -6,10 +6,8 @@ from typing import Final
 
 from .bdf import BDF
 from .radau import Radau
-from .roots import root
-from .runge_kutta import RungeKutta
+from .runge_kutta import DOP853, RK23, RK45, RungeKutta
 from .stepper import Bounds, Derivative, Limits, Piece, State, Stepper
-from .tableaux import DOP853, RK23, RK45
 
 STEPPERS: Final[Mapping[str, Callable[[Derivative, State, Limits], Stepper]]] = {
     "RK45": partial(RungeKutta, RK45),
@@ -19,4 +17,4 @@ STEPPERS: Final[Mapping[str, Callable[[Derivative, State, Limits], Stepper]]] = 
     "BDF": BDF,
 }
 
-__all__ = ["STEPPERS", "Bounds", "Derivative", "Limits", "Piece", "State", "Stepper", "root"]
+__all__ = ["STEPPERS", "Bounds", "Derivative", "Limits", "Piece", "State", "Stepper"]

@@ -48,44 +48,40 @@ class BDF(Stepper):
         self._differences = [state, [self.next_step * rate for rate in self.rates]] + [zero] * (_MAX_ORDER + 1)
         self._jacobian = Jacobian(derivative, len(state), limits.absolute)
         self._matrix: Matrix = self._jacobian.at(0.0, state, self.rates)
+        self._is_new = False  # whether that is of the present step
         self._factors: Factors | None = None
 
-    def step(self) -> bool:
-        least = self.least_step
+    def prepare(self, step: float) -> None:
         self._differences = list(self._differences)  # a copy of this stepper keeps its own
-        step = min(max(self.next_step, least), self.limits.max_step)
         if step != self.next_step:
             self._rescale(step / self.next_step if self.next_step else 1.0)
-        is_new = False  # whether the Jacobian is of this step
-        while step >= least:
-            end = self.time + step
-            step = end - self.time
-            predicted = combined([1.0] * (self._order + 1), self._differences[: self._order + 1])
-            newton = Convergence(self.limits, _MAX_CORRECTIONS)
-            correction = self._correct(newton, end, step, predicted)
-            if not newton.is_reached:
-                self._factors = None
-                if is_new:
-                    self._rescale(0.5)
-                    step *= 0.5
-                else:
-                    self._matrix = self._jacobian.at(end, predicted, self.derivative(end, predicted))
-                    is_new = True
-                continue
-            safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
-            state = added(predicted, correction)
-            scale = self.scale(state)
-            error = _ERROR[self._order] * norm(correction, scale)
-            if error <= 1.0:
-                self._start, self.time, self.state, self.next_step = self.time, end, state, step
-                self._accept(correction)
-                if self._equal_steps > self._order:
-                    self._choose_order(scale, error, safety)
-                return True
+        self._is_new = False
+
+    def attempt(self, end: float, step: float) -> float | None:
+        predicted = combined([1.0] * (self._order + 1), self._differences[: self._order + 1])
+        newton = Convergence(self.limits, _MAX_CORRECTIONS)
+        correction = self._correct(newton, end, step, predicted)
+        if not newton.is_reached:
+            self._factors = None
+            if self._is_new:
+                self._rescale(0.5)
+                return 0.5
+            self._matrix = self._jacobian.at(end, predicted, self.derivative(end, predicted))
+            self._is_new = True
+            return 1.0
+        safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
+        state = added(predicted, correction)
+        scale = self.scale(state)
+        error = _ERROR[self._order] * norm(correction, scale)
+        if not error <= 1.0:  # nor if it is no number
             factor = max(SHRINK_LIMIT, stretch(error, safety, self._order))
             self._rescale(factor)
-            step *= factor
-        return False
+            return factor
+        self._start, self.time, self.state, self.next_step = self.time, end, state, step
+        self._accept(correction)
+        if self._equal_steps > self._order:
+            self._choose_order(scale, error, safety)
+        return None
 
     def _correct(self, newton: Convergence, end: float, step: float, predicted: State) -> State:
         """Solve for what is to be added to the predicted state."""

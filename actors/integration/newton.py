@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
 from typing import Final
 
 from .stepper import Derivative, Limits, State, taken
@@ -37,20 +36,23 @@ class Jacobian:
             width = self._widths[number]
             while (value + width * reach) - value == 0.0:
                 width *= 10.0
-            found = self._difference(time, state, rates, number, width * reach)
-            if found.change < _USELESS * found.size:
+            column, change, size = self._difference(time, state, rates, number, width * reach)
+            if change < _USELESS * size:
                 wider = self._difference(time, state, rates, number, 10.0 * width * reach)
-                if found.change * wider.size < wider.change * found.size:
-                    found, width = wider, 10.0 * width
-            columns.append(found.column)
-            if found.change < _SMALL * found.size:
+                if change * wider[2] < wider[1] * size:
+                    (column, change, size), width = wider, 10.0 * width
+            columns.append(column)
+            if change < _SMALL * size:
                 width *= 10.0
-            elif found.change > _LARGE * found.size:
+            elif change > _LARGE * size:
                 width *= 0.1
             self._widths[number] = max(width, _LEAST)
         return [list(row) for row in zip(*columns, strict=True)]
 
-    def _difference(self, time: float, state: State, rates: State, number: int, move: float) -> _Difference:
+    def _difference(
+        self, time: float, state: State, rates: State, number: int, move: float
+    ) -> tuple[State, float, float]:
+        """A column of the Jacobian, the largest change that it comes from, and the rate that changed so."""
         moved = list(state)
         moved[number] += move
         move = moved[number] - state[number]
@@ -59,16 +61,7 @@ class Jacobian:
         change, size = max(
             (abs(each), max(abs(new), abs(old))) for each, new, old in zip(changes, other, rates, strict=True)
         )
-        return _Difference([each / move for each in changes], change, size)
-
-
-@dataclass(frozen=True)
-class _Difference:
-    """A column of the Jacobian, the largest change that it comes from, and the rate that changed so."""
-
-    column: State
-    change: float
-    size: float
+        return [each / move for each in changes], change, size
 
 
 class Factors:

@@ -54,7 +54,6 @@ Stages = list[State]  # three, state by state
 
 
 def _times(matrix: tuple[tuple[float, ...], ...], stages: Stages) -> Stages:
-    """A matrix of three by three times three stages."""
     return [combined(row, stages) for row in matrix]
 
 
@@ -67,41 +66,37 @@ class Radau(Stepper):
         self._matrix: Matrix = self._jacobian.at(0.0, state, self.rates)
         self._is_new = True  # whether the Jacobian is of where the solution stands
         self._factors: tuple[Factors, Factors] | None = None
+        self._was_rejected = False  # a longer step from here
         self._before: tuple[float, float] | None = None  # the latest step and its error
         self._piece: Piece | None = None
 
-    def step(self) -> bool:
-        least = self.least_step
-        step = min(max(self.next_step, least), self.limits.max_step)
+    def prepare(self, step: float) -> None:
         if step != self.next_step:
             self._before = self._factors = None
-        was_rejected = False
-        while step >= least:
-            end = self.time + step
-            step = end - self.time
-            newton = Convergence(self.limits, _MAX_CORRECTIONS)
-            stages = self._solve(newton, step)
-            if not newton.is_reached or self._factors is None:
-                self._factors = None
-                if self._is_new:
-                    step *= 0.5
-                else:
-                    self._matrix = self._jacobian.at(self.time, self.state, self.rates)
-                    self._is_new = True
-                continue
-            safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
-            state = added(self.state, stages[2])
-            error = self._error(self._factors[0], stages, state, step, filtered=was_rejected)
-            factor = safety * self._predicted(step, error)
-            if error <= 1.0:
-                self._accept(end, state, stages)
-                self._before = step, error
-                self._prepare(step, min(GROWTH_LIMIT, factor), newton)
-                return True
-            step *= max(SHRINK_LIMIT, factor)
+        self._was_rejected = False
+
+    def attempt(self, end: float, step: float) -> float | None:
+        newton = Convergence(self.limits, _MAX_CORRECTIONS)
+        stages = self._solve(newton, step)
+        if not newton.is_reached or self._factors is None:
             self._factors = None
-            was_rejected = True
-        return False
+            if self._is_new:
+                return 0.5
+            self._matrix = self._jacobian.at(self.time, self.state, self.rates)
+            self._is_new = True
+            return 1.0
+        safety = 0.9 * (2 * _MAX_CORRECTIONS + 1) / (2 * _MAX_CORRECTIONS + newton.count)
+        state = added(self.state, stages[2])
+        error = self._error(self._factors[0], stages, state, step)
+        factor = safety * self._predicted(step, error)
+        if not error <= 1.0:  # nor if it is no number
+            self._factors = None
+            self._was_rejected = True
+            return max(SHRINK_LIMIT, factor)
+        self._accept(end, state, stages)
+        self._before = step, error
+        self._go_on(step, min(GROWTH_LIMIT, factor), newton)
+        return None
 
     def _solve(self, newton: Convergence, step: float) -> Stages:
         """The stages, as what each adds to the state."""
@@ -133,12 +128,12 @@ class Radau(Stepper):
             stages = _times(_TO_STAGES, parts)
         return stages
 
-    def _error(self, factors: Factors, stages: Stages, state: State, step: float, *, filtered: bool) -> float:
+    def _error(self, factors: Factors, stages: Stages, state: State, step: float) -> float:
         ends = [value / step for value in combined(_ERROR, stages)]
         scale = self.scale(self.state, state)
         error = factors.solve(added(self.rates, ends))
         size = norm(error, scale)
-        if filtered and size > 1.0:
+        if self._was_rejected and size > 1.0:
             # The error of components that decay at once is exaggerated: once more through the system damps it.
             rates = self.derivative(self.time, added(self.state, error))
             size = norm(factors.solve(added(rates, ends)), scale)
@@ -159,7 +154,7 @@ class Radau(Stepper):
         self._piece = Piece(self.time, end, self.time, end - self.time, _FACTORS, rows)
         self.time, self.state, self.rates = end, state, self.derivative(end, state)
 
-    def _prepare(self, step: float, factor: float, newton: Convergence) -> None:
+    def _go_on(self, step: float, factor: float, newton: Convergence) -> None:
         """Make ready for the next step; what is factorised is kept while the step would hardly be longer."""
         self._is_new = newton.count > 2 and newton.rate > 1e-3
         if self._is_new:

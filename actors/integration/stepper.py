@@ -43,17 +43,14 @@ def norm(values: Sequence[float], scale: Sequence[float]) -> float:
 
 
 def added(one: Sequence[float], other: Sequence[float]) -> State:
-    """The sum of two vectors."""
     return list(map(add, one, other))
 
 
 def taken(one: Sequence[float], other: Sequence[float]) -> State:
-    """The first of two vectors less the other."""
     return list(map(sub, one, other))
 
 
 def dot(one: Sequence[float], other: Sequence[float]) -> float:
-    """The sum of the products."""
     result: float = total(map(mul, one, other))
     return result
 
@@ -122,9 +119,27 @@ class Stepper(ABC):
         self.rates = derivative(0.0, state)
         self.next_step = self._first_step(order)
 
-    @abstractmethod
     def step(self) -> bool:
         """Take one step; False if none is short enough."""
+        least = self.least_step
+        step = min(max(self.next_step, least), self.limits.max_step)
+        self.prepare(step)
+        while step >= least:
+            end = self.time + step
+            step = end - self.time
+            factor = self.attempt(end, step)
+            if factor is None:
+                return True
+            step *= factor
+        return False
+
+    @abstractmethod
+    def prepare(self, step: float) -> None:
+        """Make ready for attempts, the first of which is a step of this length."""
+
+    @abstractmethod
+    def attempt(self, end: float, step: float) -> float | None:
+        """Try to go to ``end``, ``step`` from where it stands; None if it is there now, or how much shorter to try."""
 
     @abstractmethod
     def piece(self) -> Piece:

@@ -1,16 +1,12 @@
 """Robots that observe and avoid a moving obstacle: bodies, sensors, estimators, controllers, messages."""
 
-from .channel import BroadcastChannel, ChannelError
 from .controller import RobustController
 from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
 from .messages import BodyState, Estimate, Measurement, Plan
 from .monitors import DistanceMonitor, GoalMonitor, SeparationMonitor
-from .objectives import Inform, Objective, ReachGoal
-from .obstacle import CircularMotion
-from .sensor import Sensor
-from .solvers import Barrier, Casadi, Solver
-from .vehicle import Vehicle
+from .planning import Barrier, Casadi, Inform, Objective, ReachGoal, Solver
+from .world import BroadcastChannel, ChannelError, CircularMotion, Sensor, Vehicle
 
 __all__ = [
     "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "DistanceMonitor",

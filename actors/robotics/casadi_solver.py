@@ -24,6 +24,7 @@ from .numerics.horizon import REACH_GOAL, HorizonProblem
 _SLACK = 1e-4  # m; what the second stage's bounds are widened by, so that they have an inside
 _STRICT = 1.0 - 1e-7  # f1 and f2 are asked for a little more strictly than IPOPT's tolerance keeps them
 _FAR = 1e6  # m; a tube without bound would be inf - inf to IPOPT; this one is out of reach
+_NUMBERS = [name for name in HorizonProblem._fields if name != "objective"]  # a program's parameters
 _OPTIONS = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
@@ -85,7 +86,7 @@ class _Attempt:
             sigma_weights=problem.sigma_weights[heavy],
             others_distance=problem.others_distance[np.ix_(heavy, heavy)] if heavy.any() else np.empty((0, 0)),
         )
-        numbers = _numbers(self.problem)
+        numbers = [getattr(self.problem, name) for name in _NUMBERS]
         self._parameters = np.concatenate([np.ravel(each) for each in numbers])
         self._programs = _programs(steps, tuple(map(np.shape, numbers)), problem.objective, max_iterations)
         self.iterations = 0
@@ -129,14 +130,6 @@ class _Attempt:
         self.iterations += int(program.stats()["iter_count"])
         controls = np.array(result["x"]).ravel()[: start.size].reshape(start.shape)
         return controls if np.isfinite(controls).all() and self.keeps_limits(controls) else None
-
-
-_NUMBERS = [name for name in HorizonProblem._fields if name != "objective"]
-
-
-def _numbers(problem: HorizonProblem) -> list[Any]:
-    """What a program's parameters stand for."""
-    return [getattr(problem, name) for name in _NUMBERS]
 
 
 class _Programs(NamedTuple):

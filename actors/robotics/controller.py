@@ -9,10 +9,9 @@ import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from ..core.elementary import hypot
+from .estimator import TargetModel
 from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing, read_only
-from .objectives import Objective, ReachGoal
-from .solvers import Barrier, Solver
-from .target_model import TargetModel
+from .planning import Barrier, Objective, ReachGoal, Solver
 
 if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem

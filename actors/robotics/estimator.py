@@ -1,19 +1,39 @@
-"""Estimates of the target from all robots' measurements."""
+"""Estimates of the target from all robots' measurements, and what they assume of its motion, eq. (1)."""
 
 from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from operator import attrgetter
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter, to_nanoseconds, to_seconds
+from ..core import Actor, Configurable, InputPort, OutputPort, Parameter, array_parameter, to_nanoseconds, to_seconds
 from .messages import RANGE, RELATIVE_POSITION, Array, Estimate, Measurement
-from .target_model import TargetModel
 
 EXPECTED, PREDICTED = "expected", "predicted"
+State: TypeAlias = tuple[Array, Array]  # of a filter: mean and covariance, to which nobody writes
+
+
+class TargetModel(Configurable):
+    """The parameters that a filter and whoever looks ahead from its estimates have in common."""
+
+    position_noise = Parameter(float, 0.002, unit="m^2", min=0, doc="Qp: variance a position gains in one period")
+    velocity_noise = Parameter(
+        float,
+        0.4,
+        unit="m^2/s^2",
+        min=0,
+        doc="Qv: variance a velocity gains in one period; Table II's 0.004 is in (m per 0.1 s)^2",
+    )
+    kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; 0 gives the centre no weight")
+
+    @property
+    def process_noise(self) -> Array:
+        """The covariance (4, 4) that the state (x, y, vx, vy) gains in one period."""
+        return np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
 
 
 @dataclass(slots=True)
@@ -22,7 +42,7 @@ class _Step:
 
     time: int  # ns
     measurements: list[Measurement]
-    after: Any = None  # what the filter has saved then
+    after: Any = None  # the state of the filter then
 
 
 class _Estimator(TargetModel, Actor):
@@ -69,8 +89,8 @@ class _Estimator(TargetModel, Actor):
         self._process_noise = self.process_noise
         self._waiting: list[Measurement] = []  # for the next trigger
         self._too_late = 0
-        self._steps: list[_Step] = []  # of the last ``max_delay``, and what the filter saved before them, at which time
-        self._before: Any = None
+        self._steps: list[_Step] = []  # of the last ``max_delay``, and what the filter knew before them, at which time
+        self._before: State = np.array(self.prior_mean), np.diag(self.prior_variance)
         self._before_at: int | None = None  # None: it is the prior, of whatever time
 
     def fire(self) -> None:
@@ -78,12 +98,10 @@ class _Estimator(TargetModel, Actor):
         self._take(now - to_nanoseconds(self.max_delay))
         if not self.trigger.present:
             return
-        if not self._steps and self._before is None:
-            self._before = self._save()
-        fused = self._catch_up(self._waiting, now)
+        state, fused = self._catch_up(self._waiting, now)
         self._waiting = []
         self._forget(now - to_nanoseconds(self.max_delay))
-        self.estimate.send(Estimate(*self._state(), to_seconds(now), tuple(sorted(fused))))
+        self.estimate.send(Estimate(*self._told(state), to_seconds(now), tuple(sorted(fused))))
 
     def _take(self, earliest: int) -> None:
         """Let the measurements that have come wait for the next trigger, unless they are older than ``earliest``."""
@@ -93,9 +111,9 @@ class _Estimator(TargetModel, Actor):
             self._too_late += len(come) - len(self._waiting)
             self.too_late.send(self._too_late)
 
-    def _catch_up(self, measurements: list[Measurement], now: int) -> set[str]:
-        """Put measurements where they belong, and bring the filter to the present; the robots that were heard."""
-        steps, done = self._steps, len(self._steps)
+    def _catch_up(self, measurements: list[Measurement], now: int) -> tuple[State, set[str]]:
+        """Put measurements where they belong, and bring the filter to the present; also the robots that were heard."""
+        steps = self._steps
         changed = self._step_at(now)
         new: list[tuple[_Step, Measurement]] = []
         for each in measurements:
@@ -105,19 +123,17 @@ class _Estimator(TargetModel, Actor):
                 new.append((step, each))
                 changed = min(changed, step, key=_time)
         first = steps.index(changed)
-        if first < done:
-            self._restore(steps[first - 1].after if first else self._before)
+        state, before = (steps[first - 1].after, steps[first - 1].time) if first else (self._before, self._before_at)
         fused = set()
-        for number in range(first, len(steps)):
-            step = steps[number]
-            before = steps[number - 1].time if number else self._before_at
+        for step in steps[first:]:
             elapsed = 0.0 if before is None else to_seconds(step.time - before)
             # Sorted, so that the order of arrival decides nothing, not even the last bit.
             step.measurements.sort(key=_order)
-            if self._step(elapsed, step.measurements):
+            state, is_fused = self._step(state, elapsed, step.measurements)
+            if is_fused:
                 fused |= {each.robot for where, each in new if where is step}
-            step.after = self._save()
-        return fused
+            step.after, before = state, step.time
+        return state, fused
 
     def _step_at(self, time: int) -> _Step:
         """The step of that time, which may be a new one."""
@@ -131,29 +147,21 @@ class _Estimator(TargetModel, Actor):
         """Forget the steps before a time, of which nothing will come any more."""
         count = bisect_left(self._steps, earliest, key=_time)
         if count:
-            self._before, self._before_at = self._steps[count - 1].after, self._steps[count - 1].time
+            last = self._steps[count - 1]
+            self._before, self._before_at = last.after, last.time
             del self._steps[:count]
 
-    def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
-        """Predict over ``elapsed`` seconds, 0 at the first trigger, and fuse; whether anything was fused."""
+    def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
+        """What the filter knows ``elapsed`` seconds (0 at the first trigger) later; whether anything was fused."""
         raise NotImplementedError
 
-    def _state(self) -> tuple[Array, Array]:
-        """Mean and covariance."""
-        raise NotImplementedError
-
-    def _save(self) -> Any:
-        """What ``_restore`` needs to let the filter go back to where it is now."""
-        raise NotImplementedError
-
-    def _restore(self, saved: Any) -> None:
-        """Let the filter go back."""
-        raise NotImplementedError
+    def _told(self, state: State) -> State:
+        """What is told of a state."""
+        return state
 
     def _noise_over(self, elapsed: float) -> Array:
         """The process noise of so many seconds."""
-        noise: Array = self._process_noise * (elapsed / self.period)
-        return noise
+        return self._process_noise * (elapsed / self.period)
 
     def _rows(self, measurements: list[Measurement]) -> Array:
         """The measurements (m, 7) as the kernels take them."""
@@ -165,8 +173,7 @@ class _Estimator(TargetModel, Actor):
         return np.array(rows, np.float64).reshape(-1, 7)
 
 
-def _time(step: _Step) -> int:
-    return step.time
+_time = attrgetter("time")
 
 
 def _order(measurement: Measurement) -> Any:
@@ -189,20 +196,8 @@ class UnscentedEstimator(_Estimator):
         self._move_and_fuse = ukf.predict_and_fuse  # kept, as an import takes 1 us whenever it is met
         self._model = lru_cache(8)(lambda elapsed: (ukf.constant_velocity(elapsed), self._noise_over(elapsed)))
         self._averaged = self.noise_direction == EXPECTED
-        self._mean, self._covariance = np.array(self.prior_mean), np.diag(self.prior_variance)
 
-    def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
+    def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
         model, rows = self._model(elapsed), self._rows(measurements)  # the model is nearly always the same
-        self._mean, self._covariance, fused = self._move_and_fuse(
-            self._mean, self._covariance, *model, self.kappa, rows, self._averaged
-        )
-        return fused
-
-    def _state(self) -> tuple[Array, Array]:
-        return self._mean, self._covariance
-
-    def _save(self) -> Any:
-        return self._mean, self._covariance  # of which every step makes new ones
-
-    def _restore(self, saved: Any) -> None:
-        self._mean, self._covariance = saved
+        mean, covariance, fused = self._move_and_fuse(*before, *model, self.kappa, rows, self._averaged)
+        return (mean, covariance), fused

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import EpicycleError, Parameter
 from ..core.elementary import hypot
-from .estimator import EXPECTED, _Estimator
+from .estimator import EXPECTED, State, _Estimator
 from .messages import RANGE, Array, Measurement
 
 # FilterPy's EnsembleKalmanFilter is left out: it draws from numpy's global random state, so no run could be
@@ -36,15 +36,18 @@ class FilterPyEstimator(_Estimator):
     def initialize(self) -> None:
         super().initialize()
         self._filter = _make_filter(self.filter, self.kappa)
-        # The cubature filter alone wants columns.
-        column = self.filter == "CubatureKalmanFilter"
-        self._filter.x = np.array(self.prior_mean).reshape((4, 1) if column else 4)
-        self._filter.P = np.diag(self.prior_variance)
+        self._at: State | None = None  # what it knows
+        if self.filter == "CubatureKalmanFilter":  # which alone wants columns
+            self._before = self._before[0].reshape(4, 1), self._before[1]
 
-    def _step(self, elapsed: float, measurements: list[Measurement]) -> bool:
+    def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
+        if before is not self._at:
+            self._filter.x, self._filter.P = map(np.array, before)
         if elapsed > 0.0:
             self._predict(elapsed)
-        return bool(measurements) and self._update(measurements)
+        fused = bool(measurements) and self._update(measurements)
+        self._at = np.array(self._filter.x), np.array(self._filter.P)
+        return self._at, fused
 
     def _predict(self, elapsed: float) -> None:
         from .numerics.ukf import constant_velocity
@@ -58,20 +61,20 @@ class FilterPyEstimator(_Estimator):
 
     def _update(self, measurements: list[Measurement]) -> bool:
         noises = self._noises(measurements)
-        before = self._save()
+        before = np.array(self._filter.x), np.array(self._filter.P)
         for each, (xx, xy, yy) in zip(measurements, noises, strict=True):
             ranged = each.kind == RANGE
             self._fuse(each, np.array([[xx]]) if ranged else np.array([[xx, xy], [xy, yy]]))
         if np.isfinite(self._filter.x).all() and np.isfinite(self._filter.P).all():
             return True
-        self._restore(before)
+        self._filter.x, self._filter.P = before
         return False
 
     def _noises(self, measurements: list[Measurement]) -> Array:
         """The measurements' covariances (m, 3), all as seen from the prediction, whatever the order of fusion."""
         from .numerics.ukf import measurement_noise, sigma_points
 
-        mean, covariance = self._state()
+        mean, covariance = self._told((self._filter.x, self._filter.P))
         if self.noise_direction == EXPECTED:
             points, weights = sigma_points(mean, covariance, self.kappa)
         else:
@@ -121,15 +124,8 @@ class FilterPyEstimator(_Estimator):
             used.hx = observe
             used.update(measurement.value[:, np.newaxis], R=noise)
 
-    def _state(self) -> tuple[Array, Array]:
-        covariance = np.array(self._filter.P)
-        return np.array(self._filter.x).ravel(), 0.5 * (covariance + covariance.T)
-
-    def _save(self) -> Any:
-        return np.array(self._filter.x), np.array(self._filter.P)
-
-    def _restore(self, saved: Any) -> None:
-        self._filter.x, self._filter.P = map(np.array, saved)
+    def _told(self, state: State) -> State:
+        return np.array(state[0]).ravel(), 0.5 * (state[1] + state[1].T)
 
 
 def _make_filter(name: str, kappa: float) -> Any:

@@ -41,23 +41,22 @@ class GoalMonitor(Actor):
             self.arrived.send(True)
 
 
-class _Known:
-    """The latest state of each of several bodies."""
+class _DistanceBetween(Actor):
+    """What monitors of distances share: the latest state of each of several bodies."""
 
-    def __init__(self) -> None:
+    def initialize(self) -> None:
         self._states: dict[int, BodyState] = {}
 
-    def see(self, body: int, states: Iterable[BodyState]) -> None:
-        """Take note of states of a body; an older one than what is known of it says nothing new."""
-        for state in states:
-            if body not in self._states or state.time >= self._states[body].time:
-                self._states[body] = state
+    def _tell(self, output: OutputPort[float], states_by_body: Iterable[Iterable[BodyState]]) -> None:
+        """Take note of states, and send the smallest distance between two bodies, if so many are known.
 
-    def tell(self, output: OutputPort[float]) -> None:
-        """Send the smallest distance between two, if so many are known, at the time of the latest state.
-
-        Each has moved on with its velocity since its own state.
+        It is that of the time of the latest state: each has moved on with its velocity since its own state.  One that
+        is older than what is known of a body says nothing new.
         """
+        for body, states in enumerate(states_by_body):
+            for state in states:
+                if body not in self._states or state.time >= self._states[body].time:
+                    self._states[body] = state
         now = max((state.time for state in self._states.values()), default=0.0)
         places = []
         for state in self._states.values():
@@ -70,7 +69,7 @@ class _Known:
             output.send(min(distance(a, b) for a, b in combinations(places, 2)))
 
 
-class DistanceMonitor(Actor):
+class DistanceMonitor(_DistanceBetween):
     """The distance between two bodies, whenever a state of one comes and both are known.
 
     It is that of the time of the later state: where the other body was last known to be is moved on with its velocity
@@ -82,16 +81,11 @@ class DistanceMonitor(Actor):
     b = InputPort(BodyState, doc="the other body")
     distance = OutputPort(float, doc="metres between them")
 
-    def initialize(self) -> None:
-        self._known = _Known()
-
     def fire(self) -> None:
-        self._known.see(0, self.a.tokens)
-        self._known.see(1, self.b.tokens)
-        self._known.tell(self.distance)
+        self._tell(self.distance, (self.a.tokens, self.b.tokens))
 
 
-class SeparationMonitor(Actor):
+class SeparationMonitor(_DistanceBetween):
     """The smallest distance between any two of several bodies, whenever a state comes and two or more are known.
 
     It is that of the time of the latest state, as ``DistanceMonitor`` tells it.
@@ -100,10 +94,5 @@ class SeparationMonitor(Actor):
     bodies = InputPort(BodyState, multi=True, doc="a connection for each body")
     distance = OutputPort(float, doc="smallest distance between two of them in metres")
 
-    def initialize(self) -> None:
-        self._known = _Known()
-
     def fire(self) -> None:
-        for body, states in enumerate(self.bodies.by_channel()):
-            self._known.see(body, states)
-        self._known.tell(self.distance)
+        self._tell(self.distance, self.bodies.by_channel())

@@ -1,10 +1,25 @@
 """What every aspect is made of: its kinds, join points, and parameters that select and that take time."""
 
 from .aspect import Aspect, Decoration, class_decorations, decorations
-from .composite import CompositeAspect, CompositeExecutionAspect, FiringRequest, Request
-from .execution import ActorPoint, ExecutionAspect, Job, Unit
 from .fields import STAMP, FieldError, altered, field_of, numbers_in, stamped_as
 from .join_point import TOKEN, AspectContext, JoinPoint, JoinPointAspect, Reading, Selection, aspect_stream
+from .kinds import (
+    ActorPoint,
+    CommunicationAspect,
+    CompositeAspect,
+    CompositeExecutionAspect,
+    ExecutionAspect,
+    FiringRequest,
+    Job,
+    LossAspect,
+    MeasurementAspect,
+    ObservationAspect,
+    PortAspect,
+    RandomLoss,
+    Request,
+    Unit,
+    is_bad,
+)
 from .parameters import (
     ByActorParameter,
     Duration,
@@ -19,65 +34,14 @@ from .parameters import (
     law,
     time_needed,
 )
-from .port import (
-    CommunicationAspect,
-    LossAspect,
-    MeasurementAspect,
-    ObservationAspect,
-    PortAspect,
-    RandomLoss,
-    is_bad,
-)
 from .server import NEWEST, OLDEST, Server, Task, WaitingLine
 
 __all__ = [
-    "NEWEST",
-    "OLDEST",
-    "STAMP",
-    "TOKEN",
-    "ActorPoint",
-    "Aspect",
-    "AspectContext",
-    "ByActorParameter",
-    "CommunicationAspect",
-    "CompositeAspect",
-    "CompositeExecutionAspect",
-    "Decoration",
-    "Duration",
-    "DurationParameter",
-    "ExecutionAspect",
-    "FieldError",
-    "FiringRequest",
-    "FiringTime",
-    "FiringTimeParameter",
-    "GroupsParameter",
-    "Job",
-    "JoinPoint",
-    "JoinPointAspect",
-    "LawParameter",
-    "LossAspect",
-    "MeasurementAspect",
-    "ObservationAspect",
-    "PortAspect",
-    "PortsParameter",
-    "RandomLoss",
-    "Reading",
-    "Request",
-    "Selection",
-    "SelectionParameter",
-    "Server",
-    "Task",
-    "Unit",
-    "WaitingLine",
-    "altered",
-    "aspect_stream",
-    "class_decorations",
-    "decorations",
-    "drawn",
-    "field_of",
-    "is_bad",
-    "law",
-    "numbers_in",
-    "stamped_as",
-    "time_needed",
-]
+    "NEWEST", "OLDEST", "STAMP", "TOKEN", "ActorPoint", "Aspect", "AspectContext", "ByActorParameter",
+    "CommunicationAspect", "CompositeAspect", "CompositeExecutionAspect", "Decoration", "Duration",
+    "DurationParameter", "ExecutionAspect", "FieldError", "FiringRequest", "FiringTime", "FiringTimeParameter",
+    "GroupsParameter", "Job", "JoinPoint", "JoinPointAspect", "LawParameter", "LossAspect", "MeasurementAspect",
+    "ObservationAspect", "PortAspect", "PortsParameter", "RandomLoss", "Reading", "Request", "Selection",
+    "SelectionParameter", "Server", "Task", "Unit", "WaitingLine", "altered", "aspect_stream", "class_decorations",
+    "decorations", "drawn", "field_of", "is_bad", "law", "numbers_in", "stamped_as", "time_needed",
+]  # fmt: skip

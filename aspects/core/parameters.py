@@ -15,7 +15,7 @@ from epicycle.actors import (
     Stream,
 )
 
-from .execution import Job
+from .kinds import Job
 
 T = TypeVar("T")
 Duration: TypeAlias = float | Distribution

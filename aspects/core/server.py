@@ -15,7 +15,7 @@ NEWEST, OLDEST = "newest", "oldest"
 
 
 @dataclass(order=True)
-class Task:
+class Task(ABC):
     """What waits for a server, or is served: a message, or a firing.  The smallest ``urgency`` goes first."""
 
     urgency: float
@@ -27,6 +27,10 @@ class Task:
 
     def __post_init__(self) -> None:
         self.came = self.point.tag.time
+
+    @abstractmethod
+    def release(self, now: int) -> None:
+        """It has been served: let it go on."""
 
 
 T = TypeVar("T", bound=Task)
@@ -65,29 +69,28 @@ class WaitingLine(Generic[T]):
         return heapq.heappop(self.tasks)
 
 
-class Server(ABC, Generic[T]):
-    """Serves one task at a time, and counts what it does: write ``release``."""
+class Server:
+    """Serves one task at a time, and counts what it does."""
 
     def __init__(self) -> None:
-        self.line: WaitingLine[T] = WaitingLine()
+        self.line: WaitingLine[Task] = WaitingLine()
         self.begins = 0
         self.waited = 0  # by all that have begun, until then
+        self.done = 0
+        self.responses = 0  # of all that are done: the times from coming to being done
+        self.longest = 0  # of these
         self._come = 0
-        self._served: T | None = None
+        self._served: Task | None = None
         self._begun = 0  # when the served one began, or went on
         self._busy = 0  # of all that were served before it
-
-    @abstractmethod
-    def release(self, task: T, now: int) -> None:
-        """A task has been served: let it go on."""
 
     def busy_until(self, end: int) -> int:
         """How long it has served before ``end``, which is not before the present."""
         return self._busy + (end - self._begun if self._served is not None else 0)
 
     def arrive(
-        self, task: T, capacity: int | None = None, overflow: str = NEWEST, preemptive: bool | None = None
-    ) -> T | None:
+        self, task: Task, capacity: int | None = None, overflow: str = NEWEST, preemptive: bool | None = None
+    ) -> Task | None:
         """Take in a task, now; returns the one that is dropped for it.
 
         ``preemptive``: a more urgent one interrupts the served one, if false at the instant at which that began alone.
@@ -119,31 +122,36 @@ class Server(ABC, Generic[T]):
             self._stop(now)
             self._go_on(now)
 
-    def _begin(self, task: T, now: int) -> None:
+    def _begin(self, task: Task, now: int) -> None:
         self._served, self._begun = task, now
         self.begins += 1
         self.waited += now - task.came
         if task.duration > 0:
             task.point.later(to_seconds(task.duration), self._finish, (task, now))
         else:
-            self._stop(now)
-            self.release(task, now)
+            self._release(task, now)
 
-    def _finish(self, what: tuple[T, int]) -> None:
+    def _finish(self, what: tuple[Task, int]) -> None:
         """A task is over, unless it was interrupted since it began or went on at that time."""
         task, begun = what
         if task is self._served and begun == self._begun:
             now = begun + task.duration
-            self._stop(now)
-            self.release(task, now)
+            self._release(task, now)
             self._go_on(now)
+
+    def _release(self, task: Task, now: int) -> None:
+        self._stop(now)
+        self.done += 1
+        self.responses += now - task.came
+        self.longest = max(self.longest, now - task.came)
+        task.release(now)
 
     def _go_on(self, now: int) -> None:
         """If it is idle, begin with the most urgent task."""
         while self._served is None and self.line.tasks:
             self._begin(self.line.pop(now), now)
 
-    def _interrupt(self, task: T, now: int) -> None:
+    def _interrupt(self, task: Task, now: int) -> None:
         worked = now - self._begun
         self._stop(now)
         task.duration -= worked

@@ -204,7 +204,7 @@ def first_sentence(doc: str) -> str:
 def _group(cls: type) -> tuple[str, str]:
     """The topic under which a type is listed, and what its module says of it."""
     parts = cls.__module__.split(".")
-    # epicycle.actors.robotics.sensor is about robotics; acme_robots.lidar is of acme_robots.
+    # epicycle.actors.robotics.world is about robotics; acme_robots.lidar is of acme_robots.
     depth = 3 if parts[0] == "epicycle" else 1
     module = sys.modules.get(".".join(parts[:depth]))
     return parts[depth - 1] if len(parts) >= depth else parts[-1], first_sentence(getattr(module, "__doc__", "") or "")

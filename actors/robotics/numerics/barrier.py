@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import borrower, kernel
+from .compiled import Array, borrower, kernel
 from .constraints import BOUND, ROUNDING, VALUE
 from .horizon import HorizonProblem
 from .newton import newton_step
@@ -43,7 +43,6 @@ from .task import (
     objective_of,
     take,
 )
-from .typing import Array
 
 TOLERANCE = 1e-6  # m; violations below this count as none
 _SLACK = 1e-4  # m that an infeasible problem's bounds get, and that restoration goes beyond keeping a constraint

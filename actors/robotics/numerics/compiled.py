@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
+from numpy.typing import NDArray
 
 from ...core import elementary
 from ...core.elementary.in_numba import register
 
+Array = NDArray[np.float64]  # the one array type of the kernels
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
@@ -27,9 +29,24 @@ def _compiled(function: Function, **options: bool) -> Function:
 
 
 def kernel(function: Function) -> Function:
-    """Compile a pure function on arrays; ``error_model="numpy"`` gives inf and NaN instead of exceptions."""
-    with _cache_of_these_sources():
+    """Compile a pure function on arrays; ``error_model="numpy"`` gives inf and NaN instead of exceptions.
+
+    Compiled code lies in a folder named after all sources of this package and of the elementary functions.  By itself
+    numba looks only at the file of a kernel, and would keep using old code that it calls from others.
+    """
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    if before:  # the user's own, NUMBA_CACHE_DIR
+        folder = Path(before)
+    elif os.access(_HERE, os.W_OK):
+        folder = _HERE / "__pycache__"
+    else:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "epicycle"
+    config.CACHE_DIR = str(folder / _SOURCES)
+    try:
         return _compiled(function, cache=True, _nrt=True)
+    finally:
+        config.CACHE_DIR = before
 
 
 def inner(function: Function) -> Function:
@@ -51,27 +68,6 @@ def borrower(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """A ``borrower`` that becomes a part of its callers, where it is called for each of many things."""
     return _compiled(function, no_cpython_wrapper=True, _nrt=False, forceinline=True)
-
-
-@contextmanager
-def _cache_of_these_sources() -> Iterator[None]:
-    """Compiled code lies in a folder named after all sources of this package and of the elementary functions.
-
-    By itself numba looks only at the file of a kernel, and would keep using old code that it calls from others.
-    """
-    config: Any = numba.config
-    before = config.CACHE_DIR
-    if before:  # the user's own, NUMBA_CACHE_DIR
-        config.CACHE_DIR = str(Path(before) / _SOURCES)
-    elif os.access(_HERE, os.W_OK):
-        config.CACHE_DIR = str(_HERE / "__pycache__" / _SOURCES)
-    else:
-        home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        config.CACHE_DIR = str(Path(home) / "epicycle" / _SOURCES)
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before
 
 
 _HERE = Path(__file__).parent

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from .compiled import borrower, inlined, inner
+from .compiled import Array, borrower, inlined, inner
 from .horizon import HorizonProblem
 from .terms import Term, keep_away, keep_away_uncertain, stay_near
-from .typing import Array
 
 ROUNDING = 1e-6  # m; a constraint that is kept by less than this is not left out
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .compiled import Array
 from .horizon import REACH_GOAL, HorizonProblem
-from .typing import Array
 
 _TINY = 1e-18  # m^2; gives a root a slope at zero, too, and changes it by less than 1e-9 m
 

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .compiled import kernel
+from .compiled import Array, kernel
 from .mutual_information import pairwise_distance
-from .typing import Array
 
 REACH_GOAL = 0
 INFORM = 1

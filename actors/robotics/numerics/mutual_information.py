@@ -16,9 +16,8 @@ import math
 import numpy as np
 
 from ...core.elementary import exp, hypot, log
-from .compiled import borrower, inner, kernel
+from .compiled import Array, borrower, inner, kernel
 from .terms import Term
-from .typing import Array
 
 
 @kernel

@@ -12,9 +12,8 @@ import math
 
 import numpy as np
 
-from .compiled import borrower, inlined, inner
+from .compiled import Array, borrower, inlined, inner
 from .terms import Term
-from .typing import Array
 
 Vector = tuple[float, float]
 Matrix = tuple[float, float, float, float]  # by rows

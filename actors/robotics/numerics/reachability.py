@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from .compiled import inner, kernel
+from .compiled import Array, inner, kernel
 from .horizon import trajectory
-from .typing import Array
 from .ukf import constant_velocity, mapped, predict, sigma_points, turned
 
 OLDEST = 100_000.0  # periods

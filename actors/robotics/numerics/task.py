@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.elementary import log
-from .compiled import borrower, inlined, inner
+from .compiled import Array, borrower, inlined, inner
 from .constraints import BOUND, MARGIN, VALUE, WHEN, X, Y, certainly_kept, circle, constraints_of, term
 from .horizon import REACH_GOAL, HorizonProblem
 from .mutual_information import informed, new_points
 from .newton import CONTROL, STEP, VELOCITY, Quadratic, Vector, add, clear, new_stages, put
 from .terms import Term, smoothed, stay_near
-from .typing import Array
 
 _SHARE = 0.8  # of the way to the nearest limit that a step goes at most
 
@@ -110,7 +109,6 @@ def move(task: Task, length: float) -> None:
 
 @borrower
 def take(task: Task) -> None:
-    """Take the controls tried."""
     plan = task.plan
     for s in range(plan.shape[0]):
         for c in range(2):

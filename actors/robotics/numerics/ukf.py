@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import inner, kernel
-from .typing import Array
+from .compiled import Array, inner, kernel
 
 RELATIVE_POSITION = 0
 RANGE = 1

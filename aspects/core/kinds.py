@@ -1,4 +1,4 @@
-"""Execution aspects: they stand at actors, and decide when, or whether, these fire.
+"""The kinds of aspects: those of what passes ports, those of firings of actors, and those that are models themselves.
 
 What passes the join point of an actor is a ``Job``: a firing that is due, with the tokens that came at its tag and the
 wake-ups that the actor asked for.  ``point.forward(job)`` lets the actor fire; with a delay, or called later, it fires
@@ -21,9 +21,98 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
-from epicycle.actors import Actor, InputPort, Tag, Wake
+from epicycle.actors import Actor, InputPort, Parameter, Tag, Wake
 
 from .join_point import JoinPoint, JoinPointAspect, aspect_stream
+
+
+class PortAspect(JoinPointAspect[Any, JoinPoint]):
+    """An aspect of the tokens that pass ports: write ``pass_token``.
+
+    ``stands_at`` says at which: "input" (communication), "output" (measurement), or both.  ``alters_parameters``: it
+    may also stand at parameters that are numbers, which it gets as tokens whenever their actors fire.
+    """
+
+    at_ports: ClassVar[bool] = True
+    stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
+
+    @abstractmethod
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        """Decide what becomes of a token at a join point."""
+
+
+class CommunicationAspect(PortAspect):
+    """An aspect of the way to an input port."""
+
+    stands_at: ClassVar[frozenset[str]] = frozenset({"input"})
+
+
+class MeasurementAspect(PortAspect):
+    """An aspect of what leaves an output port."""
+
+    stands_at: ClassVar[frozenset[str]] = frozenset({"output"})
+
+
+class ObservationAspect(PortAspect):
+    """An aspect that looks at what passes and never changes it: write ``observe``.
+
+    Every token goes on at once, whatever ``observe`` does with what it sees.
+    """
+
+    @abstractmethod
+    def observe(self, token: Any, point: JoinPoint) -> None:
+        """Look at a token before it goes on."""
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        self.observe(token, point)
+        point.forward(token)
+
+
+class LossAspect(PortAspect):
+    """An aspect that lets some tokens not pass: write ``loses``.  A loss is noted as the first of its ``events``."""
+
+    events: ClassVar[tuple[str, ...]] = ("dropped",)
+
+    @abstractmethod
+    def loses(self, token: Any, point: JoinPoint) -> bool:
+        """Whether a token is lost."""
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        if self.loses(token, point):
+            point.act(self.events[0], token)
+        else:
+            point.forward(token)
+
+
+class RandomLoss(LossAspect):
+    """A loss that does not depend on the token: write ``draw``."""
+
+    spare_first = Parameter(bool, False, doc="tokens of the first tag at which any comes always pass")
+
+    @abstractmethod
+    def draw(self, point: JoinPoint) -> bool:
+        """Whether the next token is lost; as many random numbers are drawn at any strength."""
+
+    def loses(self, token: Any, point: JoinPoint) -> bool:
+        lost = self.draw(point)
+        first = point.memory.setdefault("first tag", point.tag) if self.spare_first else None
+        return lost and point.tag != first
+
+
+def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:
+    """The state of a two-state Markov chain that takes one step for every token; it starts in its stationary law.
+
+    ``worsens`` is the probability of good -> bad in a step, ``recovers`` that of bad -> good.  One uniform number is
+    drawn for every token.
+    """
+    draw = point.random.random()
+    bad = point.memory.get("bad")
+    if bad is None:
+        bad = draw * (worsens + recovers) < worsens
+    else:
+        bad = draw >= recovers if bad else draw < worsens
+    point.memory["bad"] = bad
+    return bool(bad)
 
 
 @dataclass(eq=False)
@@ -133,3 +222,59 @@ class ExecutionAspect(JoinPointAspect[Job, ActorPoint]):
     @abstractmethod
     def schedule(self, job: Job, point: ActorPoint) -> None:
         """Decide when, or whether, a job is executed: ``point.forward(job)``, now or later or never."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A token on its way through an aspect that is a model: what the actors of such a composite get and send.
+
+    ``source`` is the port that the token comes from, ``port`` where it was going (the connection, for an aspect that
+    stands on one alone), ``time`` when it came, in s.  What the composite answers goes on to where the request came
+    from: an actor inside may keep a request for a while, lose it, or change its token with
+    ``dataclasses.replace(request, token=...)``.
+    """
+
+    token: Any
+    source: str
+    port: str
+    time: float
+    aspect: str
+    way: int = 0  # which of the ways through the port
+
+
+@dataclass(frozen=True)
+class FiringRequest(Request):
+    """A firing that is due, on its way through an aspect that is a model: ``port`` is the path of the actor.
+
+    ``execution_time`` (s) is what the aspect says of this actor; ``token`` is None.  The actor fires when the request
+    is answered, with the tokens and wake-ups of the time at which it came.
+    """
+
+    execution_time: float = 0.0
+
+
+class CompositeAspect(PortAspect):
+    """An aspect that is a model: each token is a request to a composite, and goes on when the composite answers.
+
+    Events: ``requested``; ``delivered``, with the seconds since.  A request that is never answered is a token lost.
+    Ptolemy: ``CompositeCommunicationAspect``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("requested", "delivered")
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        point.enter(token)
+
+
+class CompositeExecutionAspect(ExecutionAspect):
+    """An aspect at actors that is a model: each firing is a request to a composite, and happens when it answers.
+
+    Events: ``requested``, with the execution time; ``executed``, with the seconds since.  A request that is never
+    answered is a firing that never happens.  Ptolemy: ``CompositeExecutionAspect``.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("requested", "executed")
+    is_processor: ClassVar[bool] = True
+
+    def schedule(self, job: Job, point: ActorPoint) -> None:
+        point.enter(job)

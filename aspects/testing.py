@@ -1,19 +1,73 @@
-"""Tests of non-interference: what an aspect leaves as it is."""
+"""Tests that an aspect does not interfere with what it is not woven on: for anyone's aspects, on anyone's models.
+
+Each function runs a model a few times and raises an ``AssertionError`` that says which event of the log was the first
+to differ.  How to run it is told by a *trial*: a function that weaves aspects around a model in addition to its own,
+runs it, and returns the records of the event log.  ``epicycle.runner.Trial`` makes one of a model:
+
+>>> trial = Trial("collision_avoidance", until=2.0)
+>>> def test_offset():
+...     assert_silent_at_zero(Offset(by=0.0), trial, at="**.measurement")
+...     assert_removal_moves_nothing(Offset(by=0.3), trial, at="**.measurement")
+...     assert_streams_are_its_own(Offset(by=0.3), trial, at="**.measurement")
+
+Where no token passes the aspect a test shows nothing, and fails for that reason.
+"""
 
 from __future__ import annotations
 
+import copy
 import random  # noqa: TID251 (to see that nobody uses it)
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from epicycle.aspects import Aspect
+from . import Aspect, ExecutionAspect, JoinPoint, JoinPointAspect, PortAspect, Unit
 
-from .trial import Event, RunModel, Woven
-from .visits import Visits
+__all__ = [
+    "Event", "RunModel", "Woven", "assert_observes_only", "assert_order_of_unrelated_aspects_is_free",
+    "assert_removal_moves_nothing", "assert_silent_at_zero", "assert_streams_are_its_own",
+]  # fmt: skip
 
 NAME = "tested"
 OTHER = "other"
+P = TypeVar("P", bound=JoinPoint)
+
+
+@dataclass(frozen=True)
+class Woven:
+    """An aspect, its name, and the pointcuts where it is to stand."""
+
+    name: str
+    aspect: Aspect
+    at: str | Sequence[str] = "**"
+
+
+class Event(Protocol):
+    """A record of the event log, as ``Record`` of ``epicycle.runner`` is one."""
+
+    @property
+    def actor(self) -> str:
+        """The actor or composite at whose port it took place."""
+
+    @property
+    def port(self) -> str:
+        """The name of the port."""
+
+    @property
+    def aspect(self) -> str:
+        """The name of the aspect that acted, empty for a send."""
+
+    def encoded(self, *, microstep: bool = True) -> bytes:
+        """All of it, to the bit; with ``microstep`` false but for that."""
+
+
+class RunModel(Protocol):
+    """Runs a model with some aspects woven in addition to its own, and returns the records of the event log."""
+
+    def __call__(self, *woven: Woven) -> Sequence[Event]: ...
 
 
 def assert_silent_at_zero(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
@@ -21,7 +75,7 @@ def assert_silent_at_zero(aspect: Aspect, trial: RunModel, at: str | Sequence[st
 
     ``aspect`` is made with that strength: ``Noise(deviation=0)``.
     """
-    visits = Visits(aspect)
+    visits = _Visits(aspect)
     log = trial(Woven(NAME, visits.aspect, at))
     visits.demand_some(at)
     _compare(f"{aspect!r} at {at} is not silent", trial(), "without it", log, "with it")
@@ -29,7 +83,7 @@ def assert_silent_at_zero(aspect: Aspect, trial: RunModel, at: str | Sequence[st
 
 def assert_observes_only(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
     """The event log without the aspect's own events is, to the bit, the one of the model without the aspect."""
-    visits = Visits(aspect)
+    visits = _Visits(aspect)
     log = [event for event in trial(Woven(NAME, visits.aspect, at)) if event.aspect != NAME]
     visits.demand_some(at)
     what = f"{aspect!r} at {at} does more than to observe"
@@ -46,7 +100,7 @@ def assert_removal_moves_nothing(
     token in place, or reaches into the model in another way.  (Microsteps are not compared: what the aspect does later
     takes some, and moves those of SimPy processes at that time.)
     """
-    visits = Visits(aspect, acts=False, tells=False)
+    visits = _Visits(aspect, acts=False, tells=False)
     log = trial(Woven(NAME, visits.aspect, at), *beside)
     visits.demand_some(at)
     what = f"{aspect!r} at {at} moves what is not its own, though none of its decisions was carried out"
@@ -62,7 +116,7 @@ def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequen
     untouched, and the same aspect decides the same in a second run.
     """
     before = _shared_generators()
-    alone = Visits(aspect, acts=False)
+    alone = _Visits(aspect, acts=False)
     acts = _acts(trial(Woven(NAME, alone.aspect, at)))
     alone.demand_some(at)
     if _shared_generators() != before:
@@ -78,7 +132,7 @@ def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequen
         ports[stream] = port
 
     half = list(alone.streams)[::2]
-    here, beside = Visits(aspect, acts=False), Visits(aspect, acts=False, tells=False)
+    here, beside = _Visits(aspect, acts=False), _Visits(aspect, acts=False, tells=False)
     acts_of_half = _acts(trial(Woven(OTHER, beside.aspect, at), Woven(NAME, here.aspect, half)))
     for port in half:
         if here.streams.get(port) != alone.streams[port]:
@@ -87,13 +141,13 @@ def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequen
         raise AssertionError(f"{aspect!r} shares the random stream at {ports[shared.pop()]} with another of its kind")
     if not alone.shares:
         what = f"{aspect!r}: what it decides at a port depends on where else it stands"
-        acts = [event for event in acts if _port(event) in set(half)]
+        acts = [event for event in acts if ".".join(filter(None, (event.actor, event.port))) in half]
         _compare(what, acts, f"at {at}", acts_of_half, "at half of that")
 
 
 def assert_order_of_unrelated_aspects_is_free(first: Woven, second: Woven, trial: RunModel) -> None:
     """Two aspects that stand at different ports can be declared in either order: the event log is the same."""
-    visits = Visits(first.aspect), Visits(second.aspect)
+    visits = _Visits(first.aspect), _Visits(second.aspect)
     woven = Woven(first.name, visits[0].aspect, first.at), Woven(second.name, visits[1].aspect, second.at)
     log = trial(*woven)
     for each, one in zip(visits, (first, second), strict=True):
@@ -107,10 +161,6 @@ def assert_order_of_unrelated_aspects_is_free(first: Woven, second: Woven, trial
 def _shared_generators() -> str:
     state = np.random.get_state(legacy=False)  # noqa: NPY002 (to see that nobody uses it)
     return repr((random.getstate(), state["state"]["key"].tolist(), state["state"]["pos"]))
-
-
-def _port(event: Event) -> str:
-    return f"{event.actor}.{event.port}" if event.port else event.actor
 
 
 def _acts(log: Sequence[Event]) -> list[Event]:
@@ -129,3 +179,66 @@ def _compare(
             if told[0] == told[1]:  # up to the sixth digit
                 told = [repr(event) for event in pair]
             raise AssertionError(f"{what}: event {place + 1} differs\n  {which}: {told[0]}\n  {which_other}: {told[1]}")
+
+
+class _Visits:
+    """An aspect that is watched: what passes it, and the random streams that it meets.
+
+    With ``acts`` false nothing that it decides is done: each token goes on as it came, at once.  With ``tells`` false
+    it leaves no trace in the log and the results.
+    """
+
+    def __init__(self, aspect: Aspect, *, acts: bool = True, tells: bool = True) -> None:
+        self.count = 0
+        self.streams: dict[str, str] = {}  # their states when the first token came, by port
+        self.shares = False
+        self.aspect = copy.copy(aspect)
+        self._original = aspect
+        self._acts = acts
+        self._mutes = (*(() if acts else ("forward", "stop")), *(() if tells else ("act", "count", "record")))
+        self._points: dict[JoinPoint, JoinPoint] = {}
+        # Each run has a copy of the original, and tells this of it.
+        decides = "pass_token" if isinstance(aspect, PortAspect) else "schedule"
+        if isinstance(aspect, JoinPointAspect):
+            setattr(self.aspect, decides, partial(self._pass, aspect, decides))
+            setattr(self.aspect, "pass_by", partial(self._pass, aspect, "pass_by"))  # noqa: B010 (they are methods)
+        if isinstance(aspect, ExecutionAspect):
+            setattr(self.aspect, "begin", partial(self._begin, aspect))  # noqa: B010
+
+    def demand_some(self, at: str | Sequence[str]) -> None:
+        """Raise ``AssertionError`` if nothing has passed."""
+        if self.count == 0:
+            raise AssertionError(
+                f"nothing has passed {self._original!r} at {at}, so nothing is shown: let it run longer"
+            )
+
+    def _begin(self, original: ExecutionAspect, unit: Unit) -> None:
+        original.begin(self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart")))
+
+    def _pass(self, original: Aspect, method: str, passing: Any, point: JoinPoint) -> None:
+        """Let the aspect do what it does with a token or a firing."""
+        if method != "pass_by":
+            self.count += 1
+            if point.port not in self.streams:
+                self.streams[point.port] = repr(point.random)
+        known = self._points.get(point)
+        if known is None:
+            known = self._points[point] = self._muted(point)
+        getattr(original, method)(passing, known)
+        self.shares = self.shares or bool(point.shared)
+        if not self._acts:
+            point.forward(passing)
+
+    def _muted(self, point: P, more: Sequence[str] = ()) -> P:
+        if not self._mutes:
+            return point
+        muted = copy.copy(point)
+        for method in (*self._mutes, *more):
+            setattr(muted, method, _do_nothing)
+        if not self._acts:
+            setattr(muted, "hold", lambda token: _do_nothing)  # noqa: B010
+        return muted
+
+
+def _do_nothing(*_: object, **__: object) -> None:
+    pass

@@ -1,0 +1,189 @@
+"""The world around the robots' software: bodies that are driven or move by themselves, sensors, a radio channel."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, counted
+from ..core.elementary import cos, hypot, sin
+from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, all_finite, enclosing
+
+# Of floats: arithmetic on arrays of two takes ten times as long.
+Pair = tuple[float, float]
+
+
+class Vehicle(Actor):
+    """A double integrator in the paper's discrete form: ``P += dt * V``, ``V += dt * U`` at every trigger.
+
+    ``dt`` is the time since the last trigger and U the acceleration held over it.  A control that arrives at
+    the time of a trigger acts from that time on, so the state sent there does not depend on it; one that
+    arrives between two triggers acts from the next one.  Without a new control the last one is held.  A
+    control that is not finite is ignored.
+    """
+
+    trigger = InputPort(object, doc="move to the present time and send the state")
+    acceleration = InputPort(np.ndarray, shape=(2,), triggers=False, doc="m/s^2, the control to be applied from now on")
+    state = OutputPort(BodyState, depends_on=("trigger",), doc="position and velocity at this time")
+
+    start = array_parameter((2,), unit="m", doc="position at the first trigger")
+    start_velocity = array_parameter((2,), (0.0, 0.0), unit="m/s", doc="velocity at the first trigger")
+    max_speed = Parameter(float, 8.0, unit="m/s", min=0, doc="a faster velocity is shortened to this")
+    max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=0, doc="a harder control is shortened to this")
+
+    def initialize(self) -> None:
+        self._position = _pair(self.start)
+        self._velocity = shortened(_pair(self.start_velocity), self.max_speed)
+        self._held: Pair = 0.0, 0.0
+        self._next = self._held
+        self._moved_at: int | None = None
+
+    def fire(self) -> None:
+        now = self.tag.time
+        if self.trigger.present:
+            if self._moved_at is not None:
+                self._move((now - self._moved_at) / 1e9)
+            self._held = self._next
+            self._moved_at = now
+            self.state.send(BodyState(self._position, self._velocity, self.now))
+        if self.acceleration.present and all_finite(wanted := _pair(self.acceleration.value)):
+            self._next = shortened(wanted, self.max_acceleration)
+            if self._moved_at == now:
+                self._held = self._next
+
+    def _move(self, elapsed: float) -> None:
+        (x, y), (vx, vy), (ux, uy) = self._position, self._velocity, self._held
+        self._position = x + elapsed * vx, y + elapsed * vy
+        self._velocity = shortened((vx + elapsed * ux, vy + elapsed * uy), self.max_speed)
+
+
+def shortened(vector: Pair, longest: float) -> Pair:
+    """The vector itself, or the one of length ``longest`` in its direction if it is longer."""
+    x, y = vector
+    length = hypot(x, y)
+    return (x * (longest / length), y * (longest / length)) if length > longest else vector
+
+
+def _pair(values: ArrayLike) -> Pair:
+    x, y = np.asarray(values, dtype=float).tolist()
+    return x, y
+
+
+class CircularMotion(Actor):
+    """A body on a circle of radius ``speed / turn_rate`` (Table III), computed from the time alone.
+
+    The circle's centre lies to the left of the first heading: with the defaults the body starts on top of a
+    circle around (12, 0) and turns counter-clockwise.
+    """
+
+    trigger = InputPort(object, doc="send the state now")
+    state = OutputPort(BodyState, doc="position and velocity at this time")
+
+    start = array_parameter((2,), (12.0, 2.0), unit="m", doc="position at the start of the run")
+    speed = Parameter(float, 1.26, unit="m/s", min=0, doc="constant speed")
+    turn_rate = Parameter(float, 0.628, unit="rad/s", doc="positive turns left; 0 is a straight line")
+    heading = Parameter(float, math.pi, unit="rad", doc="direction of motion at the start, from the x axis")
+
+    def initialize(self) -> None:
+        self._began = self.now
+
+    def fire(self) -> None:
+        now = self.now
+        elapsed = now - self._began
+        turned = self.turn_rate * elapsed
+        # The chord of the arc travelled: right for any turn rate, 0 included.
+        chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
+        direction, heading = self.heading + turned / 2.0, self.heading + turned
+        x, y = self.start.tolist()
+        position = x + chord * cos(direction), y + chord * sin(direction)
+        velocity = self.speed * cos(heading), self.speed * sin(heading)
+        self.state.send(BodyState(position, velocity, now))
+
+
+def _sinc(x: float) -> float:
+    """sin(pi x) / (pi x), 1 at 0; np.sinc takes 10 us for one number."""
+    angle = math.pi * x
+    return sin(angle) / angle if angle else 1.0
+
+
+class Sensor(Actor):
+    """Measures the target's relative position, or its distance, with normal noise (Table II).
+
+    The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both
+    of its components are drawn at every firing, whether used or not, so that neither ``kind`` nor
+    ``max_range`` moves the noise of later measurements.  A measurement is of the time of the robot's own
+    state, by the robot's own clock.
+    """
+
+    robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
+    location = InputPort(
+        BodyState, required=False, doc="where it believes to be, which stands in the measurement; unconnected: as robot"
+    )
+    target = InputPort(BodyState, doc="where the target is")
+    measurement = OutputPort(Measurement, doc="sent at tags where both are known and the target is in range")
+
+    kind = Parameter(str, RELATIVE_POSITION, choices=(RELATIVE_POSITION, RANGE), doc="what is measured")
+    along = Parameter(float, 0.2, unit="m", min=0, doc="standard deviation along the line of sight, sigma_d")
+    across = Parameter(float, 2.0, unit="m", min=0, doc="standard deviation across the line of sight, sigma_b")
+    max_range: Parameter[float | None] = Parameter(
+        float, None, unit="m", min=0, doc="no measurement beyond this distance; none: no limit"
+    )
+    robot_name = Parameter(str, "", doc="name in the measurement; empty: the path of what the sensor stands in")
+
+    def initialize(self) -> None:
+        self._draw = self.random_stream("noise").standard_normal
+        self._name = self.robot_name or enclosing(self.path)
+
+    def fire(self) -> None:
+        error_along, error_across = self._draw(2).tolist()
+        if not (self.robot.present and self.target.present):
+            return
+        robot = self.robot.value
+        position = robot.position
+        believed = self.location.value.position if self.location.present else position
+        # Floats: arithmetic on arrays of two takes ten times as long.
+        (tx, ty), (x, y) = self.target.value.position.tolist(), position.tolist()
+        dx, dy = tx - x, ty - y
+        distance = hypot(dx, dy)
+        if self.max_range is not None and distance > self.max_range:
+            return
+        along, across = self.along * error_along, self.across * error_across
+        if self.kind == RANGE:
+            value = [distance + along]
+        else:
+            nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
+            value = [dx + along * nx - across * ny, dy + along * ny + across * nx]
+        self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, robot.time))
+
+
+class ChannelError(EpicycleError):
+    """A broadcast channel whose ends do not match."""
+
+
+class BroadcastChannel(Actor):
+    """Hands what one participant says to all the others.
+
+    The n-th connection into ``input`` and the n-th out of ``output`` belong to the same participant.
+    """
+
+    input = InputPort(Any, multi=True, doc="from each participant")
+    output = OutputPort(Any, multi=True, doc="to each participant, what the others said")
+
+    def initialize(self) -> None:
+        if self.input.width != self.output.width:
+            raise ChannelError(
+                f"{self.path} has {counted(self.input.width, 'connection')} into 'input' "
+                f"but {self.output.width} out of 'output'; "
+                "connect both once for each participant, in the same order"
+            )
+
+    def fire(self) -> None:
+        send, listeners = self.output.send, range(self.output.width)
+        for speaker, tokens in enumerate(self.input.by_channel()):
+            for token in tokens:
+                for listener in listeners:
+                    if listener != speaker:
+                        send(token, listener)

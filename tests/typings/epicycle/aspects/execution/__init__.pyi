@@ -1,1 +1,0 @@
-from aspects.execution import *

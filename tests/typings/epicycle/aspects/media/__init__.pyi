@@ -1,1 +1,0 @@
-from aspects.media import *
