@@ -8,6 +8,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from textwrap import fill
 from types import MappingProxyType
@@ -82,6 +83,25 @@ def style(further: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
     with matplotlib.style.context(["default", {**_STYLE, **further}]), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a box stands for what the font lacks
         yield
+
+
+@lru_cache(maxsize=16)
+def font(size: float, bold: bool = False) -> Any:
+    """The font that comes with matplotlib, in a size."""
+    open_matplotlib()
+    from matplotlib.font_manager import FontProperties
+
+    return FontProperties(family="DejaVu Sans", size=size, weight="bold" if bold else "normal")
+
+
+@lru_cache(maxsize=65536)
+def text_width(text: str, size: float, bold: bool = False) -> float:
+    """The width of a line of text in this font, in points, rounded up: layout needs no canvas."""
+    open_matplotlib()
+    from matplotlib.textpath import text_to_path
+
+    wide, _, _ = text_to_path.get_text_width_height_descent(text, font(size, bold), ismath=False)
+    return float(int(wide) + 1)
 
 
 def new_canvas(width: float, height: float) -> Any:
