@@ -31,8 +31,8 @@ from ...text import Problems
 from ..drawing import draw
 from ..figures import positions, selected
 from ..pen import DASHES, FORMATS, PALETTE
-from .data import Condition, Data
-from .figure import Layout, Roles, RunKey, SignalFigure, layout, roles
+from .data import Condition, Data, Names
+from .figure import Layout, Roles, RunKey, SignalFigure, roles
 
 TOKEN = "token"
 MOST, LEAST = "most", "least"
@@ -158,7 +158,7 @@ class Tracks(RepeatedFigure):
 
     def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
         found = roles(data.plan, self.where, None, None, self.panels, has_axis=False)
-        return layout(data, self, Roles(None, None, (*([found.lines] if found.lines else []), *found.panels)))
+        return Layout(data, self, Roles(None, None, (*filter(None, [found.lines]), *found.panels)))
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         arranged = self.arranged(data)
@@ -216,7 +216,7 @@ class SingleRun(SignalFigure):
     def _chosen(self, data: Data) -> tuple[Condition, dict[str, Any]] | None:
         rows = [
             (condition, row)
-            for condition in self.conditions(data)
+            for condition in data.where(self.where)
             for row in condition.good[: self.runs]
             if row[self.metric] is not None
         ]
@@ -253,7 +253,7 @@ class SingleRun(SignalFigure):
         condition, row = chosen
         for path in paths:
             path.write_bytes(extracts[condition.index, row["replication"]][path.suffix.removeprefix(".")])
-        names = self.names(data)
+        names = Names(data.plan, self.labels)
         value = names.level(self.metric, row[self.metric])
         among = f" among the first {self.runs}" if self.runs else ""
         return (

@@ -15,7 +15,7 @@ from ...build import Complaint
 from ...language import Factor
 from ...study import Plan, mean
 from ..pen import DASHES, LIMIT, MARKERS, PALETTE
-from .data import Condition, Data, Names, is_numeric, mean_of
+from .data import Condition, Data, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure
 
 BOXES, CURVES = "boxes", "curves"
@@ -41,10 +41,10 @@ class Means(TableFigure):
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        chosen, arranged = self.conditions(data), self.arranged(data, has_axis=True)
+        arranged = self.arranged(data, has_axis=True)
         names, over = arranged.names, arranged.roles.over
         sheet = arranged.sheet(same_y=self.same_scale)
-        axis = _Axis(data, names, over, chosen)
+        axis = _Axis(data, arranged)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
             for number, (level, conditions) in enumerate(panel.lines.items()):
                 arranged.show(level, self._line(axes, axis, conditions, number, len(arranged.levels)))
@@ -52,7 +52,7 @@ class Means(TableFigure):
         sheet.call_axes(names.axis(over) if over else "", mean_of(names.axis(self.metric)))
         arranged.finish(sheet, paths)
         what = f"{mean_of(names.words(self.metric)).capitalize()} with its 95 % interval (Student)."
-        return _sentences(what, counts(chosen, [self.metric]), arranged.omitted)
+        return _sentences(what, counts(arranged.chosen, [self.metric]), arranged.omitted)
 
     def _line(self, axes: Any, axis: _Axis, conditions: list[Condition], number: int, lines: int) -> Any:
         points = []
@@ -96,7 +96,7 @@ class Distributions(TableFigure):
             yield Complaint("metrics", "there is no metric in it", "name one at least")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        chosen, has_axis = self.conditions(data), self.style == BOXES
+        has_axis = self.style == BOXES
         arranged = self.arranged(data, has_axis=has_axis)
         panels = [(metric, panel) for metric in self.metrics for panel in arranged.panels] or [("", Panel("", {}))]
         across = len(arranged.panels)
@@ -118,15 +118,15 @@ class Distributions(TableFigure):
         boxes = "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
         return _sentences(
             boxes if has_axis else "Share of the runs whose value is no greater.",
-            counts(chosen, self.metrics),
-            *(self._beyond(chosen, arranged.names, metric) for metric in self.metrics),
+            counts(arranged.chosen, self.metrics),
+            *(self._beyond(arranged, metric) for metric in self.metrics),
             arranged.omitted,
         )
 
-    def _beyond(self, chosen: list[Condition], names: Names, metric: str) -> str:
+    def _beyond(self, arranged: Layout, metric: str) -> str:
         if self.limit is None:
             return ""
-        values = [value for condition in chosen for value in condition.numbers(metric)]
+        values, names = _numbers(arranged.chosen, metric), arranged.names
         below = sum(value < self.limit for value in values)
         limit = names.level(metric, self.limit)
         return f"Below {limit}: {names.words(metric)} of {below:,} of {counted(len(values), 'run')}."
@@ -135,14 +135,14 @@ class Distributions(TableFigure):
         from matplotlib.patches import Patch
 
         names, over, lines = arranged.names, arranged.roles.over, len(arranged.levels)
-        levels = data.levels(over, self.conditions(data), self.where) if over else [None]
+        levels = data.levels(over, arranged.chosen, self.where) if over else [None]
         width = 0.8 / lines
         for number, (line, conditions) in enumerate(panel.lines.items()):
             colour = PALETTE[number]
             groups: dict[int, list[float]] = {}
             for place, level in enumerate(levels):
                 here = [each for each in conditions if not over or each.values[over] == level]
-                if values := [value for condition in here for value in condition.numbers(metric)]:
+                if values := _numbers(here, metric):
                     groups[place] = values
             if groups:
                 thin = {"color": colour, "linewidth": 0.9}
@@ -172,8 +172,7 @@ class Distributions(TableFigure):
 
     def _curves(self, axes: Any, metric: str, panel: Panel, arranged: Layout) -> None:
         for number, (line, conditions) in enumerate(panel.lines.items()):
-            values = sorted(value for condition in conditions for value in condition.numbers(metric))
-            if values:
+            if values := sorted(_numbers(conditions, metric)):
                 shares = [place / len(values) for place in range(len(values) + 1)]
                 look = {"drawstyle": "steps-post", "color": PALETTE[number], "linestyle": DASHES[number]}
                 (curve,) = axes.plot([values[0], *values], shares, **look)
@@ -183,6 +182,10 @@ class Distributions(TableFigure):
         axes.set_ylabel("share of runs")
         if self.limit is not None:
             axes.axvline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
+
+
+def _numbers(conditions: Sequence[Condition], metric: str) -> list[float]:
+    return [value for condition in conditions for value in condition.numbers(metric)]
 
 
 def _sentences(*parts: str) -> str:
@@ -197,8 +200,7 @@ def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
     if bad:
         parts.append(f"{bad:,} of them failed")
     for metric in metrics:
-        missing = runs - bad - sum(len(condition.numbers(metric)) for condition in chosen)
-        if missing:
+        if missing := runs - bad - len(_numbers(chosen, metric)):
             parts.append(f"{missing:,} have no {metric}")
     return f"{', '.join(parts)}."
 
@@ -206,11 +208,11 @@ def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
 class _Axis:
     """Where conditions stand along the horizontal axis."""
 
-    def __init__(self, data: Data, names: Names, factor: str | None, chosen: Sequence[Condition]) -> None:
-        self._factor = factor
-        self._levels: list[Factor] = data.levels(factor, chosen) if factor else [None]
-        self._texts = [names.level("", level) if factor else "" for level in self._levels]
-        self.is_numeric = bool(factor) and is_numeric(data.plan, str(factor)) and None not in self._levels
+    def __init__(self, data: Data, arranged: Layout) -> None:
+        self._factor = factor = arranged.roles.over
+        self._levels: list[Factor] = data.levels(factor, arranged.chosen) if factor else [None]
+        self._texts = [arranged.names.level("", level) if factor else "" for level in self._levels]
+        self.is_numeric = factor is not None and is_numeric(data.plan, factor) and None not in self._levels
         self._places = [self._of(level) for level in self._levels]  # in the order of the study
         places = sorted(set(self._places))
         self.step = min((after - before for before, after in pairwise(places)), default=1.0)
@@ -219,7 +221,6 @@ class _Axis:
         self.is_connected = dimension is not None and (len(dimension.columns) == 1 or places == self._places)
 
     def _of(self, level: Factor) -> float:
-        """The place of a level."""
         if self.is_numeric and isinstance(level, (int, float)):
             return float(level)
         return float(self._levels.index(level))

@@ -22,8 +22,6 @@ from .declared import figures_of_study
 from .figure import RunKey, SignalFigure, StudyFigure
 from .page import Picture, report_page
 
-Extracts = dict[str, dict[RunKey, Any]]  # by figure and run
-
 
 @dataclass
 class Report:
@@ -48,15 +46,22 @@ def write_report(
     problems = Problems()
     figures = figures_of_study(data.plan, problems)
     problems.raise_if_any()
-    extracts, failure = _extracts(data, figures, jobs, tell)
+    extracts = _extracts(data, figures, jobs, tell)
     pictures = []
     place = folder / "figures"
     place.mkdir(parents=True, exist_ok=True)
     for name, figure in figures.items():
-        picture = _picture(name, figure, data, extracts.get(name, {}), failure, place, report)
-        if picture.problem:
-            report.problems.append(f"figure {name}: {picture.problem}")
-        pictures.append(picture)
+        paths = [place / f"{abridged(name, MAX_NAME)}.{ending}" for ending in FORMATS]
+        for path in paths:
+            path.unlink(missing_ok=True)  # of an earlier report
+        try:
+            caption = _draw(name, figure, data, extracts.get(name, {}), paths)
+        except EpicycleError as error:
+            report.problems.append(f"figure {name}: {error}")
+            pictures.append(Picture(name, figure.doc, None, str(error)))
+        else:
+            report.files += paths
+            pictures.append(Picture(name, figure.doc, paths[FORMATS.index("svg")].read_bytes(), caption))
     judgements, recommendations = results.claims(), results.guideline()
     texts = {}
     if judgements or recommendations:
@@ -71,68 +76,49 @@ def write_report(
     texts["report.html"] = report_page(data, pictures, judgements, recommendations)
     for name, text in texts.items():
         path = folder / name
-        replace_file(path, partial(_write, text))
+        replace_file(path, partial(Path.write_text, data=text, encoding="utf-8"))
         report.files.append(path)
     report.verdicts = Counter(each.verdict for each in judgements)
     return report
 
 
-def _write(text: str, path: Path) -> None:
-    path.write_text(text, encoding="utf-8")
-
-
-def _picture(
-    name: str,
-    figure: StudyFigure,
-    data: Data,
-    extracts: Mapping[RunKey, Any],
-    failure: str,
-    folder: Path,
-    report: Report,
-) -> Picture:
-    """Draw one figure, or find out why it cannot be drawn."""
-    paths = [folder / f"{abridged(name, MAX_NAME)}.{ending}" for ending in FORMATS]
-    for path in paths:
-        path.unlink(missing_ok=True)  # of an earlier report
-    if isinstance(figure, SignalFigure) and failure:
-        return Picture(name, figure.doc, "", None, failure)
-    if not any(condition.good for condition in figure.conditions(data)):
-        return Picture(name, figure.doc, "", None, "none of the runs that it shows is there")
+def _draw(name: str, figure: StudyFigure, data: Data, extracts: Mapping[RunKey, Any], paths: list[Path]) -> str:
+    """Draw a figure into files; what is to be said of it.  Raises ``EpicycleError``."""
+    for extract in extracts.values():
+        if isinstance(extract, EpicycleError):
+            raise extract
+    if not any(condition.good for condition in data.where(figure.where)):
+        raise EpicycleError("none of the runs that it shows is there")
     try:
-        for extract in extracts.values():
-            if isinstance(extract, EpicycleError):
-                raise extract
         with style():
-            caption = figure.draw(data, extracts, paths)
-    except EpicycleError as error:
-        return Picture(name, figure.doc, "", None, str(error))
+            return figure.draw(data, extracts, paths)
+    except EpicycleError:
+        raise
     except Exception as error:  # of a class of a user's
-        return Picture(name, figure.doc, "", None, str(FigureError(name, describe(error), raised_at(error))))
-    report.files += paths
-    return Picture(name, figure.doc, caption, paths[FORMATS.index("svg")].read_bytes())
+        raise FigureError(name, describe(error), raised_at(error)) from error
 
 
 def _extracts(
     data: Data, figures: Mapping[str, StudyFigure], jobs: int, tell: Callable[[int, int], None]
-) -> tuple[Extracts, str]:
-    """What figures need of runs that are repeated; or why these cannot be."""
+) -> dict[str, dict[RunKey, Any]]:
+    """What figures need of runs that are repeated, by figure and run; or an error that says why these cannot be."""
+    wanted: dict[str, list[RunKey]] = {}
     readers: dict[RunKey, list[tuple[str, SignalFigure]]] = {}
     for name, figure in figures.items():
         if isinstance(figure, SignalFigure):
-            for run in figure.runs_of(data):
+            wanted[name] = figure.runs_of(data)
+            for run in wanted[name]:
                 readers.setdefault(run, []).append((name, figure))
-    if not readers:
-        return {}, ""
     rows = {(row["condition"], row["replication"]): row for row in data.rows}
-    replays = [Replay(*run, rows[run]["seed"], rows[run]["digest"], tuple(wanted)) for run, wanted in readers.items()]
-    found: Extracts = {name: {} for name in figures}
+    replays = [Replay(*run, rows[run]["seed"], rows[run]["digest"], tuple(each)) for run, each in readers.items()]
+    found: dict[str, dict[RunKey, Any]] = {name: {} for name in wanted}
     try:
-        plan_of_folder(data.results.folder)  # which says so if the model has changed
-        done = repeat(data.plan, replays, jobs, lambda number: tell(number, len(replays)))
-        for replay, extracts in done:
-            for name, extract in extracts.items():
-                found[name][replay.condition, replay.replication] = extract
+        if replays:
+            plan_of_folder(data.results.folder)  # which says so if the model has changed
+            for replay, extracts in repeat(data.plan, replays, jobs, lambda number: tell(number, len(replays))):
+                for name, extract in extracts.items():
+                    found[name][replay.condition, replay.replication] = extract
     except EpicycleError as error:
-        reason = "its model cannot be loaded any more" if isinstance(error, ModelError) else str(error)
-        return {}, reason
-    return found, ""
+        why = EpicycleError("its model cannot be loaded any more") if isinstance(error, ModelError) else error
+        return {name: dict.fromkeys(runs, why) for name, runs in wanted.items()}
+    return found

@@ -16,7 +16,7 @@ from epicycle.runner.cli import main
 from epicycle.runner.language import StudyMetric, read_study
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
-from epicycle.runner.show.report.figure import layout, roles
+from epicycle.runner.show.report.figure import Layout, roles
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Means
 from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
@@ -346,8 +346,7 @@ def test_every_factor_is_shown_somewhere(
         " both: {zip: {a: [1, 2], b: [1, 2]}}}\n"
     )
     plan = Plan(read_study(tmp_path / "s.yaml"), [], {}, [{}, {}, {}, {}], {}, {}, "0")
-    found = roles(plan, fixed, over, lines, panels, has_axis=True)
-    assert (found.over, found.lines, found.panels) == expected
+    assert roles(plan, fixed, over, lines, panels, has_axis=True) == expected
 
 
 @pytest.mark.parametrize(
@@ -376,11 +375,11 @@ def test_figures_of_a_study_that_names_none(vary: str, figures: list[str], tmp_p
 def test_panels_and_lines_keep_apart_what_differs(queue: Path) -> None:
     data = Data(open_study(queue))
     figure = Means(metric="mean_wait", where={"mean_service": [2.0, 0.5]})
-    arranged = layout(data, figure, roles(data.plan, figure.where, "load", None, (), has_axis=True))
+    arranged = Layout(data, figure, roles(data.plan, figure.where, "load", None, (), has_axis=True))
     assert arranged.levels == [2.0, 0.5]  # as it is written
     places = [each.index for panel in arranged.panels for line in panel.lines.values() for each in line]
     assert sorted(places) == [0, 2, 3, 5]
-    by_panel = layout(data, figure, roles(data.plan, {}, "load", "", ("mean_service",), has_axis=True))
+    by_panel = Layout(data, figure, roles(data.plan, {}, "load", "", ("mean_service",), has_axis=True))
     assert [panel.title for panel in by_panel.panels] == ["mean service: 2 s", "mean service: 0.5 s"]
 
 
