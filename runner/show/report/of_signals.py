@@ -28,9 +28,8 @@ from ...catalogue import Figure
 from ...results import Results
 from ...study import Plan, half_width
 from ...text import Problems
-from ..drawing import draw
 from ..figures import positions, selected
-from ..pen import DASHES, FORMATS, PALETTE
+from ..pen import DASHES, FORMATS, PALETTE, draw
 from .data import Condition, Data, Names
 from .figure import Layout, Roles, RunKey, SignalFigure, roles
 

@@ -71,7 +71,6 @@ class Means(TableFigure):
             color=PALETTE[number],
             marker=MARKERS[number],
             linestyle=DASHES[number] if axis.is_connected else "none",
-            capsize=2.2,
             elinewidth=1.0,
         )
 
@@ -145,19 +144,16 @@ class Distributions(TableFigure):
                 if values := _numbers(here, metric):
                     groups[place] = values
             if groups:
-                thin = {"color": colour, "linewidth": 0.9}
                 axes.boxplot(
                     list(groups.values()),
                     positions=[place + width * (number - (lines - 1) / 2) for place in groups],
                     widths=0.8 * width,
-                    whis=(5, 95),
                     manage_ticks=False,
-                    patch_artist=True,
-                    boxprops={"facecolor": colour, "alpha": 0.35, "edgecolor": colour, "linewidth": 0.8},
-                    medianprops={"color": colour, "linewidth": 1.6},
-                    whiskerprops=thin,
-                    capprops=thin,
-                    flierprops={"marker": ".", "markersize": 3.5, "markerfacecolor": colour, "markeredgewidth": 0},
+                    boxprops={"facecolor": colour, "alpha": 0.35, "edgecolor": colour},
+                    medianprops={"color": colour},
+                    whiskerprops={"color": colour},
+                    capprops={"color": colour},
+                    flierprops={"markerfacecolor": colour},
                 )
             arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
         axes.set_xlim(-0.6, len(levels) - 0.4)

@@ -14,9 +14,8 @@ from epicycle.actors import EpicycleError, abridged
 
 from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
 from ...text import ModelError, Problems, describe, raised_at
-from ..drawing import FigureError
-from ..folder import MAX_NAME
-from ..pen import FORMATS, style
+from ..outcome import MAX_NAME
+from ..pen import FORMATS, FigureError, style
 from .data import Data
 from .declared import figures_of_study
 from .figure import RunKey, SignalFigure, StudyFigure
