@@ -134,7 +134,6 @@ def _spread(net: Net, layers: Layers, runs: Runs) -> None:
     parts: dict[int, Run] = {}
 
     def run(channel: int) -> Run:
-        """The run to the right of a layer."""
         if channel not in parts:
             parts[channel] = Run(net, [], [])
             runs[channel].append(parts[channel])

@@ -77,7 +77,6 @@ class Pill:
 
     @property
     def width(self) -> float:
-        """How wide it is."""
         return pill_width(self.text)
 
 
@@ -95,7 +94,6 @@ class Words:
 
     @property
     def width(self) -> float:
-        """How wide it is."""
         return text_width(self.text, self.size, self.bold)
 
 
@@ -121,7 +119,6 @@ def draw(outline: Outline) -> Drawing:
 
 
 def pill_width(words: str) -> float:
-    """The width of a badge."""
     return text_width(words, PILL) + 8.0
 
 
@@ -234,7 +231,6 @@ class _Scope:
         return max((_pills_width(self.ends[pin]) + arrow for pin in pins), default=0.0)
 
     def _point(self, pin: Pin) -> Point:
-        """Where a pin is."""
         cell, is_left = pin.cell, pin in pin.cell.left
         if cell.kind == "pass":
             x = self.spans[cell.layer][0 if is_left else 1]
@@ -293,7 +289,6 @@ class _Scope:
         ]
 
     def _wire(self, net: Net, x: float, y: float, level: int) -> Wire:
-        """The lines of a net."""
         pieces: list[Piece] = []
         for span, runs in zip(self.spans, self.runs, strict=False):
             for run in (each for each in runs if each.net is net):

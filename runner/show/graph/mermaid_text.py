@@ -26,7 +26,6 @@ class _Writer:
         }
 
     def lines(self) -> Iterator[str]:
-        """The lines of the chart."""
         yield "---"
         yield f"title: {_quoted(self.outline.model.name)}"
         yield "---"

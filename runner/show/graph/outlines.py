@@ -196,7 +196,6 @@ class _Outliner:
         return self.graph.composites.get(path, "") if actor is None else type(actor).__name__
 
     def box(self, path: str) -> Box:
-        """A box, and all that is in it."""
         name, count = path.rpartition(".")[2], len(self._instances(path))
         if count > 1:
             name = f"{name.partition('[')[0]}[0..{count - 1}]"
@@ -225,7 +224,6 @@ class _Outliner:
         return tuple(map(short_name, self.standing.get(path, ())))
 
     def aspects_within(self, composite: str) -> tuple[str, ...]:
-        """The aspects that stand at what is in a composite."""
         names = (
             short_name(woven.name)
             for woven in self.model.aspects

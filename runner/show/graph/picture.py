@@ -98,8 +98,7 @@ class _Painter:
         self.shapes = patches
         self.colours = colours  # of aspects
 
-    def paint(self, drawing: Drawing, legend: list[Row]) -> None:
-        """A drawing and its legend, what lies below first."""
+    def paint(self, drawing: Drawing, legend: list[Row]) -> None:  # what lies below first
         for placed in drawing.boxes:
             self.box(placed)
         self.wires(drawing.wires)
@@ -190,12 +189,10 @@ class _Painter:
         self.words(Words(words, x + width / 2, y + 0.35 * PILL, PILL, align="center"), ink)
 
     def words(self, words: Words, colour: str = "") -> None:
-        """A line of text."""
         look = {"color": colour or (SOFT if words.is_soft else INK), "ha": words.align, "va": "baseline", "zorder": 5}
         self.sheet.text(words.x, words.y, words.text, fontproperties=font(words.size, words.bold), **look)
 
     def row(self, row: Row, x: float, y: float) -> None:
-        """A line of the legend."""
         middle = y + row.height / 2
         if row.sample == "stack":
             for step in (2, 1, 0):

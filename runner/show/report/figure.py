@@ -74,7 +74,6 @@ class StudyFigure(Configurable):
         return (value,) if isinstance(value, str) else tuple(value)
 
     def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
-        """Its panels and lines."""
         over, lines = (next(iter(self.named(parameter)), None) for parameter in ("over", "lines"))
         found = roles(data.plan, self.where, over if has_axis else None, lines, self.named("panels"), has_axis=has_axis)
         return Layout(data, self, found)
@@ -184,7 +183,6 @@ class Layout:
         self.columns = len(choices[1]) if len(choices) == 2 and 1 < len(choices[1]) <= 4 else None
 
     def sheet(self, **look: Any) -> Sheet:
-        """A sheet with these panels."""
         return Sheet(**{"panels": [panel.title for panel in self.panels] or [""], "columns": self.columns, **look})
 
     def show(self, level: Factor, handle: Any) -> None:

@@ -222,7 +222,6 @@ class _Axis:
         return float(self._levels.index(level))
 
     def place(self, condition: Condition) -> float:
-        """The place of a condition."""
         return self._of(condition.values[self._factor]) if self._factor else 0.0
 
     def dress(self, axes: Any) -> None:

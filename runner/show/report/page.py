@@ -48,7 +48,6 @@ def report_page(
     judgements: Sequence[Judgement],
     recommendations: Sequence[Recommendation],
 ) -> str:
-    """The whole document."""
     study = data.plan.study
     sections: list[tuple[str, list[Html]]] = [
         ("The study", [*_what(data), *_provenance(data)]),
