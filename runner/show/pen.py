@@ -142,7 +142,8 @@ class Sheet:
         same_y: bool | Literal["row"] = False,
     ) -> None:
         count = len(panels)
-        self.columns = 1 if heights else columns or _columns(count)
+        few = {0: 1, 4: 2}.get(count, min(count, 3))
+        self.columns = 1 if heights else columns or (few if count <= 12 else 4)
         rows = math.ceil(count / self.columns)
         if heights:
             self.canvas = new_canvas(7.0, 0.4 + sum(heights))
@@ -190,9 +191,3 @@ class Sheet:
 def legend_beside(axes: Any, **options: Any) -> None:
     """A legend to the right of the axes, as long as need be."""
     axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, **options)
-
-
-def _columns(count: int) -> int:
-    if count <= 3:
-        return max(count, 1)
-    return 2 if count == 4 else 3 if count <= 12 else 4

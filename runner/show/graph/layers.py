@@ -27,6 +27,11 @@ class Pin:
     cell: Cell
     offset: float = 0.0
 
+    @property
+    def y(self) -> float:
+        """How far down it is, once its cell has a place."""
+        return self.cell.y + self.offset
+
 
 @dataclass(eq=False)
 class Cell:

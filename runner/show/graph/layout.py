@@ -131,6 +131,7 @@ class _Scope:
 
     def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port]) -> None:
         self.box = box
+        self.top = TITLE + MARGIN if box.path else 0.0  # where the inside begins
         self.inner: dict[Box, _Scope] = {}
         self.ends: dict[Pin, Port] = {}
         self.pins: dict[str, Pin] = {}  # by the paths of their ports
@@ -154,11 +155,6 @@ class _Scope:
         if box.path:
             self.height += TITLE + 2 * MARGIN
             self.width = max(self.width, text_width(f"{box.name}: {box.kind}", NAME, bold=True) + 2 * MARGIN)
-
-    @property
-    def top(self) -> float:
-        """Where the inside begins."""
-        return TITLE + MARGIN if self.box.path else 0.0
 
     def _pin(self, cell: Cell, side: str, port: Port, offset: float = 0.0) -> None:
         pin = self.pins[port.path] = cell.pin(side)
@@ -185,7 +181,7 @@ class _Scope:
             cell.width, cell.height = scope.width, scope.height
             for pin in (*cell.left, *cell.right):
                 inside = scope.pins[self.ends[pin].path]
-                pin.offset = scope.top + inside.cell.y + inside.offset
+                pin.offset = scope.top + inside.y
             return
         widths = []
         for pins in (cell.left, cell.right):
@@ -238,7 +234,7 @@ class _Scope:
             x = cell.x if is_left else cell.x + cell.width
         else:
             x = 0.0 if cell.kind == "entry" else self.width
-        return x, cell.y + pin.offset
+        return x, pin.y
 
     # -- drawing --------------------------------------------------------------------------------------------------
 

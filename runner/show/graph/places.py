@@ -126,8 +126,8 @@ def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
     trunks: list[Trunk] = []
     taken: set[float] = set()
     for group in groups.values():
-        left = [_height(pin) for run in group for pin in run.left]
-        right = sorted({_height(pin) for run in group for pin in run.right})
+        left = [pin.y for run in group for pin in run.left]
+        right = sorted({pin.y for run in group for pin in run.right})
         taken.update(left, right)
         if len({*left, *right}) > 1:
             trunks.append(Trunk(tuple(group), left, right))
@@ -141,10 +141,6 @@ def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
     for index in nx.topological_sort(graph):
         trunks[index].track = max((trunks[before].track + 1 for before in graph.predecessors(index)), default=0)
     return trunks, max((trunk.track + 1 for trunk in trunks), default=0)
-
-
-def _height(pin: Pin) -> float:
-    return pin.cell.y + pin.offset
 
 
 def _free_height(taken: list[float], wanted: float) -> float:

@@ -74,8 +74,9 @@ class StudyFigure(Configurable):
         return (value,) if isinstance(value, str) else tuple(value)
 
     def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
-        over, lines = (next(iter(self.named(parameter)), None) for parameter in ("over", "lines"))
-        found = roles(data.plan, self.where, over if has_axis else None, lines, self.named("panels"), has_axis=has_axis)
+        over = getattr(self, "over", None) if has_axis else None
+        lines = getattr(self, "lines", "")  # a figure that has no such parameter draws one line a panel
+        found = roles(data.plan, self.where, over, lines, self.named("panels"), has_axis=has_axis)
         return Layout(data, self, found)
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:

@@ -31,7 +31,7 @@ from ...text import Problems
 from ..figures import positions, selected
 from ..pen import DASHES, FORMATS, PALETTE, draw
 from .data import Condition, Data, Names
-from .figure import Layout, Roles, RunKey, SignalFigure, roles
+from .figure import RunKey, SignalFigure
 
 TOKEN = "token"
 MOST, LEAST = "most", "least"
@@ -154,10 +154,6 @@ class Tracks(RepeatedFigure):
         return {
             kind: [(name, positions(results[name])) for name in selected(patterns, results)] for kind, patterns in ways
         }
-
-    def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
-        found = roles(data.plan, self.where, None, None, self.panels, has_axis=False)
-        return Layout(data, self, Roles(None, None, (*filter(None, [found.lines]), *found.panels)))
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         arranged = self.arranged(data)
