@@ -26,6 +26,7 @@ from ...study import (
     mean,
     ranked,
 )
+from ...text import plain
 from .data import Condition, Data, Names, estimated, mean_of, shown
 
 MAX_ROWS = 400  # of one table
@@ -86,7 +87,8 @@ def _what(data: Data) -> Iterable[Html]:
     rows = [[tag("code", name), _levels(data, name), names.unit(name), names.doc(name)] for name in varied]
     if rows:
         yield wide_table(["varied", "levels", "unit", ""], rows, class_="words")
-    if fixed := [f"{each.path} = {getattr(each.node, 'text', '...')}" for each in plan.study.fixed]:
+    fixed = [f"{each.path} = {getattr(each.node, 'text', shown(str(plain(each.node))))}" for each in plan.study.fixed]
+    if fixed:
         yield tag("p", "Set in all runs: ", [[tag("code", each), " "] for each in fixed])
     yield tag("p", _seeds(data))
 
@@ -152,7 +154,7 @@ def _failures(data: Data, failures: list[dict[str, Any]]) -> Iterable[Html]:
             row["status"],
             data.names.place(data.conditions[row["condition"]].values),
             str(row["seed"]),
-            row["error"],
+            tag("pre", row["error"]),
             tag("code", f"epicycle replay {folder} {row['run'][:12]}"),
         ]
         for row in failures[:MAX_FAILURES]
@@ -375,7 +377,7 @@ def _guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:
     which = "greatest" if asked is not None and asked.greatest else "least"
     tolerance = asked.tolerance if asked is not None else 0.0
     unit = names.unit(found[0].metric)
-    yield tag("p", f"Which {choose} make the {mean_of(metric)} {which}:", class_="label")
+    yield tag("p", f"The {choose} with the {which} {mean_of(metric)}:", class_="label")
     head = [*map(names.axis, found[0].where), f"best {choose}", mean_of(names.axis(found[0].metric))]
     yield wide_table(
         [*head, "confidence", "not worse", "enough"], [_row(each) for each in found], names=len(found[0].where)
