@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import networkx as nx
 
@@ -26,6 +25,7 @@ ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0
 DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
 # Of a PNG: whole pixels for a point, so that lines are sharp; how many pixels there may be, and on one side.
 DPI, PIXELS, SIDE = (288, 144, 72), 4e7, 30000
+LINE = 15.0  # height of a line of the legend
 
 
 def write_picture(drawing: Drawing, path: Path) -> None:
@@ -36,8 +36,8 @@ def write_picture(drawing: Drawing, path: Path) -> None:
         if (name := short_name(woven.name)) in seen:
             aspects.setdefault(name, []).append(woven)
     legend = _legend(drawing, aspects)
-    width = max([drawing.width, *(row.width + 2 * MARGIN for row in legend)])
-    height = drawing.height + sum(row.height for row in legend) + (MARGIN if legend else 0.0)
+    width = max([drawing.width, *(row.indent + text_width(row.explanation, PORT) + 2 * MARGIN for row in legend)])
+    height = drawing.height + LINE * len(legend) + (MARGIN if legend else 0.0)
     most = 72 * min(SIDE / max(width, height), math.sqrt(PIXELS / (width * height)))
     with style({"path.simplify": False}):
         canvas = new_canvas(width / 72, height / 72)
@@ -48,25 +48,17 @@ def write_picture(drawing: Drawing, path: Path) -> None:
         save(canvas, path, dpi=next((dpi for dpi in DPI if dpi <= most), most), facecolor="white")
 
 
-@dataclass
-class Row:
+class Row(NamedTuple):
     """A line of the legend: a sample of something in the drawing, and what it means."""
 
     sample: str  # aspect, label, port, stack, director or closed
     words: str
     explanation: str
 
-    height = 15.0
-
     @property
     def indent(self) -> float:
-        """The width of the sample."""
-        return pill_width(self.words) if self.words else 14.0
-
-    @property
-    def width(self) -> float:
-        """The width of the whole line."""
-        return self.indent + 6.0 + text_width(self.explanation, PORT)
+        """Where the explanation begins, beside the sample."""
+        return 6.0 + (pill_width(self.words) if self.words else 14.0)
 
 
 def _legend(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[Row]:
@@ -109,10 +101,8 @@ class _Painter:
             self.words(words)
         for pill in drawing.pills:
             self.pill(pill.text, pill.aspect, pill.x, pill.y)
-        y = drawing.height + MARGIN / 2
-        for row in legend:
-            self.row(row, MARGIN, y)
-            y += row.height
+        for number, row in enumerate(legend):
+            self.row(row, MARGIN, drawing.height + MARGIN / 2 + LINE * (number + 0.5))
 
     # -- parts ----------------------------------------------------------------------------------------------------
 
@@ -192,8 +182,7 @@ class _Painter:
         look = {"color": colour or (SOFT if words.is_soft else INK), "ha": words.align, "va": "baseline", "zorder": 5}
         self.sheet.text(words.x, words.y, words.text, fontproperties=font(words.size, words.bold), **look)
 
-    def row(self, row: Row, x: float, y: float) -> None:
-        middle = y + row.height / 2
+    def row(self, row: Row, x: float, middle: float) -> None:
         if row.sample == "stack":
             for step in (2, 1, 0):
                 self.rectangle(x + step, middle - 4.0 + 1.7 * step, 13.0 - 2 * step, 6.0, "white")
@@ -206,7 +195,7 @@ class _Painter:
             self.closed(x + 3.0, middle - 3.5)
         else:
             self.pill(row.words, row.words if row.sample == "aspect" else "", x, middle)
-        self.words(Words(row.explanation, x + row.indent + 6.0, middle + 0.35 * PORT, PORT))
+        self.words(Words(row.explanation, x + row.indent, middle + 0.35 * PORT, PORT))
 
 
 def _towards(start: Point, end: Point, way: float) -> Point:
