@@ -107,16 +107,15 @@ def write_folder(folder: Path, results: Results, command: Iterable[str], error: 
     Each file is written aside and then moved into place, so a folder never holds half a file.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    written = [folder / "signals.parquet"]
-    write_signals(results, written[-1])
-    written.append(folder / "manifest.json")
-    manifest = {**summary_object(results), "command": list(command), "versions": versions()}
+    signals, manifest = folder / "signals.parquet", folder / "manifest.json"
+    write_signals(results, signals)
+    told = {**summary_object(results), "command": list(command), "versions": versions()}
     if error:
-        manifest["error"] = error
+        told["error"] = error
     aside = folder / ".manifest.json"
-    aside.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
-    os.replace(aside, written[-1])
-    return written
+    aside.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    os.replace(aside, manifest)
+    return [signals, manifest]
 
 
 def draw_figures(folder: Path, results: Results, figures: dict[str, Figure]) -> tuple[list[Path], list[FigureError]]:

@@ -8,6 +8,7 @@ many; it has one place in each layer that it passes, however many branches it ha
 from __future__ import annotations
 
 from bisect import bisect_right, insort
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, product
@@ -136,34 +137,26 @@ def closing(graph: Any, edges: Sequence[tuple[T, T]]) -> Iterator[bool]:
 def _spread(net: Net, layers: Layers, runs: Runs) -> None:
     """Divide a net into runs, with a pass in every layer between its ends."""
     start = net.source.cell.layer
-    parts: dict[int, Run] = {}
-
-    def run(channel: int) -> Run:
-        if channel not in parts:
-            parts[channel] = Run(net, [], [])
-            runs[channel].append(parts[channel])
-        return parts[channel]
-
-    def pass_through(number: int) -> None:
-        """A pass in a layer, joined to the runs on both sides."""
+    forward = [pin for pin in net.targets if pin.cell.layer > start]
+    backward = [pin for pin in net.targets if pin.cell.layer <= start]
+    parts: dict[int, Run] = defaultdict(lambda: Run(net, [], []))  # by the layer on their left
+    parts[start].left.append(net.source)
+    for number in (
+        *range(start + 1, max((pin.cell.layer for pin in forward), default=start)),
+        *range(start, min((pin.cell.layer for pin in backward), default=start + 1) - 1, -1),
+    ):
         cell = Cell("pass", layer=number)
         layers[number].append(cell)
         if net.label is not None and net.labelled is None:
             net.labelled = cell
             cell.width, cell.height = net.label
-        run(number - 1).right.append(cell.pin("left"))
-        run(number).left.append(cell.pin("right"))
+        parts[number - 1].right.append(cell.pin("left"))
+        parts[number].left.append(cell.pin("right"))
         cell.left[0].offset = cell.right[0].offset = cell.height / 2
-
-    run(start).left.append(net.source)
-    forward = [pin for pin in net.targets if pin.cell.layer > start]
-    for number in range(start + 1, max((pin.cell.layer for pin in forward), default=start)):
-        pass_through(number)
-    backward = [pin for pin in net.targets if pin.cell.layer <= start]
-    for number in range(start, min((pin.cell.layer for pin in backward), default=start + 1) - 1, -1):
-        pass_through(number)
     for pin in (*forward, *backward):
-        run(pin.cell.layer - 1).right.append(pin)
+        parts[pin.cell.layer - 1].right.append(pin)
+    for number, run in parts.items():
+        runs[number].append(run)
 
 
 # -- order --------------------------------------------------------------------------------------------------------

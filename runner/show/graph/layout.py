@@ -195,8 +195,6 @@ class _Scope:
         cell.width = max(names + 16.0, sum(widths) + 12.0 + (10.0 if all(widths) else 0.0), hidden + 16.0, 44.0)
         cell.height = HEADER + ROW * rows + 3.0 + (PILL_HEIGHT + PILL_GAP) * len(child.aspects)
 
-    # -- columns --------------------------------------------------------------------------------------------------
-
     def _columns(self) -> float:
         """Set where each layer begins and ends, and where the tracks between them are; the width of all."""
         self.spans: list[tuple[float, float]] = []
@@ -235,8 +233,6 @@ class _Scope:
         else:
             x = 0.0 if cell.kind == "entry" else self.width
         return x, pin.y
-
-    # -- drawing --------------------------------------------------------------------------------------------------
 
     def put(self, drawing: Drawing, x: float, y: float, level: int) -> None:
         """Put everything into a drawing, the top left corner of this scope at (x, y)."""

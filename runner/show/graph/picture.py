@@ -104,8 +104,6 @@ class _Painter:
         for number, row in enumerate(legend):
             self.row(row, MARGIN, drawing.height + MARGIN / 2 + LINE * (number + 0.5))
 
-    # -- parts ----------------------------------------------------------------------------------------------------
-
     def box(self, placed: PlacedBox) -> None:
         """A box: white for an actor, shaded for a composite, doubled if that has a director."""
         box, x, y = placed.box, placed.x, placed.y

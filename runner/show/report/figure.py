@@ -191,8 +191,9 @@ class Layout:
         if self.roles.lines:
             self.handles.setdefault(self.names.level(self.roles.lines, level), handle)
 
-    def finish(self, sheet: Sheet, paths: Sequence[Path]) -> None:
-        """Add the legend, and write the files."""
+    def finish(self, sheet: Sheet, paths: Sequence[Path], *said: str) -> str:
+        """Add the legend, and write the files; what is said of the figure, and of what is left out of it."""
         title = self.names.words(self.roles.lines) if self.roles.lines else ""
         sheet.legend(list(self.handles.values()), list(self.handles), title)
         sheet.save(paths)
+        return " ".join(filter(None, (*said, self.omitted)))

@@ -104,9 +104,8 @@ class Series(RepeatedFigure):
                     axes.fill_between(times, means - halves, means + halves, color=colour, alpha=0.18, linewidth=0)
                     arranged.show(level, line)
         sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
-        arranged.finish(sheet, paths)
         said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"
-        return f"{said}, as long as half of them go on. {arranged.omitted}".rstrip()
+        return arranged.finish(sheet, paths, f"{said}, as long as half of them go on.")
 
 
 def over_time(
@@ -182,8 +181,7 @@ class Tracks(RepeatedFigure):
             axes.set_xlim(low[0] - room, high[0] + room)
             axes.set_ylim(low[1] - room, high[1] + room)
         sheet.call_axes("x (m)", "y (m)")
-        arranged.finish(sheet, paths)
-        return f"The first {counted(self.runs, 'run')} of each condition. {arranged.omitted}".rstrip()
+        return arranged.finish(sheet, paths, f"The first {counted(self.runs, 'run')} of each condition.")
 
 
 class SingleRun(SignalFigure):

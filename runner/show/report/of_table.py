@@ -50,9 +50,8 @@ class Means(TableFigure):
                 arranged.show(level, self._line(axes, axis, conditions, number, len(arranged.levels)))
             axis.dress(axes)
         sheet.call_axes(names.axis(over) if over else "", mean_of(names.axis(self.metric)))
-        arranged.finish(sheet, paths)
         what = f"{mean_of(names.words(self.metric)).capitalize()} with its 95 % interval (Student)."
-        return _sentences(what, counts(arranged.chosen, [self.metric]), arranged.omitted)
+        return arranged.finish(sheet, paths, what, counts(arranged.chosen, [self.metric]))
 
     def _line(self, axes: Any, axis: _Axis, conditions: list[Condition], number: int, lines: int) -> Any:
         points = []
@@ -113,22 +112,15 @@ class Distributions(TableFigure):
         if is_grid or len(self.metrics) == 1:  # the panels of a row have one axis
             for axes in sheet.axes:
                 axes.label_outer(remove_inner_ticks=False)
-        arranged.finish(sheet, paths)
         boxes = "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
-        return _sentences(
-            boxes if has_axis else "Share of the runs whose value is no greater.",
-            counts(arranged.chosen, self.metrics),
-            *(self._beyond(arranged, metric) for metric in self.metrics),
-            arranged.omitted,
-        )
-
-    def _beyond(self, arranged: Layout, metric: str) -> str:
-        if self.limit is None:
-            return ""
-        values, names = _numbers(arranged.chosen, metric), arranged.names
-        below = sum(value < self.limit for value in values)
-        limit = names.level(metric, self.limit)
-        return f"Below {limit}: {names.words(metric)} of {below:,} of {counted(len(values), 'run')}."
+        said = [boxes if has_axis else "Share of the runs whose value is no greater."]
+        said.append(counts(arranged.chosen, self.metrics))
+        if self.limit is not None:
+            for metric in self.metrics:
+                values, names = _numbers(arranged.chosen, metric), arranged.names
+                below, runs = sum(value < self.limit for value in values), counted(len(values), "run")
+                said.append(f"Below {names.level(metric, self.limit)}: {names.words(metric)} of {below:,} of {runs}.")
+        return arranged.finish(sheet, paths, *said)
 
     def _boxes(self, axes: Any, data: Data, metric: str, panel: Panel, arranged: Layout) -> None:
         from matplotlib.patches import Patch
@@ -182,10 +174,6 @@ class Distributions(TableFigure):
 
 def _numbers(conditions: Sequence[Condition], metric: str) -> list[float]:
     return [value for condition in conditions for value in condition.numbers(metric)]
-
-
-def _sentences(*parts: str) -> str:
-    return " ".join(part for part in parts if part)
 
 
 def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:

@@ -129,9 +129,6 @@ def _provenance(data: Data) -> Iterable[Html]:
     yield wide_table(["", ""], [[name, tag("code", value)] for name, value in facts.items() if value], class_="facts")
 
 
-# -- runs -------------------------------------------------------------------------------------------------------------
-
-
 def _runs(data: Data) -> Iterable[Html]:
     counts, plan, beyond = data.results.counts(), data.plan, data.results.beyond()
     over = counts.total() - beyond
@@ -166,9 +163,6 @@ def _failures(data: Data, failures: list[dict[str, Any]]) -> Iterable[Html]:
         yield note(f"... and {more:,} more: epicycle status {folder}")
 
 
-# -- figures ----------------------------------------------------------------------------------------------------------
-
-
 def _picture(number: int, picture: Picture) -> Html:
     what = picture.doc or picture.name.replace("_", " ").capitalize()
     what = what if what.rstrip()[-1:] in ".!?" else f"{what.rstrip()}."
@@ -180,9 +174,6 @@ def _picture(number: int, picture: Picture) -> Html:
         shown = tag("img", src=source, alt=what)
         caption += [" ", tag("span", picture.said, class_="note")]
     return tag("figure", shown, tag("figcaption", caption), id=f"figure-{picture.name}")
-
-
-# -- means ------------------------------------------------------------------------------------------------------------
 
 
 def _means(data: Data) -> Iterable[Html]:
@@ -220,27 +211,30 @@ def _pivot(data: Data, metric: str) -> Iterable[Html]:
         place = tuple(condition.values[name] for name in rows)
         found.setdefault(place, {})[condition.values[column]] = condition
     head = [*map(names.axis, rows), *(f"{names.words(column)} {names.level(column, level)}" for level in levels)]
-    body = [
-        [*map(shown, place), *(_cell(across.get(level), metric) for level in levels)]
-        for place, across in islice(found.items(), MAX_ROWS)
-    ]
-    yield wide_table(head, body, names=len(rows))
-    yield from _more(len(found))
+    body = (
+        [*map(shown, place), *(_cell(across.get(level), metric) for level in levels)] for place, across in found.items()
+    )
+    return _long_table(head, body, len(rows), len(found))
 
 
 def _flat(data: Data) -> Iterable[Html]:
     factors, metrics = data.results.factors, data.results.metrics
-    body = []
-    for each in islice(data.conditions.values(), MAX_ROWS):
-        levels, means = (shown(each.values[name]) for name in factors), (_cell(each, metric) for metric in metrics)
-        body.append([*levels, *means, f"{len(each.rows):,}"])
-    yield wide_table([*map(data.names.axis, (*factors, *metrics)), "runs"], body, names=len(factors))
-    yield from _more(len(data.conditions))
+    body = (
+        [
+            *(shown(each.values[name]) for name in factors),
+            *(_cell(each, metric) for metric in metrics),
+            f"{len(each.rows):,}",
+        ]
+        for each in data.conditions.values()
+    )
+    head = [*map(data.names.axis, (*factors, *metrics)), "runs"]
+    return _long_table(head, body, len(factors), len(data.conditions))
 
 
-def _more(rows: int) -> Iterable[Html]:
-    if rows > MAX_ROWS:
-        yield note(f"... and {counted(rows - MAX_ROWS, 'row')} more; table.parquet has all.")
+def _long_table(head: list[str], rows: Iterable[list[Content]], names: int, count: int) -> Iterable[Html]:
+    yield wide_table(head, islice(rows, MAX_ROWS), names=names)
+    if count > MAX_ROWS:
+        yield note(f"... and {counted(count - MAX_ROWS, 'row')} more; table.parquet has all.")
 
 
 def _cell(condition: Condition | None, metric: str) -> Content:
