@@ -87,12 +87,9 @@ def text_width(text: str, size: float, bold: bool = False) -> float:
 
 def new_canvas(width: float, height: float) -> Any:
     """An empty matplotlib figure (inches), which needs no screen."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    canvas = Figure(figsize=(width, height))
-    FigureCanvasAgg(canvas)
-    return canvas
+    return Figure(figsize=(width, height))
 
 
 def save(canvas: Any, path: Path, **options: object) -> None:
@@ -106,13 +103,11 @@ class FigureError(EpicycleError):
 
     def __init__(self, name: str, reason: str, raised: Position | None = None) -> None:
         super().__init__(name, reason, raised)
-        self.name = name
-        self.reason = reason
-        self.raised = raised
 
     def __str__(self) -> str:
-        lines = [readable(f"figure {self.name} cannot be drawn: {self.reason}")]
-        return "\n".join([*lines, *(told_raised(self.raised) if self.raised is not None else [])])
+        name, reason, raised = self.args
+        lines = [readable(f"figure {name} cannot be drawn: {reason}")]
+        return "\n".join([*lines, *(told_raised(raised) if raised is not None else [])])
 
 
 def draw(name: str, figure: Figure, results: Results, path: Path) -> None:
