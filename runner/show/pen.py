@@ -103,11 +103,13 @@ class FigureError(EpicycleError):
 
     def __init__(self, name: str, reason: str, raised: Position | None = None) -> None:
         super().__init__(name, reason, raised)
+        self.name = name
+        self.reason = reason
+        self.raised = raised
 
     def __str__(self) -> str:
-        name, reason, raised = self.args
-        lines = [readable(f"figure {name} cannot be drawn: {reason}")]
-        return "\n".join([*lines, *(told_raised(raised) if raised is not None else [])])
+        lines = [readable(f"figure {self.name} cannot be drawn: {self.reason}")]
+        return "\n".join([*lines, *(told_raised(self.raised) if self.raised is not None else [])])
 
 
 def draw(name: str, figure: Figure, results: Results, path: Path) -> None:
