@@ -141,6 +141,7 @@ class Distributions(TableFigure):
                     positions=[place + width * (number - (lines - 1) / 2) for place in groups],
                     widths=0.8 * width,
                     manage_ticks=False,
+                    patch_artist=True,
                     boxprops={"facecolor": colour, "alpha": 0.35, "edgecolor": colour},
                     medianprops={"color": colour},
                     whiskerprops={"color": colour},
@@ -149,9 +150,7 @@ class Distributions(TableFigure):
                 )
             arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
         axes.set_xlim(-0.6, len(levels) - 0.4)
-        every = -(-len(levels) // 16)
-        texts = [names.level("", level) if over else "" for level in levels[::every]]
-        _texts_along(axes, range(0, len(levels), every), texts)
+        _texts_along(axes, range(len(levels)), [names.level("", level) if over else "" for level in levels])
         axes.set_xlabel(names.axis(over) if over else "")
         axes.set_ylabel(fill(names.axis(metric), 30))
         axes.grid(axis="x", visible=False)
@@ -213,13 +212,16 @@ class _Axis:
         return self._of(condition.values[self._factor]) if self._factor else 0.0
 
     def dress(self, axes: Any) -> None:
-        """Ticks where levels are, if they are few, and not strewn over the axis like the points of a hypercube."""
-        if len(self._places) <= 12 and (self.is_connected or not self.is_numeric):
+        """Ticks where levels are: numbers only if they are few, and not strewn like the points of a hypercube."""
+        if not self.is_numeric or (self.is_connected and len(self._places) <= 12):
             _texts_along(axes, self._places, self._texts)
         if not self.is_numeric:
             axes.set_xlim(-0.5, len(self._places) - 0.5)
 
 
 def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str]) -> None:
+    """Write texts at their places, of many only some, and aslant where they are long."""
+    every = -(-len(texts) // 16)
+    places, texts = places[::every], texts[::every]
     turned = max(map(len, texts), default=0) * len(texts) > 60
     axes.set_xticks(places, texts, rotation=30 if turned else 0, ha="right" if turned else "center")
