@@ -111,7 +111,7 @@ def _has(dimension: Dimension, factor: str, level: Any) -> bool:
         if len(dimension.columns) == 1:
             return dimension.find({factor: level}) is not None
         return any(dimension.level(index).values[factor] == level for index in range(dimension.size))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):  # what is no number, or no finite one
         return False
 
 
