@@ -75,8 +75,7 @@ def tell_json_text(text: str) -> None:
 
 
 def _escape(text: str) -> str:
-    units = text.encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{units[place]:02x}{units[place + 1]:02x}" for place in range(0, len(units), 2))
+    return json.dumps(text)[1:-1]
 
 
 def _escape_error(error: UnicodeError) -> tuple[str, int]:

@@ -31,7 +31,7 @@ def shipped_files() -> list[Path]:
         path.relative_to(ROOT)
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
-        if (path.suffix in {".py", ".yaml", ".css"} or path.name in {"py.typed", "schema.json"})
+        if (path.suffix in {".py", ".yaml", ".css", ".mplstyle"} or path.name in {"py.typed", "schema.json"})
         and "__pycache__" not in path.parts
     )
 

@@ -1,11 +1,10 @@
 """What people see: of a run summary, figures, results folder; of what is installed, the reference."""
 
 from ..catalogue import Figure
-from .drawing import FigureError, draw
 from .figures import Histogram, TimeSeries, Trajectories
-from .folder import check_folder, draw_figures, write_folder
+from .outcome import check_folder, draw_figures, summary_object, summary_table, write_folder
+from .pen import FigureError, draw
 from .reference import aspects_at, described, detail, markdown, overview, parts_described, weaving
-from .summary import summary_object, summary_table
 
 __all__ = [
     "Figure",

@@ -97,12 +97,8 @@ class Trajectories(Figure):
 
     def _every(self, signal: Signal) -> list[int]:
         """Indices of the tokens that come at multiples of the interval."""
-        marks, upcoming = [], 0.0
-        for index, time in enumerate(signal.times):
-            if time >= upcoming - 1e-9:
-                marks.append(index)
-                upcoming = (np.floor(time / self.interval + 1e-9) + 1) * self.interval
-        return marks
+        steps = np.floor(np.asarray(signal.times) / self.interval + 1e-9)
+        return [int(index) for index in np.unique(steps, return_index=True)[1]]
 
 
 class TimeSeries(Figure):

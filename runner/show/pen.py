@@ -8,12 +8,17 @@ import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from textwrap import fill
 from types import MappingProxyType
 from typing import Any, Literal
 
-from epicycle.actors import shortened
+from epicycle.actors import EpicycleError, readable, shortened
+
+from ..catalogue import Figure
+from ..results import Results
+from ..text import Position, describe, raised_at, told_raised
 
 # Okabe and Ito, Color Universal Design, 2008; with markers and dashes, so that lines differ in print, too.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#7f7f7f")
@@ -26,30 +31,6 @@ FORMATS = ("png", "svg")
 MAX_TEXT = 200  # characters of a label
 _LONG = 30  # letters in a line beside an axis
 _LONGEST = {1: 60, 2: 46, 3: 30}  # and above a panel, by the number of columns
-_STYLE: dict[str, Any] = {
-    "font.size": 8.5,
-    "axes.titlesize": 8.5,
-    "axes.labelsize": 8.5,
-    "axes.linewidth": 0.7,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": "0.9",
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "lines.linewidth": 1.3,
-    "lines.markersize": 4.5,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "epicycle",
-    # Names, labels and docs of models are drawn as they are: `$\left` is no formula, and no TeX is started.
-    "text.parse_math": False,
-    "text.usetex": False,
-    "axes.formatter.use_mathtext": False,
-}
 # What matplotlib would write into a file of its own accord: names, versions, times.
 _METADATA = {
     "svg": ("Creator", "Date", "Format", "Type"),
@@ -79,25 +60,65 @@ def style(further: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
     open_matplotlib()
     import matplotlib.style
 
-    with matplotlib.style.context(["default", {**_STYLE, **further}]), warnings.catch_warnings():
+    ours = Path(__file__).with_suffix(".mplstyle")
+    with matplotlib.style.context(["default", ours, dict(further)]), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a box stands for what the font lacks
         yield
 
 
+@lru_cache(maxsize=16)
+def font(size: float, bold: bool = False) -> Any:
+    """The font that comes with matplotlib, in a size."""
+    open_matplotlib()
+    from matplotlib.font_manager import FontProperties
+
+    return FontProperties(family="DejaVu Sans", size=size, weight="bold" if bold else "normal")
+
+
+@lru_cache(maxsize=65536)
+def text_width(text: str, size: float, bold: bool = False) -> float:
+    """The width of a line of text in this font, in points, rounded up: layout needs no canvas."""
+    open_matplotlib()
+    from matplotlib.textpath import text_to_path
+
+    wide, _, _ = text_to_path.get_text_width_height_descent(text, font(size, bold), ismath=False)
+    return float(int(wide) + 1)
+
+
 def new_canvas(width: float, height: float) -> Any:
     """An empty matplotlib figure (inches), which needs no screen."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    canvas = Figure(figsize=(width, height))
-    FigureCanvasAgg(canvas)
-    return canvas
+    return Figure(figsize=(width, height))
 
 
 def save(canvas: Any, path: Path, **options: object) -> None:
     """Write a matplotlib figure; the ending decides the format, and the same figure gives the same bytes."""
     kind = path.suffix.lower().removeprefix(".")
     canvas.savefig(path, format=kind, metadata=dict.fromkeys(_METADATA.get(kind, ())), **options)
+
+
+class FigureError(EpicycleError):
+    """A figure cannot be drawn; ``raised`` is the line of a user's class from which the exception comes."""
+
+    def __init__(self, name: str, reason: str, raised: Position | None = None) -> None:
+        super().__init__(name, reason, raised)
+        self.name = name
+        self.reason = reason
+        self.raised = raised
+
+    def __str__(self) -> str:
+        lines = [readable(f"figure {self.name} cannot be drawn: {self.reason}")]
+        return "\n".join([*lines, *(told_raised(self.raised) if self.raised is not None else [])])
+
+
+def draw(name: str, figure: Figure, results: Results, path: Path) -> None:
+    """Draw a figure into a file; raises ``FigureError`` for whatever its class raises."""
+    try:
+        with style():
+            figure.draw(results, path)
+    except Exception as error:
+        raise FigureError(name, describe(error), raised_at(error)) from error
 
 
 class Sheet:
@@ -118,7 +139,8 @@ class Sheet:
         same_y: bool | Literal["row"] = False,
     ) -> None:
         count = len(panels)
-        self.columns = 1 if heights else columns or _columns(count)
+        few = {0: 1, 4: 2}.get(count, min(count, 3))
+        self.columns = 1 if heights else columns or (few if count <= 12 else 4)
         rows = math.ceil(count / self.columns)
         if heights:
             self.canvas = new_canvas(7.0, 0.4 + sum(heights))
@@ -151,9 +173,7 @@ class Sheet:
             return
         long = max(map(len, labels)) > 22
         columns = min(len(handles), 2 if long else 5 if self.columns > 1 else 4)
-        self.canvas.legend(
-            handles, labels, title=title or None, title_fontsize=8.5, loc="outside upper center", ncols=columns
-        )
+        self.canvas.legend(handles, labels, title=title or None, loc="outside upper center", ncols=columns)
 
     def save(self, paths: Sequence[Path]) -> None:
         """Write the files, whose endings decide the format."""
@@ -168,9 +188,3 @@ class Sheet:
 def legend_beside(axes: Any, **options: Any) -> None:
     """A legend to the right of the axes, as long as need be."""
     axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, **options)
-
-
-def _columns(count: int) -> int:
-    if count <= 3:
-        return max(count, 1)
-    return 2 if count == 4 else 3 if count <= 12 else 4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
+from operator import attrgetter
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -43,10 +44,9 @@ def parts_described(types: Iterable[type[Configurable]]) -> dict[str, list[TypeR
     }
 
 
-def by_group(references: Iterable[TypeReference]) -> Iterator[tuple[str, str, Iterator[TypeReference]]]:
-    """The topics, what is said of them, and the types of each."""
-    for (group, about), members in groupby(references, key=lambda each: (each.group, each.about_group)):
-        yield group, about, members
+def by_group(references: Iterable[TypeReference]) -> Iterator[tuple[tuple[str, str], Iterator[TypeReference]]]:
+    """The topics with what is said of each, and their types."""
+    return groupby(references, key=attrgetter("group", "about_group"))
 
 
 # -- for a terminal -------------------------------------------------------------------------------------------------
@@ -56,7 +56,7 @@ def overview(references: Sequence[TypeReference]) -> Group:
     """A line for each type under the heading of its topic."""
     width = max((len(each.name) for each in references), default=0)
     blocks: list[RenderableType] = []
-    for group, about, members in by_group(references):
+    for (group, about), members in by_group(references):
         blocks += [Text(""), Text.assemble((group, "bold"), f"  {about}" if about else "")]
         table = Table(box=None, show_header=False, pad_edge=False)
         table.add_column(width=width + 2, no_wrap=True)
@@ -134,29 +134,25 @@ One number of a run: `name: {of: port, take: ..., ...}`. What counts *tokens* we
 def markdown(
     catalogue: Catalogue, figures: Mapping[str, type[Figure]], study_figures: Mapping[str, type[Configurable]]
 ) -> str:
-    """The whole reference as a Markdown document."""
     lines = [INTRODUCTION]
-    every: list[type[Configurable]] = [*catalogue.actors.values(), *catalogue.aspects.values(), *figures.values()]
-    every += study_figures.values()
+    every = [each for types in (catalogue.actors, catalogue.aspects, figures, study_figures) for each in types.values()]
     actors, aspects = described(catalogue.actors), described(catalogue.aspects)
     for title, references in (("Actors", actors), ("Aspects", aspects)):
         lines.append(f"## {title}\n")
-        for group, about, members in by_group(references):
+        for (group, about), members in by_group(references):
             names = ", ".join(f"[{each.name}](#{each.name.lower()})" for each in members)
             lines.append(f"**{group}** ({about}): {names}\n")
         lines += [block for each in references for block in _markdown(each)]
     for base, known in parts_described(every).items():
-        lines.append(
-            f"## {base}\n\nThe value of a parameter, such as `{{type: {known[0].name}, ...}}`.\n" if known else ""
-        )
-        lines += [block for each in known for block in _markdown(each)]
+        about = f"## {base}\n\nThe value of a parameter, such as `{{type: {known[0].name}, ...}}`.\n" if known else ""
+        lines += [about, *(block for each in known for block in _markdown(each))]
     lines += _metrics()
     for title, types in (("Figures", figures), ("Figures of studies", study_figures)):
         lines.append(f"## {title}\n")
         lines += [block for each in described(types) for block in _markdown(each)]
     lines.append("## Keys\n")
     for title, construct in CONSTRUCTS.items():
-        rows = [[f"`{key}`", each.doc.replace("<", "\\<")] for key, each in construct.keys.items()]
+        rows = [[key, each.doc.replace("<", "\\<")] for key, each in construct.keys.items()]
         lines += [f"### {title}\n", _rows(("key", "what it is"), rows)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
@@ -164,14 +160,10 @@ def markdown(
 def _metrics() -> list[str]:
     """What a metric can take, and what else is said of one."""
     takes = [
-        [f"`{name}`", each.over, each.doc, ", ".join(f"`{option}`" for option in each.options), each.unit]
+        [name, each.over, each.doc, ", ".join(f"`{option}`" for option in each.options), each.unit]
         for name, each in TAKES.items()
     ]
-    options = [
-        [f"`{row[0]}`", *row[1:]]
-        for row in map(_parameter_row, describe("metric", Measure).parameters)
-        if row[0] != "take"
-    ]
+    options = [_parameter_row(each) for each in describe("metric", Measure).parameters if each.name != "take"]
     return [
         METRICS,
         _rows(("take", "counts", "what it is", "options", "unit"), takes),
@@ -180,33 +172,26 @@ def _metrics() -> list[str]:
 
 
 def _rows(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of Markdown."""
-    cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    cells = [[cell.replace("|", "\\|") for cell in (f"`{name}`", *others)] for name, *others in rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (heading, ["---"] * len(heading), *cells)) + "\n"
 
 
 def _markdown(reference: TypeReference) -> list[str]:
     """One type under a heading of its own."""
-    blocks = [f"### {reference.name}\n", f"{reference.doc}\n"]
-    for heading, rows in sections(reference):
-        blocks.append(_rows(heading, [[f"`{row[0]}`", *row[1:]] for row in rows]))
-    return [*blocks, *(f"{line}\n" for line in facts(reference))]
+    tables = [_rows(heading, rows) for heading, rows in sections(reference)]
+    return [f"### {reference.name}\n", f"{reference.doc}\n", *tables, *(f"{line}\n" for line in facts(reference))]
 
 
 # -- what both say --------------------------------------------------------------------------------------------------
 
 
-def sections(reference: TypeReference) -> list[tuple[Sequence[str], list[list[str]]]]:
-    """The tables of a type: ports and parameters, with their headings."""
-    found: list[tuple[Sequence[str], list[list[str]]]] = []
+def sections(reference: TypeReference) -> Iterator[tuple[Sequence[str], list[list[str]]]]:
+    """The tables of a type, as far as they have rows: ports and parameters, with their headings."""
     for direction in ("input", "output"):
-        rows = [_port_row(port) for port in reference.ports if port.direction == direction]
-        if rows:
-            found.append(((f"{direction} port", "type", "", "what it is"), rows))
+        if rows := [_port_row(port) for port in reference.ports if port.direction == direction]:
+            yield (f"{direction} port", "type", "", "what it is"), rows
     if reference.parameters:
-        rows = [_parameter_row(parameter) for parameter in reference.parameters]
-        found.append((("parameter", "type", "unit", "default", "what it is"), rows))
-    return found
+        yield ("parameter", "type", "unit", "default", "what it is"), [*map(_parameter_row, reference.parameters)]
 
 
 def facts(reference: TypeReference) -> list[str]:
@@ -243,10 +228,5 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
         kind += f", {parameter.min:g} to {parameter.max:g}"
     else:
         kind += bounds_text(parameter.min, parameter.above, parameter.max, "{:g}".format)
-    return [
-        parameter.name,
-        kind,
-        parameter.unit,
-        "required" if parameter.required else shown(parameter.default),
-        parameter.doc,
-    ]
+    default = "required" if parameter.required else shown(parameter.default)
+    return [parameter.name, kind, parameter.unit, default, parameter.doc]

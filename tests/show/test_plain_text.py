@@ -11,8 +11,7 @@ import yaml
 from epicycle.actors import Clock, Parameter
 from epicycle.runner import Model, Results, Simulation
 from epicycle.runner.cli import main
-from epicycle.runner.show import Figure, FigureError, draw
-from epicycle.runner.show.folder import draw_figures
+from epicycle.runner.show import Figure, FigureError, draw, draw_figures
 from epicycle.runner.show.graph import outline, write_graph
 from epicycle.runner.show.pen import Sheet, style
 from epicycle.runner.show.report.data import shown

@@ -19,7 +19,7 @@ from epicycle.actors import Tag
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.engine import Results, Signal, plain
-from epicycle.runner.show.folder import write_signals
+from epicycle.runner.results import write_signals
 
 
 class Light(Enum):

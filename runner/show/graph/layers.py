@@ -8,11 +8,12 @@ many; it has one place in each layer that it passes, however many branches it ha
 from __future__ import annotations
 
 from bisect import bisect_right, insort
-from collections.abc import Callable, Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, product
 from operator import itemgetter
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import networkx as nx
 
@@ -26,6 +27,11 @@ class Pin:
 
     cell: Cell
     offset: float = 0.0
+
+    @property
+    def y(self) -> float:
+        """How far down it is, once its cell has a place."""
+        return self.cell.y + self.offset
 
 
 @dataclass(eq=False)
@@ -42,6 +48,7 @@ class Cell:
     layer: int = 0
     width: float = 0.0
     height: float = 0.0
+    x: float = 0.0
     y: float = 0.0
 
     def pin(self, side: str) -> Pin:
@@ -70,15 +77,12 @@ class Run:
     right: list[Pin]
 
 
-@dataclass
-class Layering:
-    """The cells of each layer from top to bottom, and the runs to the right of each layer."""
-
-    layers: list[list[Cell]]
-    runs: list[list[Run]]
+Layers: TypeAlias = list[list[Cell]]  # the cells of each layer from top to bottom
+Runs: TypeAlias = list[list[Run]]  # to the right of each layer
+Joints: TypeAlias = list[list[tuple[Pin, Pin]]]  # the pairs of pins that these join
 
 
-def layer(cells: Sequence[Cell], nets: Sequence[Net]) -> Layering:
+def layer(cells: Sequence[Cell], nets: Sequence[Net]) -> tuple[Layers, Runs]:
     """Assign every cell to a layer, and make the passes of long nets.
 
     Entries stand in the first layer, exits in the last.  Nets that would close a cycle run backwards: those with a
@@ -96,127 +100,119 @@ def layer(cells: Sequence[Cell], nets: Sequence[Net]) -> Layering:
     for cell in cells:
         if cell.kind == "exit":
             cell.layer = last + 1
-    layers: list[list[Cell]] = [[] for _ in range(last + 2)]
+    layers: Layers = [[] for _ in range(last + 2)]
     for cell in cells:
         layers[cell.layer].append(cell)
-    runs: list[list[Run]] = [[] for _ in range(last + 1)]
+    runs: Runs = [[] for _ in range(last + 1)]
     for net in nets:
         _spread(net, layers, runs)
-    return Layering(layers, runs)
+    return layers, runs
 
 
 def _forward(cells: Sequence[Cell], nets: Sequence[Net]) -> Any:
     """The graph of the cells without what would close a cycle; ``span`` is the least distance of two layers."""
-    every: Any = nx.DiGraph()
-    every.add_nodes_from(cells)
-    edges = [(net, target.cell) for net in nets for target in net.targets]
-    every.add_edges_from((net.source.cell, target) for net, target in edges)
-    knot = {cell: number for number, knot in enumerate(nx.strongly_connected_components(every)) for cell in knot}
     graph: Any = nx.DiGraph()
     graph.add_nodes_from(cells)
-    for net, target in sorted(edges, key=lambda edge: edge[0].label is not None):
-        source, span = net.source.cell, 1 if net.label is None else 2
-        if source is target or (knot[source] == knot[target] and nx.has_path(graph, target, source)):
-            continue
-        known = graph[source][target]["span"] if graph.has_edge(source, target) else 0
-        graph.add_edge(source, target, span=max(span, known))
+    spans = [
+        (net.source.cell, target.cell, 1 if net.label is None else 2)
+        for net in sorted(nets, key=lambda net: net.label is not None)
+        for target in net.targets
+    ]
+    for (source, target, span), closes in zip(spans, closing(graph, [each[:2] for each in spans]), strict=True):
+        if not closes:
+            known = graph[source][target]["span"] if graph.has_edge(source, target) else 0
+            graph.add_edge(source, target, span=max(span, known))
     return graph
 
 
-def _spread(net: Net, layers: list[list[Cell]], runs: list[list[Run]]) -> None:
+def closing(graph: Any, edges: Sequence[tuple[T, T]]) -> Iterator[bool]:
+    """Of each edge, whether it would close a cycle in a graph to which the caller adds those that do not."""
+    every = graph.copy()
+    every.add_edges_from(edges)
+    knot = {node: number for number, knot in enumerate(nx.strongly_connected_components(every)) for node in knot}
+    for source, target in edges:
+        yield source is target or (knot[source] == knot[target] and nx.has_path(graph, target, source))
+
+
+def _spread(net: Net, layers: Layers, runs: Runs) -> None:
     """Divide a net into runs, with a pass in every layer between its ends."""
     start = net.source.cell.layer
-    parts: dict[int, Run] = {}
-
-    def run(channel: int) -> Run:
-        """The run to the right of a layer."""
-        if channel not in parts:
-            parts[channel] = Run(net, [], [])
-            runs[channel].append(parts[channel])
-        return parts[channel]
-
-    def pass_through(number: int) -> None:
-        """A pass in a layer, joined to the runs on both sides."""
+    forward = [pin for pin in net.targets if pin.cell.layer > start]
+    backward = [pin for pin in net.targets if pin.cell.layer <= start]
+    parts: dict[int, Run] = defaultdict(lambda: Run(net, [], []))  # by the layer on their left
+    parts[start].left.append(net.source)
+    for number in (
+        *range(start + 1, max((pin.cell.layer for pin in forward), default=start)),
+        *range(start, min((pin.cell.layer for pin in backward), default=start + 1) - 1, -1),
+    ):
         cell = Cell("pass", layer=number)
         layers[number].append(cell)
         if net.label is not None and net.labelled is None:
             net.labelled = cell
             cell.width, cell.height = net.label
-        run(number - 1).right.append(cell.pin("left"))
-        run(number).left.append(cell.pin("right"))
+        parts[number - 1].right.append(cell.pin("left"))
+        parts[number].left.append(cell.pin("right"))
         cell.left[0].offset = cell.right[0].offset = cell.height / 2
-
-    run(start).left.append(net.source)
-    forward = [pin for pin in net.targets if pin.cell.layer > start]
-    for number in range(start + 1, max((pin.cell.layer for pin in forward), default=start)):
-        pass_through(number)
-    backward = [pin for pin in net.targets if pin.cell.layer <= start]
-    for number in range(start, min((pin.cell.layer for pin in backward), default=start + 1) - 1, -1):
-        pass_through(number)
     for pin in (*forward, *backward):
-        run(pin.cell.layer - 1).right.append(pin)
+        parts[pin.cell.layer - 1].right.append(pin)
+    for number, run in parts.items():
+        runs[number].append(run)
 
 
 # -- order --------------------------------------------------------------------------------------------------------
 
 
-def order(layering: Layering, fixed: Iterable[Cell] = ()) -> None:
+def order(layers: Layers, runs: Runs, fixed: Iterable[Cell] = ()) -> None:
     """Put the cells of each layer, and the pins of each box, into an order with few crossings.
 
     ``fixed`` are entries and exits whose order is given: they keep it among themselves.
     """
-    joints = [_joints(layering, number) for number in range(len(layering.runs))]
+    joints = [_joints(layers, number, here) for number, here in enumerate(runs)]
     given = {cell: place for place, cell in enumerate(fixed)}
-    best, least = _state(layering), _all_crossings(layering.layers, joints)
-    start = best
+    sides = [pins for cells in layers for cell in cells for pins in (cell.left, cell.right)]
+    ordered: list[list[Any]] = [*layers, *sides]
+    start = best = [[*each] for each in ordered]
+    least = _all_crossings(layers, joints)
     for upside_down in (False, True):
-        _restore(layering, start)
+        _restore(ordered, start)
         if upside_down:
-            for cells in layering.layers:
+            for cells in layers:
                 cells.reverse()
                 _keep(cells, given)
         for _ in range(SWEEPS):
             if least == (0, 0):
                 break
             for rightwards in (True, False):
-                _sweep(layering.layers, joints, given, rightwards)
-                found = _all_crossings(layering.layers, joints)
+                _sweep(layers, joints, given, rightwards)
+                found = _all_crossings(layers, joints)
                 if found < least:
-                    best, least = _state(layering), found
-    _restore(layering, best)
-    for cells in layering.layers:
+                    best, least = [[*each] for each in ordered], found
+    _restore(ordered, best)
+    for cells in layers:
         cells[:] = [cell for cell in cells if cell.kind != "turn"]
 
 
-def _joints(layering: Layering, number: int) -> list[tuple[Pin, Pin]]:
+def _restore(ordered: list[list[Any]], state: list[list[Any]]) -> None:
+    for each, before in zip(ordered, state, strict=True):
+        each[:] = before
+
+
+def _joints(layers: Layers, number: int, runs: list[Run]) -> list[tuple[Pin, Pin]]:
     """The pairs of pins that the runs to the right of a layer join; where one turns round, a cell holds its place."""
-    pairs = []
-    for run in layering.runs[number]:
+    pairs: list[tuple[Pin, Pin]] = []
+    for run in runs:
         ends = []
         for pins, beyond, side in ((run.left, number, "right"), (run.right, number + 1, "left")):
             if not pins:
                 turn = Cell("turn", layer=beyond)
-                layering.layers[beyond].append(turn)
+                layers[beyond].append(turn)
                 pins = [turn.pin(side)]
             ends.append(pins)
-        pairs += list(product(ends[0], ends[1]))
+        pairs += product(ends[0], ends[1])
     return pairs
 
 
-def _state(layering: Layering) -> list[list[tuple[Cell, list[Pin], list[Pin]]]]:
-    return [[(cell, list(cell.left), list(cell.right)) for cell in cells] for cells in layering.layers]
-
-
-def _restore(layering: Layering, state: list[list[tuple[Cell, list[Pin], list[Pin]]]]) -> None:
-    for cells, kept in zip(layering.layers, state, strict=True):
-        cells[:] = [cell for cell, _, _ in kept]
-        for cell, left, right in kept:
-            cell.left[:], cell.right[:] = left, right
-
-
-def _sweep(
-    layers: list[list[Cell]], joints: list[list[tuple[Pin, Pin]]], given: dict[Cell, int], rightwards: bool
-) -> None:
+def _sweep(layers: Layers, joints: Joints, given: dict[Cell, int], rightwards: bool) -> None:
     """Order each layer by where its pins are connected to in the layer before it, in one direction or the other."""
     last = len(layers) - 1
     for number in range(1, last + 1) if rightwards else range(last - 1, -1, -1):
@@ -226,21 +222,17 @@ def _sweep(
         for left, right in joints[min(before, number)]:
             here, far = (right, left) if rightwards else (left, right)
             there.setdefault(here, []).append(ranks[far])
-        _arrange(layers[number], there, given)
+        cells = layers[number]
+        for cell in cells:
+            for pins in (cell.left, cell.right):
+                _sort(pins, [there.get(pin, []) for pin in pins])
+        _sort(cells, [[rank for pin in (*cell.left, *cell.right) for rank in there.get(pin, ())] for cell in cells])
+        _keep(cells, given)
 
 
-def _arrange(cells: list[Cell], there: dict[Pin, list[int]], given: dict[Cell, int]) -> None:
-    """Order one layer by the ranks of what its pins are connected to."""
-    for cell in cells:
-        for pins in (cell.left, cell.right):
-            _sort(pins, lambda pin: there.get(pin, []))
-    _sort(cells, lambda cell: [rank for pin in (*cell.left, *cell.right) for rank in there.get(pin, ())])
-    _keep(cells, given)
-
-
-def _sort(items: list[T], ranks: Callable[[T], list[int]]) -> None:
-    """Sort by mean rank; what has no rank stays in its place."""
-    means = {index: sum(found) / len(found) for index, item in enumerate(items) if (found := ranks(item))}
+def _sort(items: list[T], ranks: list[list[int]]) -> None:
+    """Sort by the mean of each item's ranks; what has none stays in its place."""
+    means = {index: sum(found) / len(found) for index, found in enumerate(ranks) if found}
     in_order = [items[index] for index in sorted(means, key=means.__getitem__)]
     for index, item in zip(sorted(means), in_order, strict=True):
         items[index] = item
@@ -258,7 +250,7 @@ def _ranks(cells: list[Cell], side: str) -> dict[Pin, int]:
     return {pin: rank for rank, pin in enumerate(pins)}
 
 
-def _all_crossings(layers: list[list[Cell]], joints: list[list[tuple[Pin, Pin]]]) -> tuple[int, int]:
+def _all_crossings(layers: Layers, joints: Joints) -> tuple[int, int]:
     """How many lines cross, and how many of these pairs are both on their way between passes.
 
     Near an end a line changes its height anyway, so there a crossing costs no bends.

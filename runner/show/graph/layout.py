@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from . import text
-from .layers import Cell, Layering, Net, Pin, Run, layer, order
+from ..pen import text_width
+from .layers import Cell, Net, Pin, Run, layer, order
 from .outlines import Box, Link, Outline, Port, label
 from .places import Trunk, place, tracks
 
+NAME, KIND, PORT, PILL = 9.0, 7.5, 7.0, 6.5  # font sizes in points
 ROW = 14.0  # from port to port of an actor
 HEADER, TITLE = 28.0, 20.0  # heights of an actor's and of a composite's name
 PILL_HEIGHT, PILL_GAP = 12.0, 3.0
@@ -76,7 +77,6 @@ class Pill:
 
     @property
     def width(self) -> float:
-        """How wide it is."""
         return pill_width(self.text)
 
 
@@ -93,15 +93,8 @@ class Words:
     align: str = "left"
 
     @property
-    def left(self) -> float:
-        """Where it begins."""
-        share = {"left": 0.0, "center": 0.5, "right": 1.0}[self.align]
-        return self.x - share * self.width
-
-    @property
     def width(self) -> float:
-        """How wide it is."""
-        return text.width(self.text, self.size, self.bold)
+        return text_width(self.text, self.size, self.bold)
 
 
 @dataclass
@@ -119,15 +112,14 @@ class Drawing:
 
 def draw(outline: Outline) -> Drawing:
     """Lay out an outline."""
-    scope = _Scope(outline.root, [], [])
+    scope = _Scope(outline.root, (), ())
     drawing = Drawing(outline, scope.width + 2 * MARGIN, scope.height + 2 * MARGIN)
     scope.put(drawing, MARGIN, MARGIN, 0)
     return drawing
 
 
 def pill_width(words: str) -> float:
-    """The width of a badge."""
-    return text.width(words, text.PILL) + 8.0
+    return text_width(words, PILL) + 8.0
 
 
 def _pills_width(port: Port) -> float:
@@ -139,61 +131,45 @@ class _Scope:
 
     def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port]) -> None:
         self.box = box
+        self.top = TITLE + MARGIN if box.path else 0.0  # where the inside begins
         self.inner: dict[Box, _Scope] = {}
-        self.cells: dict[Box, Cell] = {}
         self.ends: dict[Pin, Port] = {}
         self.pins: dict[str, Pin] = {}  # by the paths of their ports
-        frame = [self._frame_port(port, "entry") for port in inputs]
-        frame += [self._frame_port(port, "exit") for port in outputs]
-        for child in box.children:
-            self._add(child)
+        frame = []
+        for kind, side, ports in (("entry", "right", inputs), ("exit", "left", outputs)):
+            for port in ports:
+                frame.append(Cell(kind, width=text_width(port.name, PORT) + 8.0, height=ROW))
+                self._pin(frame[-1], side, port, ROW - 3.0)
+        self.cells = {child: Cell("box") for child in box.children}
+        for child, cell in self.cells.items():
+            for side, ports in (("left", child.inputs), ("right", child.outputs)):
+                for port in ports:
+                    self._pin(cell, side, port)
         self.nets = self._nets()
-        self.layering: Layering = layer([*frame, *self.cells.values()], list(self.nets))
-        order(self.layering, frame)
+        self.layers, self.runs = layer([*frame, *self.cells.values()], list(self.nets))
+        order(self.layers, self.runs, frame)
         for child, cell in self.cells.items():
             self._measure(child, cell)
-        self.height = place(self.layering)
-        self.width = 0.0
-        self._columns()
+        self.height = place(self.layers, self.runs)
+        self.width = self._columns()
         if box.path:
             self.height += TITLE + 2 * MARGIN
-            self.width = max(self.width, text.width(self.title, text.NAME, bold=True) + 2 * MARGIN)
+            self.width = max(self.width, text_width(f"{box.name}: {box.kind}", NAME, bold=True) + 2 * MARGIN)
 
-    @property
-    def title(self) -> str:
-        """What is written above the inside."""
-        return f"{self.box.name}: {self.box.kind}"
-
-    @property
-    def top(self) -> float:
-        """Where the inside begins."""
-        return TITLE + MARGIN if self.box.path else 0.0
-
-    def _frame_port(self, port: Port, kind: str) -> Cell:
-        cell = Cell(kind, width=text.width(port.name, text.PORT) + 8.0, height=ROW)
-        self._pin(cell, "right" if kind == "entry" else "left", port).offset = ROW - 3.0
-        return cell
-
-    def _add(self, child: Box) -> None:
-        cell = self.cells[child] = Cell("box")
-        for side, ports in (("left", child.inputs), ("right", child.outputs)):
-            for port in ports:
-                self._pin(cell, side, port)
-
-    def _pin(self, cell: Cell, side: str, port: Port) -> Pin:
+    def _pin(self, cell: Cell, side: str, port: Port, offset: float = 0.0) -> None:
         pin = self.pins[port.path] = cell.pin(side)
+        pin.offset = offset
         self.ends[pin] = port
-        return pin
 
-    def _nets(self) -> dict[Net, list[Link]]:
-        """The links that leave one port with one label are a net."""
+    def _nets(self) -> dict[Net, Link]:
+        """The links that leave one port with one label are a net; the first of them stands for all."""
         groups: dict[tuple[str, str], list[Link]] = {}
         for link in self.box.links:
             groups.setdefault((link.source, label(link)), []).append(link)
         nets = {}
         for (source, words), links in groups.items():
             size = (pill_width(words) + 8.0, PILL_HEIGHT) if words else None
-            nets[Net(self.pins[source], [self.pins[link.target] for link in links], size)] = links
+            nets[Net(self.pins[source], [self.pins[link.target] for link in links], size)] = links[0]
         return nets
 
     def _measure(self, child: Box, cell: Cell) -> None:
@@ -205,46 +181,41 @@ class _Scope:
             cell.width, cell.height = scope.width, scope.height
             for pin in (*cell.left, *cell.right):
                 inside = scope.pins[self.ends[pin].path]
-                pin.offset = scope.top + inside.cell.y + inside.offset
+                pin.offset = scope.top + inside.y
             return
         widths = []
         for pins in (cell.left, cell.right):
-            widths.append(max((text.width(self.ends[pin].name, text.PORT) for pin in pins), default=0.0))
+            widths.append(max((text_width(self.ends[pin].name, PORT) for pin in pins), default=0.0))
             for row, pin in enumerate(pins):
                 pin.offset = HEADER + ROW * row + ROW / 2
         rows = max(len(cell.left), len(cell.right))
         hidden = max((pill_width(name) for name in child.aspects), default=0.0)
-        names = max(text.width(child.name, text.NAME, bold=True), text.width(child.kind, text.KIND))
+        names = max(text_width(child.name, NAME, bold=True), text_width(child.kind, KIND))
         names += 16.0 if child.is_closed else 0.0  # beside the sign of a closed one
         cell.width = max(names + 16.0, sum(widths) + 12.0 + (10.0 if all(widths) else 0.0), hidden + 16.0, 44.0)
         cell.height = HEADER + ROW * rows + 3.0 + (PILL_HEIGHT + PILL_GAP) * len(child.aspects)
 
-    # -- columns --------------------------------------------------------------------------------------------------
-
-    def _columns(self) -> None:
-        """Set where each layer begins and ends, and where the tracks between them are."""
-        self.begins: list[float] = []
-        self.ends_at: list[float] = []
-        self.x: dict[Cell, float] = {}
+    def _columns(self) -> float:
+        """Set where each layer begins and ends, and where the tracks between them are; the width of all."""
+        self.spans: list[tuple[float, float]] = []
         self.trunks: dict[Run, list[Trunk]] = {}
-        self.track_x: dict[Trunk, float] = {}
-        x = 0.0 if self.layering.layers[0] or not self.box.path else MARGIN
-        for number, cells in enumerate(self.layering.layers):
+        x = 0.0 if self.layers[0] or not self.box.path else MARGIN
+        for cells, runs in zip(self.layers, [*self.runs, []], strict=True):
             before = max((self._margin(cell, cell.left) for cell in cells), default=0.0)
             after = max((self._margin(cell, cell.right) for cell in cells), default=0.0)
             room = max((cell.width for cell in cells), default=0.0)
             for cell in cells:  # boxes stand in the middle of their layer
-                self.x[cell] = x + before + (room - cell.width) // 2
-            self.begins.append(x)
-            x += before + room + after
-            self.ends_at.append(x)
-            runs = self.layering.runs[number] if number < len(self.layering.runs) else []
+                cell.x = x + before + (room - cell.width) // 2
+            self.spans.append((x, x + before + room + after))
+            x = self.spans[-1][1]
             trunks, count = tracks(runs)
-            self.trunks.update((run, [trunk for trunk in trunks if run in trunk.runs]) for run in runs)
-            self.track_x.update((trunk, x + PADDING + TRACK * trunk.track) for trunk in trunks)
+            for trunk in trunks:
+                trunk.x = x + PADDING + TRACK * trunk.track
+                for run in trunk.runs:
+                    self.trunks.setdefault(run, []).append(trunk)
             if runs:
                 x += 2 * PADDING + TRACK * max(count - 1, 0)
-        self.width = x if self.layering.layers[-1] or not self.box.path else x + MARGIN
+        return x if self.layers[-1] or not self.box.path else x + MARGIN
 
     def _margin(self, cell: Cell, pins: list[Pin]) -> float:
         """The room that a box needs on one side for badges and arrowheads."""
@@ -253,15 +224,15 @@ class _Scope:
         arrow = HEAD if pins is cell.left else 4.0
         return max((_pills_width(self.ends[pin]) + arrow for pin in pins), default=0.0)
 
-    def _pin_x(self, pin: Pin) -> float:
+    def _point(self, pin: Pin) -> Point:
         cell, is_left = pin.cell, pin in pin.cell.left
         if cell.kind == "pass":
-            return self.begins[cell.layer] if is_left else self.ends_at[cell.layer]
-        if cell.kind == "box":
-            return self.x[cell] if is_left else self.x[cell] + cell.width
-        return 0.0 if cell.kind == "entry" else self.width
-
-    # -- drawing --------------------------------------------------------------------------------------------------
+            x = self.spans[cell.layer][0 if is_left else 1]
+        elif cell.kind == "box":
+            x = cell.x if is_left else cell.x + cell.width
+        else:
+            x = 0.0 if cell.kind == "entry" else self.width
+        return x, pin.y
 
     def put(self, drawing: Drawing, x: float, y: float, level: int) -> None:
         """Put everything into a drawing, the top left corner of this scope at (x, y)."""
@@ -269,7 +240,7 @@ class _Scope:
         linked = [*self.box.links, *(link for child in self.inner for link in child.links)]
         joined = {end for link in linked for end in (link.source, link.target)}
         for child, cell in self.cells.items():
-            left, upper = x + self.x[cell], top + cell.y
+            left, upper = x + cell.x, top + cell.y
             ports = []
             for side, pins in (("left", cell.left), ("right", cell.right)):
                 for pin in pins:
@@ -289,41 +260,35 @@ class _Scope:
             drawing.boxes.append(PlacedBox(child, left, upper, cell.width, cell.height, level, tuple(ports)))
             if child in self.inner:
                 self.inner[child].put(drawing, left, upper, level + 1)
-        for net, links in self.nets.items():
+        for net, link in self.nets.items():
             drawing.wires.append(self._wire(net, x, top, level))
             if net.labelled is not None:
-                cell, words = net.labelled, label(links[0])
-                forward = cell.layer > net.source.cell.layer
-                start = self.begins[cell.layer] + 4.0 if forward else self.ends_at[cell.layer] - cell.width + 4.0
+                cell = net.labelled
+                begin, end = self.spans[cell.layer]
+                start = begin if cell.layer > net.source.cell.layer else end - cell.width
                 at = top + cell.y + cell.height / 2
-                drawing.pills.append(Pill(words, "", x + start, at, links[0].delay))
+                drawing.pills.append(Pill(label(link), "", x + start + 4.0, at, link.delay))
 
     def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
         """The name and type of a box: in one line above the inside of a composite, else one below the other."""
         if box.is_open:
-            name = Words(box.name, x + MARGIN, y + 14.0, text.NAME, bold=True)
-            return [name, Words(f": {box.kind}", name.x + name.width, name.y, text.NAME, is_soft=True)]
+            name = Words(box.name, x + MARGIN, y + 14.0, NAME, bold=True)
+            return [name, Words(f": {box.kind}", name.x + name.width, name.y, NAME, is_soft=True)]
         middle = x + width / 2
         return [
-            Words(box.name, middle, y + 12.0, text.NAME, bold=True, align="center"),
-            Words(box.kind, middle, y + 22.5, text.KIND, is_soft=True, align="center"),
+            Words(box.name, middle, y + 12.0, NAME, bold=True, align="center"),
+            Words(box.kind, middle, y + 22.5, KIND, is_soft=True, align="center"),
         ]
 
     def _wire(self, net: Net, x: float, y: float, level: int) -> Wire:
-        """The lines of a net."""
         pieces: list[Piece] = []
-        for number, runs in enumerate(self.layering.runs):
+        for span, runs in zip(self.spans, self.runs, strict=False):
             for run in (each for each in runs if each.net is net):
                 pieces += self._pieces(run)
                 # A pass is drawn with the run on its right.
-                pieces += [
-                    ((self.begins[number], height), (self.ends_at[number], height))
-                    for pin in run.left
-                    if pin.cell.kind == "pass"
-                    for height in [self._point(pin)[1]]
-                ]
-        shifted = [((x + a, y + b), (x + c, y + d)) for (a, b), (c, d) in pieces]
-        lines, dots = trace(shifted)
+                passes = (self._point(pin)[1] for pin in run.left if pin.cell.kind == "pass")
+                pieces += [((span[0], height), (span[1], height)) for height in passes]
+        lines, dots = trace([((x + a, y + b), (x + c, y + d)) for (a, b), (c, d) in pieces])
         heads = tuple((x + a, y + b) for a, b in map(self._point, net.targets))
         targets = tuple(self.ends[pin].path for pin in net.targets)
         return Wire(self.ends[net.source].path, targets, lines, heads, dots, level)
@@ -331,11 +296,11 @@ class _Scope:
     def _pieces(self, run: Run) -> list[Piece]:
         """The straight pieces of a run: its trunk, and a line from each pin to it."""
         left, right = [self._point(pin) for pin in run.left], [self._point(pin) for pin in run.right]
-        trunks = self.trunks[run]
+        trunks = self.trunks.get(run, [])
         if not trunks:
             return [(left[0], right[0])]
         # A trunk may be longer than what this run needs of it: runs to one port share it.
-        tracks = [self.track_x[trunk] for trunk in trunks]
+        tracks = [trunk.x for trunk in trunks]
         stops = [[height for _, height in left], [height for _, height in right]]
         stops[1:1] = [trunk.right for trunk in trunks[:-1]]  # where a divided trunk goes over to its second track
         pieces: list[Piece] = [((x, height), (tracks[0], height)) for x, height in left]
@@ -347,15 +312,12 @@ class _Scope:
         pieces += [((tracks[-1], height), (x, height)) for x, height in right]
         return [piece for piece in pieces if piece[0] != piece[1]]
 
-    def _point(self, pin: Pin) -> tuple[float, float]:
-        return self._pin_x(pin), pin.cell.y + pin.offset
-
 
 def _port_name(port: PlacedPort, is_open: bool) -> Words:
     """The name of a port inside its box; inside of an open composite it stands above the line that goes on there."""
-    y = port.y - 3.0 if is_open else port.y + 0.35 * text.PORT
+    y = port.y - 3.0 if is_open else port.y + 0.35 * PORT
     x, align = (port.x + 6.0, "left") if port.side == "left" else (port.x - 6.0, "right")
-    return Words(port.port.name, x, y, text.PORT, is_soft=not port.is_joined, align=align)
+    return Words(port.port.name, x, y, PORT, is_soft=not port.is_joined, align=align)
 
 
 def trace(pieces: Sequence[Piece]) -> tuple[tuple[Line, ...], tuple[Point, ...]]:

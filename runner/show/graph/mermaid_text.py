@@ -20,15 +20,12 @@ class _Writer:
     def __init__(self, outline: Outline) -> None:
         self.outline = outline
         self.names: dict[str, str] = {}  # of boxes, and of the ports of open composites, by path
-        self.boxes: dict[str, Box] = {}  # by the paths of their ports
-        self.ports: dict[str, Port] = {}
-        self.marked: list[str] = []
-        for box in outline.root.walk():
-            for port in (*box.inputs, *box.outputs):
-                self.boxes[port.path], self.ports[port.path] = box, port
+        self.marked: list[str] = []  # where aspects stand
+        self.boxes: dict[str, Box] = {  # by the paths of their ports
+            port.path: box for box in outline.root.walk() for port in (*box.inputs, *box.outputs)
+        }
 
     def lines(self) -> Iterator[str]:
-        """The lines of the chart."""
         yield "---"
         yield f"title: {_quoted(self.outline.model.name)}"
         yield "---"
@@ -43,7 +40,7 @@ class _Writer:
         for port in (*box.inputs, *box.outputs):
             if box.path:
                 yield f"{indent}{self.name(port.path)}([{_quoted(_with_aspects(port))}])"
-                self.mark(port.path, port.aspects)
+                self.marked += [self.name(port.path)] if port.aspects else []
         for child in box.children:
             own = " (own director)" if child.has_director else ""
             if child.is_open:
@@ -55,30 +52,24 @@ class _Writer:
             aspects = "".join(f"<br/>«{name}»" for name in child.aspects)
             title = _quoted(f"{child.name}<br/>{child.kind}{own}{aspects}")
             yield f"{indent}{self.name(child.path)}" + (f"[[{title}]]" if child.is_closed else f"[{title}]")
-            standing = [name for port in (*child.inputs, *child.outputs) for name in port.aspects]
-            self.mark(child.path, (*standing, *child.aspects))
+            has_aspects = child.aspects or any(port.aspects for port in (*child.inputs, *child.outputs))
+            self.marked += [self.name(child.path)] if has_aspects else []
         for link in box.links:
             yield indent + self.link(link)
 
-    def mark(self, path: str, aspects: tuple[str, ...]) -> None:
-        """Remember where an aspect stands."""
-        if aspects:
-            self.marked.append(self.name(path))
-
     def link(self, link: Link) -> str:
         """A connection, labelled with what its ends do not say."""
-        source, target = self.end(link.source, "outputs"), self.end(link.target, "inputs")
-        words = ", ".join(part for part in (" to ".join(filter(None, (source, target))), label(link)) if part)
+        ends = (self.end(link.source, "outputs"), self.end(link.target, "inputs"))
+        words = ", ".join(part for part in (" to ".join(filter(None, ends)), label(link)) if part)
         arrow = "-->" if link.delay is None else "-.->"
         between = f"{arrow}|{_quoted(words)}|" if words else arrow
         return f"{self.node(link.source)} {between} {self.node(link.target)}"
 
-    def end(self, port: str, side: str) -> str:
+    def end(self, path: str, side: str) -> str:
         """What must be said of one end: the name of the port if the box has several, and aspects."""
-        box = self.boxes[port]
-        if box.is_open:
-            return ""
-        return _with_aspects(self.ports[port], named=len(getattr(box, side)) > 1)
+        box = self.boxes[path]
+        ports: list[Port] = [] if box.is_open else getattr(box, side)
+        return "".join(_with_aspects(port, named=len(ports) > 1) for port in ports if port.path == path)
 
     def node(self, port: str) -> str:
         """The node at which a connection ends: a port of an open composite, or else the box."""

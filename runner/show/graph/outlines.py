@@ -6,20 +6,17 @@ becomes a closed box.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from itertools import accumulate, chain
 
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 
 from ...build import Model
-from ...graph import Clock, Hop, WovenAspect
+from ...graph import Clock, Hop
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded if nothing else is asked for
-
-_INDEXED = re.compile(r"(.*)\[(\d+)\]\Z")
 
 
 @dataclass(eq=False)
@@ -104,11 +101,23 @@ def outline(model: Model, depth: int | None = None, expand: bool = False) -> Out
     Composites in up to ``depth`` levels are opened; by default as many as keep the drawing readable.  Unless
     ``expand``, arrays whose instances are alike are one box.
     """
-    return _Outliner(model, expand).outline(depth)
+    outliner = _Outliner(model, expand)
+    root = outliner.box("")
+    rows = [[root]]  # the boxes, by how many composites they are in
+    while rows[-1]:
+        rows.append([child for box in rows[-1] for child in box.children])
+    levels = max(level for level, row in enumerate(rows) if any(box.is_composite for box in row))
+    if depth is None:
+        sizes = accumulate(map(len, rows[1:]))
+        depth = max((deep for deep, size in enumerate(sizes) if deep <= levels and size <= MANY), default=0)
+    for box in (box for row in rows[depth + 1 : depth + 2] for box in row if box.is_composite):
+        box.is_closed, box.children, box.links = True, [], []
+        box.aspects = outliner.aspects_within(box.path)
+    return Outline(model, root, depth, levels)
 
 
 class _Outliner:
-    """Reads the model graph once, and makes outlines of it."""
+    """Makes boxes and links of what a model graph holds."""
 
     def __init__(self, model: Model, expand: bool) -> None:
         self.model = model
@@ -117,64 +126,24 @@ class _Outliner:
         for woven in model.aspects:
             for path in dict.fromkeys((*woven.ports, *woven.actors, *map(_owner, woven.parameters))):
                 self.standing.setdefault(path, []).append(woven.name)
-        self.children: dict[str, list[str]] = {"": []}
-        self.ports: dict[str, list[str]] = {}
-        for path in self.graph.ports.nodes:
-            owner = _owner(path)
-            self._add(owner)
-            self.ports[owner].append(path)
-        for path in (*self.graph.composites, *self.graph.actors):  # those without ports
-            self._add(path)
         self.hops: dict[str, list[Hop]] = {}  # by the composite inside of which they lie
         self.outside: dict[str, list[Hop]] = {}  # by the box at which they end
-        for source, _, data in self.graph.ports.edges(data=True):
-            hop: Hop = data["hop"]
+        for source, _, hop in self.graph.ports.edges(data="hop"):
             owner = _owner(source)
             scope = owner if self.graph.direction(source) == "input" else _owner(owner)
             self.hops.setdefault(scope, []).append(hop)
             for end in {_owner(hop.source), _owner(hop.destination)} - {scope}:
                 self.outside.setdefault(end, []).append(hop)
-        self.arrays = self._arrays()
-        self.alike: set[str] = set()
-        if not expand:
-            self._find_alike()
-
-    def _add(self, path: str) -> None:
-        """Enter a box, and those that it is in, in the order in which they are met."""
-        if path and path not in self.ports:
-            parent = _owner(path)
-            self._add(parent)
-            self.ports[path] = []
-            self.children.setdefault(path, [])
-            self.children[parent].append(path)
-
-    # -- arrays ---------------------------------------------------------------------------------------------------
-
-    def _arrays(self) -> dict[str, list[str]]:
-        """The instances of each array, by its path without an index."""
-        arrays: dict[str, list[str]] = {}
-        for path in self.ports:
-            if match := _INDEXED.match(path):
-                arrays.setdefault(match[1], []).append(path)
-        return {array: paths for array, paths in arrays.items() if len(paths) > 1}
-
-    def _find_alike(self) -> None:
-        """The arrays whose instances differ in nothing that would be seen.
-
-        All are taken to be alike at first.  One that proves otherwise is drawn instance by instance, which may show
-        a difference between the instances of another array; so the search goes on until nothing changes.
-        """
-        self.alike = set(self.arrays)
-        while True:
-            unlike = {array for array in self.alike if len({self._look(path) for path in self.arrays[array]}) > 1}
-            if not unlike:
-                return
-            self.alike -= unlike
-
-    def _folded(self, path: str) -> str | None:
-        """The array, drawn as one box, of which this is an instance."""
-        match = _INDEXED.match(path)
-        return match[1] if match is not None and match[1] in self.alike else None
+        # The arrays whose instances differ in nothing that is seen.  All are taken to be alike at first.  One that
+        # proves otherwise is drawn instance by instance, which may show a difference between the instances of another
+        # array; so the search goes on until nothing changes.
+        composites = () if expand else ("", *self.graph.composites)
+        arrays = [array for each in composites for array in self.graph.parts(each).values() if len(array) > 1]
+        before = -1
+        while len(arrays) != before:
+            before = len(arrays)
+            self.alike = {path: array for array in arrays for path in array}
+            arrays = [array for array in arrays if len(set(map(self._look, array))) == 1]
 
     def _look(self, instance: str) -> frozenset[object]:
         """What there is to see of an instance, its index left out: inside, aspects, and where it is connected to."""
@@ -185,87 +154,83 @@ class _Outliner:
             parts, whole = [], instance
             for part in path[len(instance) :].split("."):
                 whole = f"{whole}.{part}" if part else whole
-                parts.append(part if self._folded(whole) is None else part.partition("[")[0] + "[*]")
+                parts.append(part.partition("[")[0] + "[*]" if whole in self.alike else part)
             return ".".join(parts)
 
         def beside(path: str) -> str:
             """A port next to the instance: in arrays that are one box, only "the same index" or another counts."""
             owner, _, port = path.rpartition(".")
-            array = self._folded(owner)
-            if array is None or owner == _owner(instance):
+            if owner not in self.alike or owner == _owner(instance):
                 return path
-            return f"{array}[{'=' if owner.rpartition('[')[2] == index else '#'}].{port}"
+            array, _, other = owner.rpartition("[")
+            return f"{array}[{'=' if other == index else '#'}].{port}"
 
         seen: set[object] = set()
         waiting = [instance]
         while waiting:
             path = waiting.pop()
-            seen.add((inside(path), self._kind(path), len(self.children[path])))
-            for place in (path, *self.ports[path]):
-                names = [inside(n) if _is_within(n, instance) else n for n in self.standing.get(place, ())]
+            children = self._children(path)
+            seen.add((inside(path), self._kind(path), len(children)))
+            for place in (path, *chain(*self._ports(path))):
+                names = [inside(n) if n.startswith(f"{instance}.") else n for n in self.standing.get(place, ())]
                 seen.add((inside(place), *names))
             seen.update((inside(hop.source), inside(hop.destination), hop.delay) for hop in self.hops.get(path, ()))
-            waiting += self.children[path]
+            waiting += children
         for hop in self.outside.get(instance, ()):
             ends = [inside(end) if _owner(end) == instance else beside(end) for end in (hop.source, hop.destination)]
             seen.add((*ends, hop.delay, "outside"))
         return frozenset(seen)
 
+    def _children(self, path: str) -> list[str]:
+        return list(chain.from_iterable(self.graph.parts(path).values()))
+
+    def _ports(self, path: str) -> tuple[list[str], list[str]]:
+        """The inputs and outputs of an actor or composite."""
+        actor = self.graph.actors.get(path)
+        if actor is None:
+            return self.graph.borders(path)
+        return [port.path for port in actor.inputs.values()], [port.path for port in actor.outputs.values()]
+
     def _kind(self, path: str) -> str:
         actor = self.graph.actors.get(path)
         return self.graph.composites.get(path, "") if actor is None else type(actor).__name__
 
-    # -- boxes ----------------------------------------------------------------------------------------------------
-
-    def outline(self, depth: int | None) -> Outline:
-        """The outline to a depth, or to one that a reader can take in."""
-        levels = self._levels("")
-        if depth is None:
-            depth = next((deep for deep in range(levels, 0, -1) if self._size("", deep) <= MANY), 0)
-        return Outline(self.model, self._box("", depth), depth, levels)
-
-    def _drawn(self, path: str) -> Iterator[tuple[str, int]]:
-        """The boxes directly inside a composite, and how many instances each stands for."""
-        for child in self.children[path]:
-            instances = self._instances(child)
-            if child == instances[0]:
-                yield child, len(instances)
-
-    def _levels(self, path: str) -> int:
-        """How deep composites are nested in a composite."""
-        inner = [child for child, _ in self._drawn(path) if child in self.graph.composites]
-        return max((1 + self._levels(child) for child in inner), default=0)
-
-    def _size(self, path: str, depth: int) -> int:
-        """How many boxes a drawing to this depth has."""
-        return sum(1 + (self._size(child, depth - 1) if depth > 0 else 0) for child, _ in self._drawn(path))
-
-    def _box(self, path: str, depth: int, count: int = 1) -> Box:
-        name = path.rpartition(".")[2]
+    def box(self, path: str) -> Box:
+        name, count = path.rpartition(".")[2], len(self._instances(path))
         if count > 1:
             name = f"{name.partition('[')[0]}[0..{count - 1}]"
         box = Box(path, name, self._kind(path), count=count, is_composite=path not in self.graph.actors)
         if path in self.graph.clocks:
             box.has_director = bool(path)
             box.kind += _clock(self.graph.clocks[path])
-        for port_path in self.ports.get(path, ()):
-            port = self.graph.ports.nodes[port_path]["port"]
-            is_multi = isinstance(port, InputPort | OutputPort) and port.multi
-            if not (self.graph.incoming(port_path) or port_path in self.standing) and _is_parameter(port):
-                continue
-            aspects = tuple(short_name(name) for name in self.standing.get(port_path, ()))
-            ports = box.inputs if self.graph.direction(port_path) == "input" else box.outputs
-            ports.append(Port(port_path, port_path.rpartition(".")[2], is_multi, aspects))
-        if not box.is_composite:
-            box.aspects = tuple(map(short_name, self.standing.get(path, ())))
-        elif path and depth == 0:
-            box.is_closed = True
-            within = (each for each in self.model.aspects if any(_is_within(at, path) for at in _disturbed(each)))
-            box.aspects = tuple(dict.fromkeys(short_name(each.name) for each in within))
+        for side, paths in zip((box.inputs, box.outputs), self._ports(path), strict=True):
+            for port_path in paths:
+                port = self.graph.ports.nodes[port_path]["port"]
+                # That of a parameter need not be seen unless something is there.
+                is_parameter = port is not None and isinstance(
+                    getattr(type(port.actor), port.name, None), PortParameter
+                )
+                if not is_parameter or self.graph.incoming(port_path) or port_path in self.standing:
+                    is_multi = isinstance(port, InputPort | OutputPort) and port.multi
+                    side.append(Port(port_path, port_path.rpartition(".")[2], is_multi, self._aspects_at(port_path)))
+        if box.is_composite:
+            children = (child for child in self._children(path) if child == self._instances(child)[0])
+            box.children, box.links = [self.box(child) for child in children], self._links(path)
         else:
-            box.children = [self._box(child, depth - 1 if path else depth, n) for child, n in self._drawn(path)]
-            box.links = self._links(path)
+            box.aspects = self._aspects_at(path)
         return box
+
+    def _aspects_at(self, path: str) -> tuple[str, ...]:
+        return tuple(map(short_name, self.standing.get(path, ())))
+
+    def aspects_within(self, composite: str) -> tuple[str, ...]:
+        names = (
+            short_name(woven.name)
+            for woven in self.model.aspects
+            for path in (*map(_owner, (*woven.ports, *woven.parameters)), *woven.actors)
+            if path.startswith(f"{composite}.")
+        )
+        return tuple(dict.fromkeys(names))
 
     def _links(self, path: str) -> list[Link]:
         """The connections inside a composite; those of instances that are one box are one link."""
@@ -287,8 +252,7 @@ class _Outliner:
 
     def _instances(self, path: str) -> list[str]:
         """The instances for which the box of an actor or composite stands."""
-        array = self._folded(path)
-        return [path] if array is None else self.arrays[array]
+        return self.alike.get(path, [path])
 
     def _shown(self, port: str) -> str:
         """The port that is drawn for a port."""
@@ -322,19 +286,5 @@ def _clock(clock: Clock) -> str:
     return f", clock {' '.join(parts)}" if parts else ""
 
 
-def _is_parameter(port: Any) -> bool:
-    """Whether a port is that of a parameter, and need not be seen unless something is connected to it."""
-    return port is not None and isinstance(getattr(type(port.actor), port.name, None), PortParameter)
-
-
-def _disturbed(woven: WovenAspect) -> list[str]:
-    """The actors and composites at which, or at whose ports and parameters, an aspect stands."""
-    return [*map(_owner, (*woven.ports, *woven.parameters)), *woven.actors]
-
-
 def _owner(path: str) -> str:
     return path.rpartition(".")[0]
-
-
-def _is_within(path: str, composite: str) -> bool:
-    return path.startswith(f"{composite}.")

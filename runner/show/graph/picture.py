@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import networkx as nx
 
-from ...graph import extent
-from ..pen import new_canvas, save, style
-from . import text
-from .layout import MARGIN, PILL_HEIGHT, Drawing, Line, PlacedBox, Point, Words, pill_width
+from ...graph import WovenAspect, extent
+from ..pen import font, new_canvas, save, style, text_width
+from .layout import MARGIN, PILL, PILL_HEIGHT, PORT, Drawing, Line, PlacedBox, Point, Wire, Words, pill_width
 from .outlines import duration, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
@@ -26,54 +25,47 @@ ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0
 DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
 # Of a PNG: whole pixels for a point, so that lines are sharp; how many pixels there may be, and on one side.
 DPI, PIXELS, SIDE = (288, 144, 72), 4e7, 30000
+LINE = 15.0  # height of a line of the legend
 
 
 def write_picture(drawing: Drawing, path: Path) -> None:
     """Draw into a file, whose ending decides the format; the same drawing gives the same bytes."""
-    legend = _legend(drawing)
-    width = max([drawing.width, *(row.width + 2 * MARGIN for row in legend)])
-    height = drawing.height + sum(row.height for row in legend) + (MARGIN if legend else 0.0)
+    seen = {pill.aspect for pill in drawing.pills}
+    aspects: dict[str, list[WovenAspect]] = {}  # in the order of their declaration
+    for woven in drawing.outline.model.aspects:
+        if (name := short_name(woven.name)) in seen:
+            aspects.setdefault(name, []).append(woven)
+    legend = _legend(drawing, aspects)
+    width = max([drawing.width, *(row.indent + text_width(row.explanation, PORT) + 2 * MARGIN for row in legend)])
+    height = drawing.height + LINE * len(legend) + (MARGIN if legend else 0.0)
+    most = 72 * min(SIDE / max(width, height), math.sqrt(PIXELS / (width * height)))
     with style({"path.simplify": False}):
         canvas = new_canvas(width / 72, height / 72)
         sheet = canvas.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
         sheet.set_axis_off()
-        _Painter(sheet, drawing, legend).paint()
-        save(canvas, path, dpi=_resolution(width, height), facecolor="white")
+        colours = dict(zip(aspects, cycle(ASPECTS), strict=False))
+        _Painter(sheet, colours).paint(drawing, legend)
+        save(canvas, path, dpi=next((dpi for dpi in DPI if dpi <= most), most), facecolor="white")
 
 
-def _resolution(width: float, height: float) -> float:
-    """The dots per inch of a PNG."""
-    most = 72 * min(SIDE / max(width, height), math.sqrt(PIXELS / (width * height)))
-    return next((dpi for dpi in DPI if dpi <= most), most)
-
-
-@dataclass
-class Row:
+class Row(NamedTuple):
     """A line of the legend: a sample of something in the drawing, and what it means."""
 
     sample: str  # aspect, label, port, stack, director or closed
     words: str
     explanation: str
 
-    height = 15.0
-
     @property
     def indent(self) -> float:
-        """The width of the sample."""
-        return pill_width(self.words) if self.words else 14.0
-
-    @property
-    def width(self) -> float:
-        """The width of the whole line."""
-        return self.indent + 6.0 + text.width(self.explanation, text.PORT)
+        """Where the explanation begins, beside the sample."""
+        return 6.0 + (pill_width(self.words) if self.words else 14.0)
 
 
-def _legend(drawing: Drawing) -> list[Row]:
+def _legend(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[Row]:
     """What needs to be explained of a drawing."""
     boxes = [placed.box for placed in drawing.boxes]
     rows = []
-    for name in _aspects(drawing):
-        woven = [each for each in drawing.outline.model.aspects if short_name(each.name) == name]
+    for name, woven in aspects.items():
         kinds = ", ".join(dict.fromkeys(each.kind for each in woven))
         rows.append(Row("aspect", name, f"aspect {kinds}, at {extent(woven)}"))
     delay = next((pill.delay for pill in drawing.pills if pill.delay is not None), None)
@@ -88,43 +80,29 @@ def _legend(drawing: Drawing) -> list[Row]:
     return rows + [Row(sample, "", explanation) for sample, (explanation, is_seen) in signs.items() if is_seen]
 
 
-def _aspects(drawing: Drawing) -> list[str]:
-    """The aspects that are seen, in the order of their declaration."""
-    seen = {pill.aspect for pill in drawing.pills}
-    names = dict.fromkeys(short_name(woven.name) for woven in drawing.outline.model.aspects)
-    return [name for name in names if name in seen]
-
-
 class _Painter:
-    """Paints a drawing and its legend on matplotlib axes, what lies below first."""
+    """Paints on matplotlib axes."""
 
-    def __init__(self, sheet: Any, drawing: Drawing, legend: list[Row]) -> None:
+    def __init__(self, sheet: Any, colours: dict[str, str]) -> None:
         from matplotlib import patches
 
         self.sheet = sheet
         self.shapes = patches
-        self.drawing = drawing
-        self.legend = legend
-        self.colours = {name: ASPECTS[place % len(ASPECTS)] for place, name in enumerate(_aspects(drawing))}
+        self.colours = colours  # of aspects
 
-    def paint(self) -> None:
-        """Paint everything."""
-        for placed in self.drawing.boxes:
+    def paint(self, drawing: Drawing, legend: list[Row]) -> None:  # what lies below first
+        for placed in drawing.boxes:
             self.box(placed)
-        self.wires()
-        for placed in self.drawing.boxes:
+        self.wires(drawing.wires)
+        for placed in drawing.boxes:
             for port in placed.ports:
                 self.port(port.x, port.y, INK if port.is_joined else FAINT, port.port.is_multi)
-        for words in self.drawing.words:
+        for words in drawing.words:
             self.words(words)
-        for pill in self.drawing.pills:
+        for pill in drawing.pills:
             self.pill(pill.text, pill.aspect, pill.x, pill.y)
-        y = self.drawing.height + MARGIN / 2
-        for row in self.legend:
-            self.row(row, MARGIN, y)
-            y += row.height
-
-    # -- parts ----------------------------------------------------------------------------------------------------
+        for number, row in enumerate(legend):
+            self.row(row, MARGIN, drawing.height + MARGIN / 2 + LINE * (number + 0.5))
 
     def box(self, placed: PlacedBox) -> None:
         """A box: white for an actor, shaded for a composite, doubled if that has a director."""
@@ -144,9 +122,8 @@ class _Painter:
         """A box with round corners."""
         style = f"round,pad=0,rounding_size={radius:g}"
         look = {"linewidth": 1.0, **look}
-        self.sheet.add_artist(
-            self.shapes.FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, **look)
-        )
+        box = self.shapes.FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, **look)
+        self.sheet.add_artist(box)
 
     def closed(self, x: float, y: float) -> None:
         """The sign of a composite that is drawn closed."""
@@ -158,9 +135,9 @@ class _Painter:
         look: Any = {"facecolor": "white" if is_multi else ink, "edgecolor": ink, "linewidth": 0.8, "zorder": 3}
         self.sheet.add_artist(self.shapes.Rectangle((x - 2.2, y - 2.2), 4.4, 4.4, **look))
 
-    def wires(self) -> None:
+    def wires(self, wires: Iterable[Wire]) -> None:
         """All lines, dots where one branches, and arrowheads where they end."""
-        wires, look = self.drawing.wires, {"facecolor": INK, "edgecolor": "none", "zorder": 2.5}
+        look: Any = {"facecolor": INK, "edgecolor": "none", "zorder": 2.5}
         # Lines that share a port lie on each other in part: painted as one, they are no darker there.
         graph: Any = nx.Graph()
         for wire in wires:
@@ -197,24 +174,13 @@ class _Painter:
         fill, half, width = self.colours[aspect] if aspect else "white", PILL_HEIGHT / 2, pill_width(words)
         self.rectangle(x, y - half, width, PILL_HEIGHT, fill, half, linewidth=0.6, zorder=4)
         ink = "white" if fill in DARK else INK
-        self.words(Words(words, x + width / 2, y + 0.35 * text.PILL, text.PILL, align="center"), ink)
+        self.words(Words(words, x + width / 2, y + 0.35 * PILL, PILL, align="center"), ink)
 
     def words(self, words: Words, colour: str = "") -> None:
-        """A line of text."""
-        self.sheet.text(
-            words.x,
-            words.y,
-            words.text,
-            color=colour or (SOFT if words.is_soft else INK),
-            fontproperties=text.font(words.size, words.bold),
-            ha=words.align,
-            va="baseline",
-            zorder=5,
-        )
+        look = {"color": colour or (SOFT if words.is_soft else INK), "ha": words.align, "va": "baseline", "zorder": 5}
+        self.sheet.text(words.x, words.y, words.text, fontproperties=font(words.size, words.bold), **look)
 
-    def row(self, row: Row, x: float, y: float) -> None:
-        """A line of the legend."""
-        middle = y + row.height / 2
+    def row(self, row: Row, x: float, middle: float) -> None:
         if row.sample == "stack":
             for step in (2, 1, 0):
                 self.rectangle(x + step, middle - 4.0 + 1.7 * step, 13.0 - 2 * step, 6.0, "white")
@@ -227,7 +193,7 @@ class _Painter:
             self.closed(x + 3.0, middle - 3.5)
         else:
             self.pill(row.words, row.words if row.sample == "aspect" else "", x, middle)
-        self.words(Words(row.explanation, x + row.indent + 6.0, middle + 0.35 * text.PORT, text.PORT))
+        self.words(Words(row.explanation, x + row.indent, middle + 0.35 * PORT, PORT))
 
 
 def _towards(start: Point, end: Point, way: float) -> Point:

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from .layers import Cell, Layering, Pin, Run
+from .layers import Cell, Layers, Pin, Run, Runs, closing
 
 Floats = NDArray[np.float64]
 
@@ -28,21 +28,20 @@ BOX_GAP, LINE_GAP, PORT_GAP = 20.0, 12.0, 4.0
 APART = 6.0  # lines nearer than this look like one
 
 
-def place(layering: Layering) -> float:
+def place(layers: Layers, runs: Runs) -> float:
     """Set the ``y`` of every cell; the height of all of them."""
-    cells = [cell for layer in layering.layers for cell in layer]
+    cells = [cell for layer in layers for cell in layer]
     if not cells:
         return 0.0
     number = {cell: index for index, cell in enumerate(cells)}
     gaps = [
         (number[above], number[below], above.height + _gap(above, below))
-        for layer in layering.layers
+        for layer in layers
         for above, below in pairwise(layer)
     ]
     pulls = [
         (number[one.cell], number[other.cell], other.offset - one.offset, weight)
-        for runs in layering.runs
-        for run in runs
+        for run in chain.from_iterable(runs)
         for one, other, weight in _pulls(run)
         if one.cell is not other.cell
     ]
@@ -107,6 +106,7 @@ class Trunk:
     left: list[float]
     right: list[float]
     track: int = 0
+    x: float = 0.0  # of its track
     low: float = field(init=False)
     high: float = field(init=False)
 
@@ -126,8 +126,8 @@ def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
     trunks: list[Trunk] = []
     taken: set[float] = set()
     for group in groups.values():
-        left = [_height(pin) for run in group for pin in run.left]
-        right = sorted({_height(pin) for run in group for pin in run.right})
+        left = [pin.y for run in group for pin in run.left]
+        right = sorted({pin.y for run in group for pin in run.right})
         taken.update(left, right)
         if len({*left, *right}) > 1:
             trunks.append(Trunk(tuple(group), left, right))
@@ -141,10 +141,6 @@ def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
     for index in nx.topological_sort(graph):
         trunks[index].track = max((trunks[before].track + 1 for before in graph.predecessors(index)), default=0)
     return trunks, max((trunk.track + 1 for trunk in trunks), default=0)
-
-
-def _height(pin: Pin) -> float:
-    return pin.cell.y + pin.offset
 
 
 def _free_height(taken: list[float], wanted: float) -> float:
@@ -194,11 +190,8 @@ def _precedence(trunks: list[Trunk]) -> Any:
             saved = _crossings(b, a) - _crossings(a, b)
             wishes.append((saved, one, other) if saved >= 0 else (-saved, other, one))
     wishes.sort(key=lambda wish: (-wish[0], *wish[1:]))
-    every = graph.copy()
-    every.add_edges_from((one, other) for _, one, other in wishes)
-    knot = {index: number for number, knot in enumerate(nx.strongly_connected_components(every)) for index in knot}
-    for _, one, other in wishes:
-        closes = knot[one] == knot[other] and nx.has_path(graph, other, one)
+    pairs = [wish[1:] for wish in wishes]
+    for (one, other), closes in zip(pairs, closing(graph, pairs), strict=True):
         graph.add_edge(*((other, one) if closes else (one, other)))
     return graph
 

@@ -1,8 +1,24 @@
-"""The report of a study: figures, tables, claims, on one page."""
+"""The report of a study: runs are repeated for its figures, these are drawn, and all is put on one page."""
 
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import EpicycleError, abridged
+
+from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
+from ...text import ModelError, Problems, describe, raised_at
+from ..outcome import MAX_NAME
+from ..pen import FORMATS, FigureError, style
+from .data import Data
 from .declared import check_figures, figures_of_study, study_figure_types
-from .figure import SignalFigure, StudyFigure
-from .write import Report, write_report
+from .figure import RunKey, SignalFigure, StudyFigure
+from .page import Picture, report_page
 
 __all__ = [
     "Report",
@@ -13,3 +29,104 @@ __all__ = [
     "study_figure_types",
     "write_report",
 ]
+
+
+@dataclass
+class Report:
+    """What was written, and what could not be."""
+
+    files: list[Path] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    verdicts: Counter[str] = field(default_factory=Counter)
+
+
+def write_report(
+    results: StudyResults, folder: Path, *, jobs: int, tell: Callable[[int, int], None] = lambda done, total: None
+) -> Report:
+    """Write ``report.html``, ``figures/`` and, if the study has claims, ``claims.json`` into a folder.
+
+    ``tell`` is told how many of the runs that figures need are repeated.
+    What keeps a figure from being drawn is a problem of the report, and stands in its place.  Raises ``ModelError`` for
+    figures that the study cannot have.
+    """
+    report = Report()
+    data = Data(results)
+    problems = Problems()
+    figures = figures_of_study(data.plan, problems)
+    problems.raise_if_any()
+    extracts = _extracts(data, figures, jobs, tell)
+    pictures = []
+    place = folder / "figures"
+    place.mkdir(parents=True, exist_ok=True)
+    for name, figure in figures.items():
+        paths = [place / f"{abridged(name, MAX_NAME)}.{ending}" for ending in FORMATS]
+        for path in paths:
+            path.unlink(missing_ok=True)  # of an earlier report
+        try:
+            caption = _draw(name, figure, data, extracts.get(name, {}), paths)
+        except EpicycleError as error:
+            report.problems.append(f"figure {name}: {error}")
+            pictures.append(Picture(name, figure.doc, None, str(error)))
+        else:
+            report.files += paths
+            pictures.append(Picture(name, figure.doc, paths[FORMATS.index("svg")].read_bytes(), caption))
+    judgements, recommendations = results.claims(), results.guideline()
+    texts = {}
+    if judgements or recommendations:
+        found = {
+            "study": data.plan.study.name,
+            "table": results.digest(),
+            "claims": [each.as_dict() for each in judgements],
+            "standings": [each.as_dict() for each in ranked(judgements)],
+            "guideline": [each.as_dict() for each in recommendations],
+        }
+        texts["claims.json"] = json.dumps(found, indent=1) + "\n"
+    texts["report.html"] = report_page(data, pictures, judgements, recommendations)
+    for name, text in texts.items():
+        path = folder / name
+        replace_file(path, text.encode())
+        report.files.append(path)
+    report.verdicts = Counter(each.verdict for each in judgements)
+    return report
+
+
+def _draw(name: str, figure: StudyFigure, data: Data, extracts: Mapping[RunKey, Any], paths: list[Path]) -> str:
+    """Draw a figure into files; what is to be said of it.  Raises ``EpicycleError``."""
+    for extract in extracts.values():
+        if isinstance(extract, EpicycleError):
+            raise extract
+    if not any(condition.good for condition in data.where(figure.where)):
+        raise EpicycleError("none of the runs that it shows is there")
+    try:
+        with style():
+            return figure.draw(data, extracts, paths)
+    except EpicycleError:
+        raise
+    except Exception as error:  # of a class of a user's
+        raise FigureError(name, describe(error), raised_at(error)) from error
+
+
+def _extracts(
+    data: Data, figures: Mapping[str, StudyFigure], jobs: int, tell: Callable[[int, int], None]
+) -> dict[str, dict[RunKey, Any]]:
+    """What figures need of runs that are repeated, by figure and run; or an error that says why these cannot be."""
+    wanted: dict[str, list[RunKey]] = {}
+    readers: dict[RunKey, list[tuple[str, SignalFigure]]] = {}
+    for name, figure in figures.items():
+        if isinstance(figure, SignalFigure):
+            wanted[name] = figure.runs_of(data)
+            for run in wanted[name]:
+                readers.setdefault(run, []).append((name, figure))
+    rows = {(row["condition"], row["replication"]): row for row in data.rows}
+    replays = [Replay(*run, rows[run]["seed"], rows[run]["digest"], tuple(each)) for run, each in readers.items()]
+    found: dict[str, dict[RunKey, Any]] = {name: {} for name in wanted}
+    try:
+        if replays:
+            plan_of_folder(data.results.folder)  # which says so if the model has changed
+            for replay, extracts in repeat(data.plan, replays, jobs, lambda number: tell(number, len(replays))):
+                for name, extract in extracts.items():
+                    found[name][replay.condition, replay.replication] = extract
+    except EpicycleError as error:
+        why = EpicycleError("its model cannot be loaded any more") if isinstance(error, ModelError) else error
+        return {name: dict.fromkeys(runs, why) for name, runs in wanted.items()}
+    return found

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 from epicycle.actors import abridged, visible
 
 from ...language import Factor
 from ...shown import in_words, rounded
-from ...study import OK, Estimate, Plan, StudyResults
+from ...study import OK, Column, Estimate, Plan, StudyResults
 
 MAX_LISTED = 12  # levels in a message
 MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level
@@ -23,7 +25,7 @@ class Condition:
 
     index: int
     values: dict[str, Factor]
-    rows: list[dict[str, Any]] = field(default_factory=list)  # by replication
+    rows: list[dict[str, Any]]  # by replication
 
     @property
     def good(self) -> list[dict[str, Any]]:
@@ -42,23 +44,17 @@ class Data:
     def __init__(self, results: StudyResults) -> None:
         self.results = results.freeze()
         self.plan = results.plan
-        self.names = Names(results.plan)
+        self.names = Names(results.plan, {})
+        self.rows = results.table().to_pylist()  # by condition and replication
         self.conditions: dict[int, Condition] = {}
-        for row in results.table().to_pylist():
-            index = row["condition"]
-            if index not in self.conditions:
-                self.conditions[index] = Condition(index, self.plan.condition(index).values)
-            self.conditions[index].rows.append(row)
+        for index, rows in groupby(self.rows, key=itemgetter("condition")):
+            self.conditions[index] = Condition(index, self.plan.condition(index).values, [*rows])
 
-    @property
-    def rows(self) -> Iterable[dict[str, Any]]:
-        """All runs, by condition and replication."""
-        return (row for condition in self.conditions.values() for row in condition.rows)
-
-    def where(self, fixed: Mapping[str, object]) -> list[Condition]:
+    def where(self, fixed: Mapping[str, Any]) -> list[Condition]:
         """The conditions that have these levels."""
+        allowed = {name: levels if isinstance(levels, (list, tuple)) else (levels,) for name, levels in fixed.items()}
         return [
-            each for each in self.conditions.values() if all(_is_in(each.values[name], fixed[name]) for name in fixed)
+            each for each in self.conditions.values() if all(each.values[name] in allowed[name] for name in allowed)
         ]
 
     def levels(
@@ -71,34 +67,25 @@ class Data:
         return sorted(found, key=order.index) if isinstance(order, list) else found
 
 
-def _is_in(value: Factor, levels: object) -> bool:
-    return value in levels if isinstance(levels, (list, tuple)) else value == levels
-
-
+@dataclass(frozen=True)
 class Names:
     """How columns and levels are called in tables and figures."""
 
-    def __init__(self, plan: Plan, labels: Mapping[str, str] | None = None) -> None:
-        self._plan = plan
-        self._labels = dict(labels or {})
-
-    def called(self, labels: Mapping[str, str]) -> Names:
-        """The same with further names for some columns."""
-        return Names(self._plan, {**self._labels, **labels})
+    plan: Plan
+    labels: Mapping[str, str]
 
     def unit(self, column: str) -> str:
         """What a column counts in; nothing for a pure number."""
-        found = self._plan.columns.get(column)
-        return "" if found is None or found.unit == "1" else found.unit
+        unit = self.plan.columns.get(column, Column()).unit
+        return "" if unit == "1" else unit
 
     def doc(self, column: str) -> str:
         """What a column is."""
-        found = self._plan.columns.get(column)
-        return "" if found is None else found.doc
+        return self.plan.columns.get(column, Column()).doc
 
     def words(self, column: str) -> str:
         """A column's name, to be read."""
-        return abridged(self._labels.get(column) or column.replace("_", " "), MAX_LABEL)
+        return abridged(self.labels.get(column) or column.replace("_", " "), MAX_LABEL)
 
     def axis(self, column: str) -> str:
         """What stands at an axis: the name with its unit."""
@@ -107,9 +94,8 @@ class Names:
 
     def level(self, column: str, value: Factor) -> str:
         """A level with its unit: ``5 m``."""
-        text = shown(value)
-        unit = self.unit(column)
-        return f"{text} {unit}" if unit and _is_number(value) else text
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return f"{shown(value)} {self.unit(column)}".rstrip() if is_number else shown(value)
 
     def place(self, values: Mapping[str, Factor]) -> str:
         """Some levels: ``measurement range: 5 m, disturbance: 0``."""
@@ -127,10 +113,6 @@ def estimated(estimate: Estimate) -> str:
     if estimate.count == 0 or not math.isfinite(width) or width == 0:
         return rounded(estimate.value, width)
     return f"{rounded(estimate.value, width)} ± {rounded(width / 2, width)}"
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def is_numeric(plan: Plan, factor: str) -> bool:

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 from epicycle.actors import UnitError, variants
 
-from ...build import Complaint, Model, made_figure, place_in_figure, tell_of_figure
+from ...build import Complaint, made_figure, place_in_figure, tell_of_figure
 from ...language import in_si, split_number
 from ...study import Plan
 from ...text import Mapping, Node, Problems, Sequence, plain
@@ -30,7 +30,20 @@ def check_figures(plan: Plan) -> None:
     models = [plan.load(plan.condition(index)) for index in sorted({0, plan.conditions - 1})] if drawn else []
     for name, figure in drawn.items():
         part = (plan.study.figures or {})[name]
-        _check_signals(name, figure, models, Mapping(part.values, part.type.position), problems)
+        written = Mapping(part.values, part.type.position)
+        complaint = next(figure.check_model(models[0]), None)
+        if complaint is not None:
+            tell_of_figure(complaint, name, written, problems)
+            continue
+        patterns = [(key, pattern) for key in figure.signal_parameters for pattern in figure.named(key)]
+        for key, pattern in patterns:
+            position = place_in_figure(Complaint(key, "", key=pattern), written)
+            tried = [Problems() for _ in models]
+            for model, told in zip(models, tried, strict=True):
+                model.outputs(pattern, f"figure {name}", position, told)
+            if all(len(told) for told in tried):
+                for problem in tried[0].found:
+                    problems.add(problem.message, problem.position, *problem.help)
     problems.raise_if_any()
 
 
@@ -62,22 +75,6 @@ def _levels(node: Node, plan: Plan, factor: str) -> object:
         if parts is not None and parts[1]:
             return in_si(float(parts[0]), parts[1])
     return plain(node)
-
-
-def _check_signals(name: str, figure: SignalFigure, models: list[Model], written: Mapping, problems: Problems) -> None:
-    """Tell what is wrong with a figure in all of the models."""
-    for complaint in figure.check_model(models[0]):
-        tell_of_figure(complaint, name, written, problems)
-        return
-    patterns = [(key, pattern) for key in figure.signal_parameters for pattern in figure.named(key)]
-    for key, pattern in patterns:
-        position = place_in_figure(Complaint(key, "", key=pattern), written)
-        tried = [Problems() for _ in models]
-        for model, told in zip(models, tried, strict=True):
-            model.outputs(pattern, f"figure {name}", position, told)
-        if all(len(told) for told in tried):
-            for problem in tried[0].found:
-                problems.add(problem.message, problem.position, *problem.help)
 
 
 def default_figures(plan: Plan) -> dict[str, StudyFigure]:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
 
@@ -31,8 +30,7 @@ _NAMED = {
 RunKey = tuple[int, int]  # a condition's number, and a replication
 
 
-@dataclass
-class Roles:
+class Roles(NamedTuple):
     """What each factor is for in a figure: along the axis, a line, a panel."""
 
     over: str | None
@@ -76,22 +74,14 @@ class StudyFigure(Configurable):
         return (value,) if isinstance(value, str) else tuple(value)
 
     def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
-        """Its panels and lines."""
-        over, lines = (next(iter(self.named(parameter)), None) for parameter in ("over", "lines"))
-        found = roles(data.plan, self.where, over if has_axis else None, lines, self.named("panels"), has_axis=has_axis)
-        return layout(data, self, found)
+        over = getattr(self, "over", None) if has_axis else None
+        lines = getattr(self, "lines", "")  # a figure that has no such parameter draws one line a panel
+        found = roles(data.plan, self.where, over, lines, self.named("panels"), has_axis=has_axis)
+        return Layout(data, self, found)
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         """Write the figure to the files, and return what is to be said of it; ``extracts`` are of repeated runs."""
         raise NotImplementedError
-
-    def conditions(self, data: Data) -> list[Condition]:
-        """The conditions to which the figure keeps."""
-        return data.where(self.where)
-
-    def names(self, data: Data) -> Names:
-        """How it calls columns."""
-        return data.names.called(self.labels)
 
 
 class SignalFigure(StudyFigure):
@@ -121,7 +111,7 @@ def _has(dimension: Dimension, factor: str, level: Any) -> bool:
         if len(dimension.columns) == 1:
             return dimension.find({factor: level}) is not None
         return any(dimension.level(index).values[factor] == level for index in range(dimension.size))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):  # what is no number, or no finite one
         return False
 
 
@@ -154,28 +144,46 @@ def roles(
     return Roles(over, lines, (*panels, *free))
 
 
-@dataclass
-class Panel:
+class Panel(NamedTuple):
     """One panel: its conditions, by the level of its lines."""
 
     title: str
     lines: dict[Factor, list[Condition]]
 
 
-@dataclass
 class Layout:
-    """All panels, what their lines are, and what had to be left out of them; then what the legend shows."""
+    """The conditions of a figure, sorted into panels and lines; then what the legend shows.
 
-    roles: Roles
-    names: Names
-    panels: list[Panel]
-    levels: list[Factor]
-    omitted: str
-    columns: int | None
-    handles: dict[str, Any] = field(default_factory=dict)
+    More than can be told apart are left out, which ``omitted`` says.
+    """
+
+    def __init__(self, data: Data, figure: StudyFigure, found: Roles) -> None:
+        self.roles = found
+        self.names = Names(data.plan, figure.labels)
+        self.chosen = data.where(figure.where)
+        self.handles: dict[str, Any] = {}
+        levels: list[Factor] = data.levels(found.lines, self.chosen, figure.where) if found.lines else [None]
+        choices = [data.levels(name, self.chosen, figure.where) for name in found.panels]
+        panels = []
+        for combination in product(*choices):
+            place = dict(zip(found.panels, combination, strict=True))
+            if here := [each for each in self.chosen if place.items() <= each.values.items()]:
+                by_line = {
+                    level: [each for each in here if not found.lines or each.values[found.lines] == level]
+                    for level in levels[:MAX_LINES]
+                }
+                panels.append(Panel(self.names.place(place), by_line))
+        omitted = []
+        if len(levels) > MAX_LINES:
+            omitted.append(f"Of {len(levels)} lines the first {MAX_LINES} are shown.")
+        if len(panels) > MAX_PANELS:
+            omitted.append(f"Of {counted(len(panels), 'panel')} the first {MAX_PANELS} are shown.")
+        self.omitted = " ".join(omitted)
+        self.panels, self.levels = panels[:MAX_PANELS], levels[:MAX_LINES]
+        # Two factors make rows and columns.
+        self.columns = len(choices[1]) if len(choices) == 2 and 1 < len(choices[1]) <= 4 else None
 
     def sheet(self, **look: Any) -> Sheet:
-        """A sheet with these panels."""
         return Sheet(**{"panels": [panel.title for panel in self.panels] or [""], "columns": self.columns, **look})
 
     def show(self, level: Factor, handle: Any) -> None:
@@ -183,33 +191,9 @@ class Layout:
         if self.roles.lines:
             self.handles.setdefault(self.names.level(self.roles.lines, level), handle)
 
-    def finish(self, sheet: Sheet, paths: Sequence[Path]) -> None:
-        """Add the legend, and write the files."""
+    def finish(self, sheet: Sheet, paths: Sequence[Path], *said: str) -> str:
+        """Add the legend, and write the files; what is said of the figure, and of what is left out of it."""
         title = self.names.words(self.roles.lines) if self.roles.lines else ""
         sheet.legend(list(self.handles.values()), list(self.handles), title)
         sheet.save(paths)
-
-
-def layout(data: Data, figure: StudyFigure, found: Roles) -> Layout:
-    """Sort conditions into panels and lines; more than can be told apart are left out, and it is said."""
-    names, chosen = figure.names(data), figure.conditions(data)
-    levels: list[Factor] = data.levels(found.lines, chosen, figure.where) if found.lines else [None]
-    choices = [data.levels(name, chosen, figure.where) for name in found.panels]
-    panels = []
-    for combination in product(*choices):
-        place = dict(zip(found.panels, combination, strict=True))
-        here = [each for each in chosen if all(each.values[name] == level for name, level in place.items())]
-        if here:
-            by_line = {
-                level: [each for each in here if not found.lines or each.values[found.lines] == level]
-                for level in levels[:MAX_LINES]
-            }
-            panels.append(Panel(names.place(place), by_line))
-    omitted = []
-    if len(levels) > MAX_LINES:
-        omitted.append(f"Of {len(levels)} lines the first {MAX_LINES} are shown.")
-    if len(panels) > MAX_PANELS:
-        omitted.append(f"Of {counted(len(panels), 'panel')} the first {MAX_PANELS} are shown.")
-    # Two factors make rows and columns.
-    columns = len(choices[1]) if len(choices) == 2 and 1 < len(choices[1]) <= 4 else None
-    return Layout(found, names, panels[:MAX_PANELS], levels[:MAX_LINES], " ".join(omitted), columns)
+        return " ".join(filter(None, (*said, self.omitted)))

@@ -28,11 +28,10 @@ from ...catalogue import Figure
 from ...results import Results
 from ...study import Plan, half_width
 from ...text import Problems
-from ..drawing import draw
 from ..figures import positions, selected
-from ..pen import DASHES, FORMATS, PALETTE
-from .data import Condition, Data
-from .figure import Layout, Roles, RunKey, SignalFigure, layout, roles
+from ..pen import DASHES, FORMATS, PALETTE, draw
+from .data import Condition, Data, Names
+from .figure import RunKey, SignalFigure
 
 TOKEN = "token"
 MOST, LEAST = "most", "least"
@@ -105,9 +104,8 @@ class Series(RepeatedFigure):
                     axes.fill_between(times, means - halves, means + halves, color=colour, alpha=0.18, linewidth=0)
                     arranged.show(level, line)
         sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
-        arranged.finish(sheet, paths)
         said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"
-        return f"{said}, as long as half of them go on. {arranged.omitted}".rstrip()
+        return arranged.finish(sheet, paths, f"{said}, as long as half of them go on.")
 
 
 def over_time(
@@ -156,10 +154,6 @@ class Tracks(RepeatedFigure):
             kind: [(name, positions(results[name])) for name in selected(patterns, results)] for kind, patterns in ways
         }
 
-    def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
-        found = roles(data.plan, self.where, None, None, self.panels, has_axis=False)
-        return layout(data, self, Roles(None, None, (*([found.lines] if found.lines else []), *found.panels)))
-
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         arranged = self.arranged(data)
         columns = arranged.columns or (1 if len(arranged.panels) == 1 else 2)
@@ -187,8 +181,7 @@ class Tracks(RepeatedFigure):
             axes.set_xlim(low[0] - room, high[0] + room)
             axes.set_ylim(low[1] - room, high[1] + room)
         sheet.call_axes("x (m)", "y (m)")
-        arranged.finish(sheet, paths)
-        return f"The first {counted(self.runs, 'run')} of each condition. {arranged.omitted}".rstrip()
+        return arranged.finish(sheet, paths, f"The first {counted(self.runs, 'run')} of each condition.")
 
 
 class SingleRun(SignalFigure):
@@ -216,7 +209,7 @@ class SingleRun(SignalFigure):
     def _chosen(self, data: Data) -> tuple[Condition, dict[str, Any]] | None:
         rows = [
             (condition, row)
-            for condition in self.conditions(data)
+            for condition in data.where(self.where)
             for row in condition.good[: self.runs]
             if row[self.metric] is not None
         ]
@@ -253,7 +246,7 @@ class SingleRun(SignalFigure):
         condition, row = chosen
         for path in paths:
             path.write_bytes(extracts[condition.index, row["replication"]][path.suffix.removeprefix(".")])
-        names = self.names(data)
+        names = Names(data.plan, self.labels)
         value = names.level(self.metric, row[self.metric])
         among = f" among the first {self.runs}" if self.runs else ""
         return (

@@ -15,7 +15,7 @@ from ...build import Complaint
 from ...language import Factor
 from ...study import Plan, mean
 from ..pen import DASHES, LIMIT, MARKERS, PALETTE
-from .data import Condition, Data, Names, is_numeric, mean_of
+from .data import Condition, Data, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure
 
 BOXES, CURVES = "boxes", "curves"
@@ -41,18 +41,17 @@ class Means(TableFigure):
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        chosen, arranged = self.conditions(data), self.arranged(data, has_axis=True)
+        arranged = self.arranged(data, has_axis=True)
         names, over = arranged.names, arranged.roles.over
         sheet = arranged.sheet(same_y=self.same_scale)
-        axis = _Axis(data, names, over, chosen)
+        axis = _Axis(data, arranged)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
             for number, (level, conditions) in enumerate(panel.lines.items()):
                 arranged.show(level, self._line(axes, axis, conditions, number, len(arranged.levels)))
             axis.dress(axes)
         sheet.call_axes(names.axis(over) if over else "", mean_of(names.axis(self.metric)))
-        arranged.finish(sheet, paths)
         what = f"{mean_of(names.words(self.metric)).capitalize()} with its 95 % interval (Student)."
-        return _sentences(what, counts(chosen, [self.metric]), arranged.omitted)
+        return arranged.finish(sheet, paths, what, counts(arranged.chosen, [self.metric]))
 
     def _line(self, axes: Any, axis: _Axis, conditions: list[Condition], number: int, lines: int) -> Any:
         points = []
@@ -71,7 +70,6 @@ class Means(TableFigure):
             color=PALETTE[number],
             marker=MARKERS[number],
             linestyle=DASHES[number] if axis.is_connected else "none",
-            capsize=2.2,
             elinewidth=1.0,
         )
 
@@ -96,7 +94,7 @@ class Distributions(TableFigure):
             yield Complaint("metrics", "there is no metric in it", "name one at least")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        chosen, has_axis = self.conditions(data), self.style == BOXES
+        has_axis = self.style == BOXES
         arranged = self.arranged(data, has_axis=has_axis)
         panels = [(metric, panel) for metric in self.metrics for panel in arranged.panels] or [("", Panel("", {}))]
         across = len(arranged.panels)
@@ -114,56 +112,45 @@ class Distributions(TableFigure):
         if is_grid or len(self.metrics) == 1:  # the panels of a row have one axis
             for axes in sheet.axes:
                 axes.label_outer(remove_inner_ticks=False)
-        arranged.finish(sheet, paths)
         boxes = "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
-        return _sentences(
-            boxes if has_axis else "Share of the runs whose value is no greater.",
-            counts(chosen, self.metrics),
-            *(self._beyond(chosen, arranged.names, metric) for metric in self.metrics),
-            arranged.omitted,
-        )
-
-    def _beyond(self, chosen: list[Condition], names: Names, metric: str) -> str:
-        if self.limit is None:
-            return ""
-        values = [value for condition in chosen for value in condition.numbers(metric)]
-        below = sum(value < self.limit for value in values)
-        limit = names.level(metric, self.limit)
-        return f"Below {limit}: {names.words(metric)} of {below:,} of {counted(len(values), 'run')}."
+        said = [boxes if has_axis else "Share of the runs whose value is no greater."]
+        said.append(counts(arranged.chosen, self.metrics))
+        if self.limit is not None:
+            for metric in self.metrics:
+                values, names = _numbers(arranged.chosen, metric), arranged.names
+                below, runs = sum(value < self.limit for value in values), counted(len(values), "run")
+                said.append(f"Below {names.level(metric, self.limit)}: {names.words(metric)} of {below:,} of {runs}.")
+        return arranged.finish(sheet, paths, *said)
 
     def _boxes(self, axes: Any, data: Data, metric: str, panel: Panel, arranged: Layout) -> None:
         from matplotlib.patches import Patch
 
         names, over, lines = arranged.names, arranged.roles.over, len(arranged.levels)
-        levels = data.levels(over, self.conditions(data), self.where) if over else [None]
+        levels = data.levels(over, arranged.chosen, self.where) if over else [None]
         width = 0.8 / lines
         for number, (line, conditions) in enumerate(panel.lines.items()):
             colour = PALETTE[number]
             groups: dict[int, list[float]] = {}
             for place, level in enumerate(levels):
                 here = [each for each in conditions if not over or each.values[over] == level]
-                if values := [value for condition in here for value in condition.numbers(metric)]:
+                if values := _numbers(here, metric):
                     groups[place] = values
             if groups:
-                thin = {"color": colour, "linewidth": 0.9}
                 axes.boxplot(
                     list(groups.values()),
                     positions=[place + width * (number - (lines - 1) / 2) for place in groups],
                     widths=0.8 * width,
-                    whis=(5, 95),
                     manage_ticks=False,
                     patch_artist=True,
-                    boxprops={"facecolor": colour, "alpha": 0.35, "edgecolor": colour, "linewidth": 0.8},
-                    medianprops={"color": colour, "linewidth": 1.6},
-                    whiskerprops=thin,
-                    capprops=thin,
-                    flierprops={"marker": ".", "markersize": 3.5, "markerfacecolor": colour, "markeredgewidth": 0},
+                    boxprops={"facecolor": colour, "alpha": 0.35, "edgecolor": colour},
+                    medianprops={"color": colour},
+                    whiskerprops={"color": colour},
+                    capprops={"color": colour},
+                    flierprops={"markerfacecolor": colour},
                 )
             arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
         axes.set_xlim(-0.6, len(levels) - 0.4)
-        every = -(-len(levels) // 16)
-        texts = [names.level("", level) if over else "" for level in levels[::every]]
-        _texts_along(axes, range(0, len(levels), every), texts)
+        _texts_along(axes, range(len(levels)), [names.level("", level) if over else "" for level in levels])
         axes.set_xlabel(names.axis(over) if over else "")
         axes.set_ylabel(fill(names.axis(metric), 30))
         axes.grid(axis="x", visible=False)
@@ -172,8 +159,7 @@ class Distributions(TableFigure):
 
     def _curves(self, axes: Any, metric: str, panel: Panel, arranged: Layout) -> None:
         for number, (line, conditions) in enumerate(panel.lines.items()):
-            values = sorted(value for condition in conditions for value in condition.numbers(metric))
-            if values:
+            if values := sorted(_numbers(conditions, metric)):
                 shares = [place / len(values) for place in range(len(values) + 1)]
                 look = {"drawstyle": "steps-post", "color": PALETTE[number], "linestyle": DASHES[number]}
                 (curve,) = axes.plot([values[0], *values], shares, **look)
@@ -185,8 +171,8 @@ class Distributions(TableFigure):
             axes.axvline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
 
 
-def _sentences(*parts: str) -> str:
-    return " ".join(part for part in parts if part)
+def _numbers(conditions: Sequence[Condition], metric: str) -> list[float]:
+    return [value for condition in conditions for value in condition.numbers(metric)]
 
 
 def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
@@ -197,8 +183,7 @@ def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
     if bad:
         parts.append(f"{bad:,} of them failed")
     for metric in metrics:
-        missing = runs - bad - sum(len(condition.numbers(metric)) for condition in chosen)
-        if missing:
+        if missing := runs - bad - len(_numbers(chosen, metric)):
             parts.append(f"{missing:,} have no {metric}")
     return f"{', '.join(parts)}."
 
@@ -206,11 +191,11 @@ def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
 class _Axis:
     """Where conditions stand along the horizontal axis."""
 
-    def __init__(self, data: Data, names: Names, factor: str | None, chosen: Sequence[Condition]) -> None:
-        self._factor = factor
-        self._levels: list[Factor] = data.levels(factor, chosen) if factor else [None]
-        self._texts = [names.level("", level) if factor else "" for level in self._levels]
-        self.is_numeric = bool(factor) and is_numeric(data.plan, str(factor)) and None not in self._levels
+    def __init__(self, data: Data, arranged: Layout) -> None:
+        self._factor = factor = arranged.roles.over
+        self._levels: list[Factor] = data.levels(factor, arranged.chosen) if factor else [None]
+        self._texts = [arranged.names.level("", level) if factor else "" for level in self._levels]
+        self.is_numeric = factor is not None and is_numeric(data.plan, factor) and None not in self._levels
         self._places = [self._of(level) for level in self._levels]  # in the order of the study
         places = sorted(set(self._places))
         self.step = min((after - before for before, after in pairwise(places)), default=1.0)
@@ -219,23 +204,24 @@ class _Axis:
         self.is_connected = dimension is not None and (len(dimension.columns) == 1 or places == self._places)
 
     def _of(self, level: Factor) -> float:
-        """The place of a level."""
         if self.is_numeric and isinstance(level, (int, float)):
             return float(level)
         return float(self._levels.index(level))
 
     def place(self, condition: Condition) -> float:
-        """The place of a condition."""
         return self._of(condition.values[self._factor]) if self._factor else 0.0
 
     def dress(self, axes: Any) -> None:
-        """Ticks where levels are, if they are few, and not strewn over the axis like the points of a hypercube."""
-        if len(self._places) <= 12 and (self.is_connected or not self.is_numeric):
+        """Ticks where levels are: numbers only if they are few, and not strewn like the points of a hypercube."""
+        if not self.is_numeric or (self.is_connected and len(self._places) <= 12):
             _texts_along(axes, self._places, self._texts)
         if not self.is_numeric:
             axes.set_xlim(-0.5, len(self._places) - 0.5)
 
 
 def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str]) -> None:
+    """Write texts at their places, of many only some, and aslant where they are long."""
+    every = -(-len(texts) // 16)
+    places, texts = places[::every], texts[::every]
     turned = max(map(len, texts), default=0) * len(texts) > 60
     axes.set_xticks(places, texts, rotation=30 if turned else 0, ha="right" if turned else "center")

@@ -3,34 +3,44 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from epicycle.actors import counted
 
 from ...html import Content, Html, note, page, tag, wide_table
-from ...language import Factor
-from ...study import Judgement, Recommendation, mean
-from . import answers
-from .data import Condition, Data, estimated, shown
+from ...language import ALWAYS, Factor
+from ...shown import rounded
+from ...study import (
+    CONFIRMED,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    REVERSED,
+    UNDECIDED,
+    Finding,
+    Judgement,
+    Recommendation,
+    mean,
+    ranked,
+)
+from ...text import plain
+from .data import Condition, Data, Names, estimated, mean_of, shown
 
 MAX_ROWS = 400  # of one table
 MAX_FAILURES = 50  # that are told one by one
 MAX_PIVOT = 10  # levels of a factor that are columns
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure as it stands on the page: drawn, or the reason why it is not."""
+class Picture(NamedTuple):
+    """A figure as it stands on the page: drawn, with what is said of it, or the reason why it is not."""
 
     name: str
     doc: str
-    caption: str
     svg: bytes | None
-    problem: str = ""
+    said: str
 
 
 def report_page(
@@ -39,29 +49,24 @@ def report_page(
     judgements: Sequence[Judgement],
     recommendations: Sequence[Recommendation],
 ) -> str:
-    """The whole document."""
     study = data.plan.study
-    sections: list[tuple[str, Sequence[Content]]] = [
+    sections: list[tuple[str, list[Html]]] = [
         ("The study", [*_what(data), *_provenance(data)]),
         ("Runs", list(_runs(data))),
         ("Figures", [_picture(number, each) for number, each in enumerate(pictures, start=1)]),
         ("Means", list(_means(data))),
-        ("Claims", list(answers.claims(data, judgements))),
-        ("Guideline", list(answers.guideline(data, recommendations))),
+        ("Claims", list(claims(data.names, judgements))),
+        ("Guideline", list(_guideline(data, recommendations))),
     ]
-    anchors = {heading: heading.split()[-1].lower() for heading, content in sections if content}
+    filled = [(heading, heading.split()[-1].lower(), content) for heading, content in sections if content]
     title = study.name.replace("_", " ")
     return page(
         f"{title}: report",
         Path(__file__).with_suffix(".css").read_text(encoding="utf-8"),
         tag("h1", title),
         tag("p", study.doc, class_="lead") if study.doc else None,
-        tag("nav", [tag("a", heading, href=f"#{anchor}") for heading, anchor in anchors.items()]),
-        [
-            tag("section", tag("h2", heading), content, id=anchors[heading])
-            for heading, content in sections
-            if heading in anchors
-        ],
+        tag("nav", [tag("a", heading, href=f"#{anchor}") for heading, anchor, _ in filled]),
+        [tag("section", tag("h2", heading), content, id=anchor) for heading, anchor, content in filled],
     )
 
 
@@ -82,7 +87,8 @@ def _what(data: Data) -> Iterable[Html]:
     rows = [[tag("code", name), _levels(data, name), names.unit(name), names.doc(name)] for name in varied]
     if rows:
         yield wide_table(["varied", "levels", "unit", ""], rows, class_="words")
-    if fixed := [f"{each.path} = {getattr(each.node, 'text', '...')}" for each in plan.study.fixed]:
+    fixed = [f"{each.path} = {getattr(each.node, 'text', shown(str(plain(each.node))))}" for each in plan.study.fixed]
+    if fixed:
         yield tag("p", "Set in all runs: ", [[tag("code", each), " "] for each in fixed])
     yield tag("p", _seeds(data))
 
@@ -123,9 +129,6 @@ def _provenance(data: Data) -> Iterable[Html]:
     yield wide_table(["", ""], [[name, tag("code", value)] for name, value in facts.items() if value], class_="facts")
 
 
-# -- runs -------------------------------------------------------------------------------------------------------------
-
-
 def _runs(data: Data) -> Iterable[Html]:
     counts, plan, beyond = data.results.counts(), data.plan, data.results.beyond()
     over = counts.total() - beyond
@@ -148,7 +151,7 @@ def _failures(data: Data, failures: list[dict[str, Any]]) -> Iterable[Html]:
             row["status"],
             data.names.place(data.conditions[row["condition"]].values),
             str(row["seed"]),
-            row["error"],
+            tag("pre", row["error"]),
             tag("code", f"epicycle replay {folder} {row['run'][:12]}"),
         ]
         for row in failures[:MAX_FAILURES]
@@ -160,23 +163,17 @@ def _failures(data: Data, failures: list[dict[str, Any]]) -> Iterable[Html]:
         yield note(f"... and {more:,} more: epicycle status {folder}")
 
 
-# -- figures ----------------------------------------------------------------------------------------------------------
-
-
 def _picture(number: int, picture: Picture) -> Html:
     what = picture.doc or picture.name.replace("_", " ").capitalize()
     what = what if what.rstrip()[-1:] in ".!?" else f"{what.rstrip()}."
     caption: list[Content] = [tag("b", f"Figure {number}. "), what]
     if picture.svg is None:
-        shown = tag("p", f"This figure could not be drawn: {picture.problem}", class_="problem")
+        shown = tag("p", f"This figure could not be drawn: {picture.said}", class_="problem")
     else:
         source = f"data:image/svg+xml;base64,{base64.b64encode(picture.svg).decode()}"
         shown = tag("img", src=source, alt=what)
-        caption += [" ", tag("span", picture.caption, class_="note")]
+        caption += [" ", tag("span", picture.said, class_="note")]
     return tag("figure", shown, tag("figcaption", caption), id=f"figure-{picture.name}")
-
-
-# -- means ------------------------------------------------------------------------------------------------------------
 
 
 def _means(data: Data) -> Iterable[Html]:
@@ -215,31 +212,29 @@ def _pivot(data: Data, metric: str) -> Iterable[Html]:
         found.setdefault(place, {})[condition.values[column]] = condition
     head = [*map(names.axis, rows), *(f"{names.words(column)} {names.level(column, level)}" for level in levels)]
     body = (
-        [*map(shown, place), *(_cell(across.get(level), metric) for level in levels)]
-        for place, across in islice(found.items(), MAX_ROWS)
+        [*map(shown, place), *(_cell(across.get(level), metric) for level in levels)] for place, across in found.items()
     )
-    yield wide_table(head, body, names=len(rows))
-    yield from _more(len(found))
+    return _long_table(head, body, len(rows), len(found))
 
 
 def _flat(data: Data) -> Iterable[Html]:
     factors, metrics = data.results.factors, data.results.metrics
-    head = [*map(data.names.axis, (*factors, *metrics)), "runs"]
-    body = [
+    body = (
         [
             *(shown(each.values[name]) for name in factors),
             *(_cell(each, metric) for metric in metrics),
             f"{len(each.rows):,}",
         ]
-        for each in islice(data.conditions.values(), MAX_ROWS)
-    ]
-    yield wide_table(head, body, names=len(factors))
-    yield from _more(len(data.conditions))
+        for each in data.conditions.values()
+    )
+    head = [*map(data.names.axis, (*factors, *metrics)), "runs"]
+    return _long_table(head, body, len(factors), len(data.conditions))
 
 
-def _more(rows: int) -> Iterable[Html]:
-    if rows > MAX_ROWS:
-        yield note(f"... and {counted(rows - MAX_ROWS, 'row')} more; table.parquet has all.")
+def _long_table(head: list[str], rows: Iterable[list[Content]], names: int, count: int) -> Iterable[Html]:
+    yield wide_table(head, islice(rows, MAX_ROWS), names=names)
+    if count > MAX_ROWS:
+        yield note(f"... and {counted(count - MAX_ROWS, 'row')} more; table.parquet has all.")
 
 
 def _cell(condition: Condition | None, metric: str) -> Content:
@@ -249,3 +244,156 @@ def _cell(condition: Condition | None, metric: str) -> Content:
     values = condition.numbers(metric)
     few = tag("small", f"{len(values)} of {len(condition.rows)}") if len(values) < len(condition.rows) else None
     return [estimated(mean(values)), few]
+
+
+# -- claims and guideline -------------------------------------------------------------------------------------------
+
+
+def claims(names: Names, judgements: Sequence[Judgement]) -> Iterable[Html]:
+    """The verdict of each claim, and all comparisons behind it."""
+    if not judgements:
+        return
+    apart = list(judgements[0].where)
+    if apart:
+        yield _by_level(names, judgements)
+        yield note(
+            "The best comes first: the fewest claims that are not reproduced; then the most that hold in the means, by "
+            "chance or not, the most that are reproduced, and the largest share of agreeing comparisons."
+        )
+    head = [*map(names.axis, apart), "claim", "", "verdict", "confirmed", "reversed", "undecided", "agreeing"]
+    rows = [
+        [
+            *map(shown, each.where.values()),
+            tag("b", each.name),
+            [each.claim.doc, " ", tag("small", each.claim.statement)],
+            _verdict(each),
+            *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
+            str(each.agreeing),
+            _weakest(names, each),
+        ]
+        for each in judgements
+    ]
+    yield wide_table([*head, "weakest comparison"], rows, names=len(apart) + 1, class_="words")
+    yield note(
+        "A comparison is a mean of differences between runs of the same replication, with Student's 95 % interval; the "
+        "p-values of one claim are corrected together (Holm). It is confirmed or reversed if the corrected p-value is "
+        "below 0.05, and no more than one run in twenty is missing; otherwise undecided. agreeing: how many point the "
+        "claimed way, by chance or not."
+    )
+    for each in judgements:
+        place = names.place(each.where)
+        title = f"{each.name}{f' ({place})' if place else ''}: {each.verdict}"
+        summary = tag("summary", f"{title}, {counted(len(each.findings), 'comparison')}")
+        yield tag("details", summary, _findings(names, each))
+
+
+def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
+    """Which claims survive which level of what they are judged for, the best first."""
+    standings = ranked(judgements)
+    claims = [each.name for each in standings[0].judgements]
+    return wide_table(
+        [*map(names.axis, judgements[0].where), NOT_REPRODUCED, "hold in the means", REPRODUCED, *claims],
+        [
+            [
+                *map(shown, each.where.values()),
+                str(each.counts(NOT_REPRODUCED)),
+                str(each.in_means),
+                str(each.counts(REPRODUCED)),
+                *(
+                    [_verdict(one), tag("small", f"{one.agreeing} of {len(one.findings)} agree")]
+                    for one in each.judgements
+                ),
+            ]
+            for each in standings
+        ],
+        names=len(judgements[0].where),
+    )
+
+
+def _verdict(judgement: Judgement) -> Html:
+    return tag("b", judgement.verdict, class_=judgement.verdict.replace(" ", "-"))
+
+
+def _findings(names: Names, judgement: Judgement) -> Html:
+    is_rate = judgement.claim.form == ALWAYS
+    head = ["comparison", "share of runs" if is_rate else "difference", "95 % interval", "runs" if is_rate else "pairs"]
+    rows = [
+        [
+            _compared(names, judgement, each),
+            _value(each),
+            _interval(each),
+            f"{each.count}{f' ({each.missing} missing)' if each.missing else ''}",
+            *([] if is_rate else ["–" if math.isnan(each.p_holm) else f"{each.p_holm:.2g}"]),
+            tag("span", each.outcome, class_={CONFIRMED: "reproduced", REVERSED: "not-reproduced"}.get(each.outcome)),
+        ]
+        for each in judgement.findings
+    ]
+    return wide_table([*head, *([] if is_rate else ["p (Holm)"]), "outcome"], rows)
+
+
+def _weakest(names: Names, judgement: Judgement) -> Content:
+    finding = judgement.weakest
+    if finding is None or not finding.count:
+        return "–"
+    return [f"{_value(finding)} ({_interval(finding)}) ", tag("small", _compared(names, judgement, finding))]
+
+
+def _interval(finding: Finding) -> str:
+    if math.isnan(finding.low):
+        return "–"
+    return " to ".join(rounded(end, finding.high - finding.low) for end in (finding.low, finding.high))
+
+
+def _compared(names: Names, judgement: Judgement, finding: Finding) -> str:
+    claim, where = judgement.claim, names.place(finding.where)
+    if claim.form == ALWAYS:
+        return where or "all runs"
+    what = names.axis(finding.metric)
+    if claim.per:
+        what = f"slope of {names.words(finding.metric)} over {names.words(claim.per)}"
+    pair = f"{what}, {names.place(finding.level)} less {names.place(finding.against)}"
+    return f"{pair}; {where}" if where else pair
+
+
+def _value(finding: Finding) -> str:
+    if not finding.count:
+        return "–"
+    return rounded(finding.value, finding.high - finding.low)
+
+
+def _guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:
+    """What to choose in each case, and how sure that is."""
+    if not found:
+        return
+    names = data.names
+    asked = data.plan.study.questions.guideline
+    choose, metric = names.words(found[0].choose), names.words(found[0].metric)
+    which = "greatest" if asked is not None and asked.greatest else "least"
+    tolerance = asked.tolerance if asked is not None else 0.0
+    unit = names.unit(found[0].metric)
+    yield tag("p", f"The {choose} with the {which} {mean_of(metric)}:", class_="label")
+    head = [*map(names.axis, found[0].where), f"best {choose}", mean_of(names.axis(found[0].metric))]
+    yield wide_table(
+        [*head, "confidence", "not worse", "enough"], [_row(each) for each in found], names=len(found[0].where)
+    )
+    close = f", or of those within {tolerance:g}{f' {unit}' if unit else ''} of the best." if tolerance else "."
+    yield note(
+        f"best: the {which} mean. confidence: how often it is the best if the replications are drawn anew. not worse: "
+        "no other is significantly better, and the truly best is among these with a confidence of 95 %. enough: the "
+        f"first of these in the order of the study{close}"
+    )
+
+
+def _row(each: Recommendation) -> list[Content]:
+    best = next((option for option in each.options if option.is_fit and option.level == each.best), None)
+    where = [shown(level) for level in each.where.values()]
+    if best is None:
+        return [*where, "–", "too few runs have a number", "", "", ""]
+    return [
+        *where,
+        tag("b", shown(each.best)),
+        estimated(best.estimate),
+        f"{each.confidence:.0%}",
+        ", ".join(map(shown, each.not_worse)),
+        shown(each.sufficient),
+    ]

@@ -55,10 +55,10 @@ def strokes(lines: tuple[Line, ...]) -> Iterator[Rectangle]:
 
 def words_of(drawing: Drawing) -> list[tuple[str, Rectangle]]:
     """The places of all texts, badges included."""
-    found = [
-        (each.text, (each.left, each.y - 0.75 * each.size, each.left + each.width, each.y + 0.2 * each.size))
-        for each in drawing.words
-    ]
+    found = []
+    for each in drawing.words:
+        left = each.x - {"left": 0.0, "center": 0.5, "right": 1.0}[each.align] * each.width
+        found.append((each.text, (left, each.y - 0.75 * each.size, left + each.width, each.y + 0.2 * each.size)))
     return found + [(each.text, (each.x, each.y - 6.0, each.x + each.width, each.y + 6.0)) for each in drawing.pills]
 
 

@@ -7,6 +7,7 @@ import re
 import shutil
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,11 +15,12 @@ import pytest
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
 from epicycle.runner.language import StudyMetric, read_study
+from epicycle.runner.show.pen import Sheet, style
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
-from epicycle.runner.show.report.figure import layout, roles
+from epicycle.runner.show.report.figure import Layout, roles
 from epicycle.runner.show.report.of_signals import over_time
-from epicycle.runner.show.report.of_table import Means
+from epicycle.runner.show.report.of_table import Distributions, Means
 from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
 from epicycle.runner.study.plan.columns import si_unit
 from epicycle.runner.study.run.manifest import manifest_text
@@ -218,6 +220,8 @@ def test_unfinished_and_failed_runs_and_hostile_names(tmp_path: Path, capsys: py
         for row in failures
     ]
     assert "6 runs in 2 conditions, 2 of them failed." in found.text
+    assert "Set in all runs: fails = [1]" in found.text
+    assert "pre" in found.tags  # errors keep their lines
     # One factor: a row for each condition; and what is there is said beside each mean.
     assert [row[0] for row in found.tables["Means"][1:3]] == [hostile, "calm"]
     assert all(cell.endswith("2 of 3") for cell in found.tables["Means"][1][1:4])
@@ -346,8 +350,7 @@ def test_every_factor_is_shown_somewhere(
         " both: {zip: {a: [1, 2], b: [1, 2]}}}\n"
     )
     plan = Plan(read_study(tmp_path / "s.yaml"), [], {}, [{}, {}, {}, {}], {}, {}, "0")
-    found = roles(plan, fixed, over, lines, panels, has_axis=True)
-    assert (found.over, found.lines, found.panels) == expected
+    assert roles(plan, fixed, over, lines, panels, has_axis=True) == expected
 
 
 @pytest.mark.parametrize(
@@ -376,12 +379,31 @@ def test_figures_of_a_study_that_names_none(vary: str, figures: list[str], tmp_p
 def test_panels_and_lines_keep_apart_what_differs(queue: Path) -> None:
     data = Data(open_study(queue))
     figure = Means(metric="mean_wait", where={"mean_service": [2.0, 0.5]})
-    arranged = layout(data, figure, roles(data.plan, figure.where, "load", None, (), has_axis=True))
+    arranged = Layout(data, figure, roles(data.plan, figure.where, "load", None, (), has_axis=True))
     assert arranged.levels == [2.0, 0.5]  # as it is written
     places = [each.index for panel in arranged.panels for line in panel.lines.values() for each in line]
     assert sorted(places) == [0, 2, 3, 5]
-    by_panel = layout(data, figure, roles(data.plan, {}, "load", "", ("mean_service",), has_axis=True))
+    by_panel = Layout(data, figure, roles(data.plan, {}, "load", "", ("mean_service",), has_axis=True))
     assert [panel.title for panel in by_panel.panels] == ["mean service: 2 s", "mean service: 0.5 s"]
+
+
+def test_names_of_levels_stand_along_the_axis_however_many_there_are(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    days = ", ".join(f"day_{day}: {{load: 0.{day + 10}}}" for day in range(20))
+    model = (Path(__file__).parents[3] / "models" / "mm1.yaml").read_text().replace("stop: 4000 s", "stop: 200 s")
+    (tmp_path / "mm1.yaml").write_text(model)
+    (tmp_path / "s.yaml").write_text(
+        f"study: s\nmodel: ./mm1.yaml\nvary: {{day: {{cases: {{{days}}}}}}}\nmetrics: [customers]\nreplications: 1\n"
+    )
+    assert main(["study", str(tmp_path / "s.yaml"), "--out", str(tmp_path / "out")]) == 0
+    data, drawn = Data(open_study(tmp_path / "out")), list[Any]()
+    monkeypatch.setattr(Sheet, "save", lambda sheet, paths: drawn.extend(sheet.axes))
+    for figure in (Means(metric="customers"), Distributions(metrics="customers")):
+        with style():
+            figure.draw(data, {}, [])
+    for axes in drawn:
+        assert [text.get_text() for text in axes.get_xticklabels()] == [f"day_{day}" for day in range(0, 20, 2)]
 
 
 def test_units_of_columns(queue: Path) -> None:

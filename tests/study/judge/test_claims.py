@@ -19,8 +19,8 @@ from scipy import stats
 from epicycle.runner import open_study
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.language import Claim, Study, read_study, study_of_text
-from epicycle.runner.show.report import answers
 from epicycle.runner.show.report.data import Data
+from epicycle.runner.show.report.page import claims
 from epicycle.runner.study import Plan, run_study
 from epicycle.runner.study.judge.claims import (
     NOT_REPRODUCED,
@@ -427,7 +427,7 @@ def test_claims_of_another_study_are_judged_at_each_level_of_what_it_has_not(que
     ]
     assert all(finding.where == {} for each in found for finding in each.findings)
     # The report shows first which of them survive what.
-    html = next(iter(answers.claims(Data(open_study(tmp_path / "out")), found)))
+    html = next(iter(claims(Data(open_study(tmp_path / "out")).names, found)))
     rows = [
         re.findall("<(?:th|td)[^>]*>(.*?)</(?:th|td)>", row) for row in re.findall("<tr>(.*?)</tr>", html, re.DOTALL)
     ]
