@@ -1,5 +1,9 @@
 """What can stand in a model graph: the actor contract, the library of actors, and the robots of the example."""
 
+from .compiled import CORE, CORE_MODULES, CORE_REASON
+
+# isort: split
+# What comes before decides what all imports behind find: compiled modules, or their sources.
 from .accumulation import Accumulator, Counter, Difference, Integrator
 from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
 from .continuous import ODE
@@ -30,23 +34,23 @@ from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
 
 __all__ = [
-    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "ODE", "REQUIRED", "Accumulator", "Actor", "AddSubtract",
-    "Barrier", "Bernoulli", "BodyState", "BooleanSwitch", "BroadcastChannel", "Casadi", "ChannelError", "Choice",
-    "CircularMotion", "Clock", "Comparator", "Configurable", "Const", "Constant", "Context", "Counter",
-    "CurrentMicrostep", "CurrentTime", "Difference", "Display", "DistanceMonitor", "Distribution", "Emit",
-    "EpicycleError", "Estimate", "Exponential", "Expression", "FilterError", "FilterPyEstimator", "Function",
-    "Gamma", "GoalMonitor", "Histogram", "Inform", "InputPort", "Integrator", "Latest", "LogNormal", "LogicGate",
-    "LookupTable", "Machine", "MappingParameter", "MathFunction", "Measurement", "Merge", "MostRecent",
-    "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort", "Parameter",
-    "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter", "Process", "Quantity",
-    "Queue", "Ramp", "Random", "RandomInteger", "ReachGoal", "Recorder", "Repeat", "Replay", "ReplayError",
-    "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor",
-    "Sequence", "Server", "SingleEvent", "Solver", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag",
-    "Test", "TimeDelay", "TimeGap", "Timer", "Triangular", "Uniform", "UnitError", "UnscentedEstimator", "Vehicle",
-    "Wake", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si",
-    "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports",
-    "irregular", "is_too_deep", "nearest", "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths",
-    "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened",
-    "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "type_name", "unknown_parameter", "variants",
-    "visible", "visible_character", "visible_lines",
+    "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NOTHING", "ODE",
+    "REQUIRED", "Accumulator", "Actor", "AddSubtract", "Barrier", "Bernoulli", "BodyState", "BooleanSwitch",
+    "BroadcastChannel", "Casadi", "ChannelError", "Choice", "CircularMotion", "Clock", "Comparator", "Configurable",
+    "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "Difference", "Display",
+    "DistanceMonitor", "Distribution", "Emit", "EpicycleError", "Estimate", "Exponential", "Expression", "FilterError",
+    "FilterPyEstimator", "Function", "Gamma", "GoalMonitor", "Histogram", "Inform", "InputPort", "Integrator", "Latest",
+    "Line", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter", "MathFunction", "Measurement",
+    "Merge", "Moment", "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective",
+    "OutputPort", "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter",
+    "Process", "Quantity", "Queue", "Ramp", "Random", "RandomInteger", "Ranks", "ReachGoal", "Recorder", "Repeat",
+    "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor",
+    "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "Station", "Stop", "Stream", "Switch",
+    "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times", "Triangular", "Uniform", "UnitError",
+    "UnscentedEstimator", "Vehicle", "Wake", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
+    "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
+    "elementary", "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
+    "normal_share", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular",
+    "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds",
+    "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip

@@ -99,11 +99,9 @@ class Harness:
             port = self.actor.inputs[name]
             each_channel = token if port.multi else [token]
             port.width = max(port.width, len(each_channel))
-            put, put_channel = port.entry()
             for channel, each in enumerate(each_channel):
                 if each is not None:
-                    put(each)
-                    put_channel(channel)
+                    port.receive(each, channel)
         due = [wake for wake in self.wakes if wake.tag == tag and not wake.cancelled]
         for wake in due:
             wake.due = True

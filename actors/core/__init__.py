@@ -1,10 +1,11 @@
 """What every actor is made of: ports, parameters, time, random streams, and the firing contract."""
 
 from . import elementary, paths
-from .actor import Actor, Context, Wake, declared_ports, has_own_ports
+from .actor import Actor, Context, declared_ports, has_own_ports
 from .authoring import ABSENT, Latest, Pending, present, rounds
 from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
+from .inbox import NOTHING, Moment, PortError, Wake, When, new_wake
 from .laws import normal_quantile, normal_share
 from .messages import (
     abridged,
@@ -20,6 +21,7 @@ from .messages import (
     visible_character,
     visible_lines,
 )
+from .order import NEVER, Line, Ranks, Times
 from .parameter import (
     REQUIRED,
     Configurable,
@@ -35,21 +37,21 @@ from .parameter import (
 )
 from .port_parameter import PortParameter
 from .port_types import accepts, shaped, token_type, type_name
-from .ports import Emit, InputPort, OutputPort, PortError
+from .ports import Emit, InputPort, OutputPort
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
-from .tag import NANOSECONDS_PER_SECOND, Tag, to_nanoseconds, to_seconds
+from .tag import NANOSECONDS_PER_SECOND, Tag, new_tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
 
 __all__ = [
-    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "REQUIRED", "Actor", "Configurable", "Context", "Emit",
-    "EpicycleError", "InputPort", "Latest", "MappingParameter", "OutputPort", "Parameter", "ParameterError",
-    "Pending", "PortError", "PortParameter", "Process", "Quantity", "Stream", "Tag", "UnitError", "Wake",
-    "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut",
-    "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "irregular",
-    "is_too_deep", "nearest", "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths", "plain",
-    "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened",
-    "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "type_name", "unknown_parameter", "variants",
-    "visible", "visible_character", "visible_lines",
+    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NOTHING", "REQUIRED", "Actor", "Configurable", "Context",
+    "Emit", "EpicycleError", "InputPort", "Latest", "Line", "MappingParameter", "Moment", "OutputPort", "Parameter",
+    "ParameterError", "Pending", "PortError", "PortParameter", "Process", "Quantity", "Ranks", "Stream", "Tag", "Times",
+    "UnitError", "Wake", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share",
+    "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular", "read_table",
+    "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type",
+    "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip

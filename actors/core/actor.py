@@ -33,26 +33,12 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
+from .inbox import PortError, Wake
 from .parameter import Configurable, ParameterError
 from .port_parameter import ParameterPort, PortParameter
-from .ports import InputPort, OutputPort, PortError
+from .ports import InputPort, OutputPort
 from .random import Stream, random_stream
 from .tag import Tag, to_nanoseconds, to_seconds
-
-
-class Wake:
-    """A wake-up that an actor asked for: ``due`` becomes true at its tag; ``cancel()`` before that removes it."""
-
-    __slots__ = ("cancelled", "due", "tag")
-
-    def __init__(self, tag: Tag) -> None:
-        self.tag = tag
-        self.due = False
-        self.cancelled = False
-
-    def cancel(self) -> None:
-        """Ask the director to forget it."""
-        self.cancelled = True
 
 
 class Context(Protocol):

@@ -6,14 +6,13 @@ This is what Ptolemy does, where an actor takes one token per channel and is fir
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterator, Sequence
-from itertools import count, zip_longest
+from itertools import zip_longest
 from typing import Any, Generic, TypeVar
 
-from .actor import Actor, Wake
+from .actor import Actor
+from .order import Line
 from .ports import InputPort
-from .tag import Tag
 
 T = TypeVar("T")
 ABSENT: Any = type("_Absent", (), {"__repr__": lambda self: "absent"})()
@@ -60,23 +59,23 @@ class Latest:
 class Pending(Generic[T]):
     """Values that wait for their time: ``put`` them in ``fire``, and take those whose time has come with ``due``."""
 
+    __slots__ = ("_actor", "_line")
+
     def __init__(self, actor: Actor) -> None:
         self._actor = actor
-        # The number keeps the order of entry among equals, and values are never compared.
-        self._heap: list[tuple[Tag, int, Wake, T]] = []
-        self._number = count()
+        self._line = Line()
 
     def __len__(self) -> int:
-        return len(self._heap)
+        return len(self._line)
 
     def put(self, value: T, delay: float) -> None:
         """Keep a value for ``delay`` seconds; 0 is the next microstep."""
-        wake = self._actor.wake_in(delay)
-        heapq.heappush(self._heap, (wake.tag, next(self._number), wake, value))
+        self._line.push(self._actor.wake_in(delay), value)
 
     def due(self) -> list[T]:
         """Take the values whose time is the present tag, in the order in which they were put."""
-        values = []
-        while self._heap and self._heap[0][2].due:
-            values.append(heapq.heappop(self._heap)[3])
+        line = self._line
+        values: list[T] = []
+        while line.is_due():
+            values.append(line.pop())
         return values

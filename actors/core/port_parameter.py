@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Callable
 from typing import Any, TypeVar, overload
 
 from .parameter import Parameter, ParameterError
@@ -26,17 +25,12 @@ class ParameterPort(InputPort[T]):
         self.has_received = False  # which is asked first: most have not, and are read for every token
         self._before: Any = _NOTHING  # what had been received, and not been read, before the present tag
 
-    def entry(self) -> tuple[Callable[[T], None], Callable[[int], None]]:
-        put, put_channel = super().entry()
-
-        def put_and_keep(token: T) -> None:
-            if not self._arriving[0]:
-                self._before = self._received
-            put(token)
-            self._received = token
-            self.has_received = True
-
-        return put_and_keep, put_channel
+    def receive(self, token: T, channel: int) -> None:
+        if not self.arrived:
+            self._before = self._received
+        super().receive(token, channel)
+        self._received = token
+        self.has_received = True
 
     def take(self) -> tuple[list[T], list[int]]:
         self._received = self._before

@@ -7,11 +7,10 @@ An output port hands a token on at once; who gets it, and through which delays a
 from __future__ import annotations
 
 import types
-from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Generic, Protocol
 
-from .errors import EpicycleError
+from .inbox import Inbox, PortError
 from .port_types import shaped, type_name
 
 if TYPE_CHECKING:
@@ -33,10 +32,6 @@ class Emit(Protocol):
         """Send a token to all channels, or to one."""
 
 
-class PortError(EpicycleError):
-    """A port was read or written in a way that its declaration or the model does not allow."""
-
-
 class _Port(Generic[T]):
     """What both directions share: the declaration, and where the instance stands."""
 
@@ -55,7 +50,7 @@ class _Port(Generic[T]):
 
     def bind(self, actor: Any) -> Any:
         """The port of one instance."""
-        bound = object.__new__(type(self))
+        bound = type(self).__new__(type(self))
         # One by one: an instance whose __dict__ was never asked for keeps its attributes in itself, where they take a
         # third of the space and are found sooner.
         for name, value in vars(self).items():
@@ -68,7 +63,7 @@ class _Port(Generic[T]):
         return f"<{self.direction} port {self.path or self.name}: {type_name(self.type)}>"
 
 
-class InputPort(_Port[T]):
+class InputPort(_Port[T], Inbox):
     """Where tokens arrive: of any type if none is given.
 
     ``shape`` is that of a ``numpy`` array, as for parameters: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
@@ -92,75 +87,21 @@ class InputPort(_Port[T]):
         super().__init__(type, shape=shape, multi=multi, doc=doc)
         self.required = required
         self.triggers = triggers
-        self.width = 0
-        self._arriving: tuple[list[T], list[int]] = [], []  # the same two lists all the time
-        self._tokens, self._channels = self._arriving
+        Inbox.__init__(self)
 
     def bind(self, actor: Any) -> InputPort[T]:
         bound: InputPort[T] = super().bind(actor)
-        bound._arriving = [], []
-        bound.release()
+        bound.width = 0
+        bound.empty()
         return bound
 
-    @property
-    def present(self) -> bool:
-        """Whether a token has arrived at the present tag."""
-        return bool(self._tokens)
+    if TYPE_CHECKING:  # what an inbox of any tokens has, with the port's own type
 
-    @property
-    def value(self) -> T:
-        """The token of the present tag, the latest if there are several; raises ``PortError`` if there is none."""
-        if not self._tokens:
-            raise PortError(f"{self.path} has no token at this tag; ask 'present' before 'value'")
-        return self._tokens[-1]
-
-    @property
-    def tokens(self) -> tuple[T, ...]:
-        """All tokens of the present tag in the order of their arrival."""
-        return tuple(self._tokens)
-
-    def by_channel(self) -> list[list[T]]:
-        """The tokens of the present tag, a list for each channel."""
-        result: list[list[T]] = [[] for _ in range(self.width)]
-        for token, channel in zip(self._tokens, self._channels, strict=True):
-            result[channel].append(token)
-        return result
-
-    def entry(self) -> tuple[Callable[[T], None], Callable[[int], None]]:
-        """Engine: what to call when a token arrives, first with the token and then with its channel."""
-        tokens, channels = self._arriving
-        return tokens.append, channels.append
-
-    @property
-    def arrived(self) -> list[int]:
-        """Engine: the channels of the tokens that have arrived, shown or not; the same list all the time."""
-        return self._arriving[1]
-
-    def clear(self) -> None:
-        """Engine: forget the tokens that are shown."""
-        self._tokens.clear()
-        self._channels.clear()
-
-    def take(self) -> tuple[list[T], list[int]]:
-        """Engine: take the tokens out, as if they had not come yet."""
-        tokens, channels = self._arriving
-        taken = tokens[:], channels[:]
-        tokens.clear()
-        channels.clear()
-        return taken
-
-    def give(self, taken: tuple[list[T], list[int]]) -> None:
-        """Engine: show tokens that were taken out."""
-        tokens, channels = self._arriving
-        tokens[:], channels[:] = taken
-
-    def hold(self) -> None:
-        """Engine: until ``release`` show nothing, and keep what is there and what comes."""
-        self._tokens, self._channels = [], []
-
-    def release(self) -> None:
-        """Engine: show what has come."""
-        self._tokens, self._channels = self._arriving
+        @property
+        def value(self) -> T: ...
+        @property
+        def tokens(self) -> tuple[T, ...]: ...
+        def by_channel(self) -> list[list[T]]: ...
 
 
 class OutputPort(_Port[T]):

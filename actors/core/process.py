@@ -17,7 +17,8 @@ from weakref import ReferenceType, ref
 from simpy.events import Event
 from simpy.events import Process as SimPyProcess
 
-from .actor import Actor, Wake
+from .actor import Actor
+from .inbox import Wake
 from .ports import InputPort
 
 

@@ -25,6 +25,14 @@ class Tag(NamedTuple):
         return f"({to_seconds(self.time):g} s, {self.microstep})"
 
 
+_new = tuple.__new__
+
+
+def new_tag(time: int, microstep: int) -> Tag:
+    """A tag, in half the time that its class takes."""
+    return _new(Tag, (time, microstep))
+
+
 def to_nanoseconds(seconds: float) -> int:
     """The nearest whole nanosecond; raises ``ValueError`` for NaN, infinities and times past ``LATEST``."""
     if not math.isfinite(seconds):

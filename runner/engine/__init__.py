@@ -16,7 +16,8 @@ from ..results import (
     write_log,
 )
 from .copies import CopyError
-from .director import ActorError, Director, LoopError
+from .director import Director
+from .errors import ActorError, LoopError
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
 from .simulation import Simulation, Snapshot, SnapshotError

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-import simpy
+from epicycle.actors import NOTHING, Actor, Moment, Wake
 
-from epicycle.actors import Actor, InputPort, Tag, Wake
+if TYPE_CHECKING:
+    from epicycle.actors import InputPort
 
 
 class Turn:
@@ -17,49 +18,128 @@ class Turn:
     nothing is connected to are left out.  ``wakes`` are the wake-ups of the present tag.
     """
 
-    __slots__ = ("actor", "is_wanted", "later", "ports", "rank", "wakes")
+    __slots__ = ("actor", "form", "is_wanted", "later", "ports", "rank", "wake", "wakes")
 
     def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int]) -> None:
         self.actor = actor
+        self.form: Form | None = None
         self.rank = rank
         connected = [port for port in actor.inputs.values() if port.width]
         self.ports: list[InputPort[Any]] = [port for port in connected if ranks[port.path] == rank]
         self.later: list[InputPort[Any]] = [port for port in connected if ranks[port.path] > rank]
         self.is_wanted = False  # whether the actor is to have this turn at the present tag
-        self.wakes: list[Wake] = []
+        self.wake: Wake | None = None  # the first of those of the present tag
+        self.wakes: list[Wake] | None = None  # the others
+
+    def add(self, wake: Wake) -> None:
+        """Have a further reason for this turn."""
+        if self.wake is None:
+            self.wake = wake
+        elif self.wakes is None:
+            self.wakes = [wake]
+        else:
+            self.wakes.append(wake)
+
+    def take_wakes(self) -> list[Wake]:
+        """The wake-ups of the present tag, which are forgotten."""
+        wakes = [] if self.wake is None else [self.wake, *(self.wakes or ())]
+        self.wake = self.wakes = None
+        return wakes
 
     def use_wakes(self) -> bool:
         """Make the wake-ups due; false if all were cancelled and there is nothing else to fire for."""
         due = False
-        for wake in self.wakes:
-            if not wake.cancelled:
-                wake.due = due = True
-        self.wakes.clear()
-        return due or any(port.present for port in self.ports)
+        if self.wake is not None and not self.wake.cancelled:
+            self.wake.due = due = True
+        if self.wakes is not None:
+            for wake in self.wakes:
+                if not wake.cancelled:
+                    wake.due = due = True
+        self.wake = self.wakes = None
+        if not due:
+            for port in self.ports:
+                if port.arrived:
+                    return True
+        return due
+
+    def hold(self) -> None:
+        """The actor fires: it does not see yet what is for a later turn."""
+        for port in self.later:
+            port.shown = NOTHING
+
+    def clear(self) -> None:
+        """The actor has fired: what it has not read is gone."""
+        for port in self.ports:
+            if port.arrived:
+                port.arrived = port.shown = []
+                if port.channels:
+                    port.channels = []
+        for port in self.later:
+            port.shown = port.arrived
 
 
-class Instant:
-    """What is to be done at one tag: tokens to deliver, then wake-ups."""
+class Form:
+    """An actor in C, which fires in its place and works on what the actor holds; in Python there are none."""
 
-    __slots__ = ("deliveries", "tag", "wakes")
+    __slots__ = ()
 
-    def __init__(self, tag: Tag) -> None:
-        self.tag = tag
-        self.deliveries: list[Callable[[], None]] = []
-        self.wakes: list[tuple[Turn, Wake]] = []
+    def fire(self) -> None:
+        """What the actor does when it fires."""
+        raise NotImplementedError
 
 
-class Environment(simpy.Environment):
-    """SimPy's part of a run: time, and the events of processes and resources.
+class Instant(Moment):
+    """What is to be done at one tag: tokens to deliver, then wake-ups.
 
-    The director's own instants are no SimPy events: it would make and handle one for each, for a tenth of the time of
-    a run, only to be told what it knows.
+    The first wake-up is ``wake``, of the actor that has the ``turn``; of most instants it is the only one.
     """
 
-    def comes_by(self, time: float) -> bool:
-        """Whether the next of SimPy's own events is at a time, or before."""
-        return bool(self._queue) and self._queue[0][0] <= time
+    __slots__ = ("pending", "turn", "turns", "wake", "wakes")
 
-    def move_on(self, time: int) -> None:
-        """It is later now; none of SimPy's events may be earlier."""
-        self._now = time
+    pending: list[Delivery] | None
+    turn: Turn | None
+    wake: Wake | None
+    turns: list[Turn] | None
+    wakes: list[Wake] | None  # of each of these turns
+
+    def add(self, turn: Turn, wake: Wake) -> None:
+        """Let an actor have a turn for a wake-up."""
+        if self.turn is None:
+            self.turn, self.wake = turn, wake
+        elif self.turns is None or self.wakes is None:
+            self.turns, self.wakes = [turn], [wake]
+        else:
+            self.turns.append(turn)
+            self.wakes.append(wake)
+
+
+def new_instant(time: int, microstep: int) -> Instant:
+    """An instant at which nothing is to be done yet."""
+    instant = Instant.__new__(Instant)
+    instant.time, instant.microstep = time, microstep
+    instant._tag = instant.pending = instant.turn = instant.wake = instant.turns = instant.wakes = None
+    return instant
+
+
+class Way:
+    """Where a token goes on to."""
+
+    __slots__ = ()
+
+    def go(self, token: Any) -> None:
+        """Let a token go on."""
+        raise NotImplementedError
+
+
+class Delivery:
+    """A token that is on its way: what to do with it when its time has come."""
+
+    __slots__ = ("token", "way")
+
+    def __init__(self, way: Way, token: Any) -> None:
+        self.way = way
+        self.token = token
+
+    def arrive(self) -> None:
+        """Let it go on."""
+        self.way.go(self.token)

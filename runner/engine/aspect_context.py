@@ -9,8 +9,10 @@ from typing import Any
 from epicycle.actors import Tag
 
 from ..results import EventLog, Signal
-from .director import ActorError, CrowdError, Director, LoopError
-from .local_time import Deliver, LocalDirector
+from .director import Director
+from .errors import ActorError, CrowdError, LoopError
+from .local_time import LocalDirector
+from .way import Call, Deliver
 
 
 class EngineContext:
@@ -28,7 +30,6 @@ class EngineContext:
         self.seed = director.seed
         self.latest = latest.get
         self.stop = director.stop
-        self.hold = director.hold
         self._blame = blame
         self._local = local
         self._director = director
@@ -43,9 +44,13 @@ class EngineContext:
     def later(self, delay: int, deliver: Deliver, token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
         try:
-            self._local.later(delay, partial(self._deliver, deliver), token)
+            self._local.later(delay, Call(partial(self._deliver, deliver)), token)
         except CrowdError as error:
             raise error.of(self._blame(error).path) from None
+
+    def hold(self, deliver: Deliver, token: Any) -> Callable[[], None]:
+        """``deliver(token)``, to be called later."""
+        return self._director.hold(Call(deliver), token).arrive
 
     def _deliver(self, deliver: Deliver, token: Any) -> None:
         try:

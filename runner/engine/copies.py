@@ -29,7 +29,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from epicycle.actors import Actor, EpicycleError, Parameter
+from epicycle.actors import CORE_MODULES, Actor, EpicycleError, Parameter
 from epicycle.actors.expression import Formula, PortFormula
 from epicycle.aspects import Aspect, JoinPoint
 
@@ -120,7 +120,7 @@ class Copies:
         copied = [(name, value, self._copy(value)) for name, value in _attributes(thing)]
         if all(value is other for _, value, other in copied):
             return thing
-        made = object.__new__(type(thing))
+        made = _new_of(type(thing))(type(thing))
         for name, _, value in copied:
             object.__setattr__(made, name, value)
         return made
@@ -189,7 +189,7 @@ class Copies:
         return self._later(self._fill_object, thing, thing.twin(self._known))
 
     def _object(self, thing: Any) -> Any:
-        made = self._later(self._fill_object, thing, object.__new__(type(thing)))
+        made = self._later(self._fill_object, thing, _new_of(type(thing))(type(thing)))
         if type(thing).__hash__ is not _HASH:  # which asks what is in it, perhaps now
             self._fill_object(*self._to_fill.pop()[1:3])
         return made
@@ -279,11 +279,22 @@ def _made_of(cls: Any) -> Callable[[Copies, Any], Any]:
 def _is_plain(cls: type) -> bool:
     """Whether an instance is its attributes and nothing else."""
     try:
-        object.__new__(cls)
+        _new_of(cls)(cls)
     except TypeError:  # there is more to it, of which only the class knows
         return False
-    is_python = all(base is object or base.__flags__ & _HEAP_TYPE for base in cls.__mro__)
-    return is_python and all(getattr(cls, name, None) is getattr(object, name, None) for name in _PROTOCOL)
+    is_ours = all(base is object or base.__flags__ & _HEAP_TYPE or _is_compiled(base) for base in cls.__mro__)
+    return is_ours and all(getattr(cls, name, None) is getattr(object, name, None) for name in _PROTOCOL)
+
+
+def _is_compiled(cls: type) -> bool:
+    """Whether a class is one of the core's in C: its attributes are those that ``__slots__`` names, as in Python."""
+    return not cls.__flags__ & _HEAP_TYPE and cls.__module__ in CORE_MODULES
+
+
+@_of_class
+def _new_of(cls: Any) -> Callable[[Any], Any]:
+    """What makes an instance without attributes."""
+    return next((base.__new__ for base in cls.__mro__ if _is_compiled(base)), object.__new__)
 
 
 def _attributes(thing: Any) -> Iterable[tuple[str, Any]]:
@@ -298,20 +309,17 @@ def _attributes(thing: Any) -> Iterable[tuple[str, Any]]:
 @_of_class
 def _slots(cls: Any) -> tuple[str, ...]:
     """The names of the slots that a class has."""
-    return tuple(
-        name for base in cls.__mro__ for name, value in vars(base).items() if type(value) is types.MemberDescriptorType
-    )
+    named = [vars(base).get("__slots__", ()) for base in cls.__mro__]
+    names = [name for each in named for name in ((each,) if isinstance(each, str) else each)]
+    return tuple(dict.fromkeys(name for name in names if name not in ("__dict__", "__weakref__")))
 
 
 @_of_class
 def _descriptors(cls: Any) -> frozenset[str]:
     """The names that set something else than the attribute."""
     return frozenset(
-        name
-        for base in cls.__mro__
-        for name, value in vars(base).items()
-        if hasattr(type(value), "__set__") and type(value) is not types.MemberDescriptorType
-    )
+        name for base in cls.__mro__ for name, value in vars(base).items() if hasattr(type(value), "__set__")
+    ).difference(_slots(cls))
 
 
 def _is_global(thing: Any) -> bool:

@@ -25,108 +25,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
-from heapq import heappop, heappush
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import Actor, EpicycleError, InputPort, Process, Tag, Wake, readable
-from epicycle.aspects import Job
+from epicycle.actors import NEVER, InputPort, Process, Ranks, Tag, Times, Wake, new_wake
 
-from ..text import NORMAL, RAISE_IT, Limits, Position, describe, told_raised
-from .agenda import Environment, Instant, Turn
-from .pace import Pace
+from ..text import NORMAL, Limits, describe
+from . import errors
+from .agenda import Delivery, Instant, Turn, Way, new_instant
+from .environment import Environment
+from .errors import ActorError, Crowd, CrowdError, LoopError, of_process
+from .pace import notice
 
-MAX_MICROSTEPS = 100_000
-MAX_STEPS = 1_000_000  # of SimPy at one instant
+if TYPE_CHECKING:
+    from epicycle.actors import Actor
+    from epicycle.aspects import Job
+
+    from .pace import Pace
+
 REPORTED = 256  # tokens that come together at one port: so many at a time are counted
-SHOWN = 3  # ports in the message of a ``CrowdError``
-_START = 0
-
-
-class ActorError(EpicycleError):
-    """An actor raised an exception: names it and the tag; the exception itself is the cause.
-
-    ``where`` is where the actor is declared, ``raised`` the line of a user's program from which the exception comes.
-    """
-
-    def __init__(
-        self, path: str, tag: Tag, doing: str, reason: str, where: str = "", raised: Position | None = None
-    ) -> None:
-        super().__init__(path, tag, doing, reason, where, raised)
-        self.path = path
-        self.tag = tag
-        self.doing = doing
-        self.reason = reason
-        self.where = where
-        self.raised = raised
-
-    def __str__(self) -> str:
-        lines = [readable(f"{self.path} failed in {self.doing} at {self.tag}: {self.reason}")]
-        lines += told_raised(self.raised) if self.raised is not None else []
-        lines += [f"   declared at {self.where}"] if self.where else []
-        return "\n".join(lines)
-
-
-class LoopError(EpicycleError):
-    """Time stands still: too many microsteps at one instant, or too many events of SimPy's."""
-
-    def __init__(self, time: int, actors: tuple[str, ...]) -> None:
-        super().__init__(time, actors)
-        self.time = time
-        self.actors = actors
-
-    def __str__(self) -> str:
-        head = f"time stands still at {self.time / 1e9:g} s: more than "
-        if not self.actors:
-            return head + f"{MAX_STEPS:,} SimPy events; a process waits again and again for no time at all"
-        names = ", ".join(self.actors)
-        return head + (
-            f"{MAX_MICROSTEPS:,} microsteps; the last actors that fired: {names}; give their loop a delay above zero"
-        )
-
-
-class CrowdError(LoopError):
-    """More at one tag, or still to come, than was meant to be; ``where`` are the ports at which most of it is."""
-
-    def __init__(self, tag: Tag, most: int, what: str, where: tuple[str, ...]) -> None:
-        super().__init__(tag.time, where)
-        self.args = (tag, most, what, where)
-        self.tag, self.most, self.what, self.where = self.args
-
-    def of(self, who: str) -> CrowdError:
-        """The same, with the name of who adds to it."""
-        return CrowdError(self.tag, self.most, self.what, (who,))
-
-    def __str__(self) -> str:
-        where = f", most of them at {', '.join(self.where)}" if self.where else ""
-        return readable(f"too much at {self.tag}: more than {self.most:,} {self.what}{where}; {RAISE_IT}")
-
-
-class Crowd:
-    """Counts what one tag holds, where there is much of it: those who add to it report many at a time."""
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self._tag: Tag | None = None
-        self._total = 0
-        self._by_port: dict[str, int] = {}
-
-    def add(self, tag: Tag, port: str, number: int) -> None:
-        """So many more at a port; raises ``CrowdError``."""
-        if tag != self._tag:
-            self._tag, self._total, self._by_port = tag, 0, {}
-        self._total += number
-        self._by_port[port] = self._by_port.get(port, 0) + number
-        if self._total > self.most:
-            ports = sorted(self._by_port, key=self._by_port.__getitem__, reverse=True)
-            raise CrowdError(tag, self.most, "tokens and acts of aspects", tuple(ports[:SHOWN]))
+_NOTICED = 16  # steps between two looks at what else there is
 
 
 class Director:
     """Fires the actors of one run."""
 
+    __slots__ = (
+        "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times", "_next", "_on_their_way",
+        "_queue", "_rank", "_ready", "_reason", "_recent", "_stop_after", "_times", "_turns", "crowd", "environment",
+        "firings", "present", "ranks", "seed", "steps",
+    )  # fmt: skip
+
     def __init__(self, order: dict[str, int], seed: int, limits: Limits = NORMAL) -> None:
-        self.environment = Environment(initial_time=_START)
+        self.environment = Environment(initial_time=0)
+        self._queue = self.environment.queue
         self.seed = seed
         self.crowd = Crowd(limits.tokens)
         self._on_their_way = 0  # tokens, to times and microsteps to come
@@ -134,101 +65,110 @@ class Director:
         self.firings = 0
         self.steps = 0  # tags, and events of SimPy's
         # The tag that is being handled, also while its time has another; None between, while SimPy does things.
-        self.present: Tag | None = None
-        self.last = Tag(_START, 0)  # the latest tag that was handled, or is being handled
+        self.present: Instant | None = None
+        self._last = new_instant(0, 0)  # the latest tag that was handled, or is being handled
         self.ranks = order  # of actors and of their inputs
-        self._turns: dict[int, Turn] = {}  # by rank
+        self._turns: list[Turn | None] = [None] * (max(order.values(), default=0) + 1)  # by rank
         # What is to be done: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
         # One entry per actor and tag, whatever the number of its tokens.
-        self._ready: list[int] = []
+        self._ready = Ranks()
         self._next: Instant | None = None
-        self._instants: dict[int, Instant] = {}
-        self._times: list[int] = []  # theirs (a heap)
+        self._times = Times()
         self._rank = -1  # the rank of what is handled now
         self._stop_after: Tag | None = None
         self._reason = "no events left"
         self._recent: list[str] | None = None  # who fires, when it looks as if time stood still
+        self._is_interrupted = False
+        self._most_microsteps = errors.MAX_MICROSTEPS
+        self._most_steps = errors.MAX_STEPS  # of SimPy at one instant
 
     @property
     def tag(self) -> Tag:
         """The present tag: outside of firings (a process that SimPy resumed), the first not handled yet."""
+        return self.now().tag
+
+    @property
+    def time(self) -> int:
+        """Its time (ns)."""
+        return self.now().time
+
+    @property
+    def last(self) -> Tag:
+        """The latest tag that was handled, or is being handled."""
+        return self._last.tag
+
+    def now(self) -> Instant:
+        """The present tag, with what is to be done at it if it is being handled."""
         if self.present is not None:
             return self.present
         # SimPy's time need not be whole; what comes between two nanoseconds belongs to the later one.
-        now = math.ceil(self.environment.now)
-        return Tag(now, 1) if now > self.last.time else Tag(self.last.time, self.last.microstep + 1)
+        now, last = math.ceil(self.environment.now), self._last
+        return new_instant(now, 1) if now > last.time else new_instant(last.time, last.microstep + 1)
 
     # -- what actors and aspects ask for --------------------------------------------------------------------------
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time``; the present or past is the next microstep."""
-        rank, present = self.ranks[actor.path], self.present
-        if present is None or time <= present.time:
-            return self.call(actor, self._tag_at(time), rank)
-        instant = self._instants.get(time) or self._await(Tag(time, 1))
-        wake = Wake(instant.tag)
-        instant.wakes.append((self.turn(actor, rank), wake))
-        return wake
+        return self.wake_turn(self.turn(actor, self.ranks[actor.path]), time)
+
+    def wake_turn(self, turn: Turn, time: int) -> Wake:
+        """Let an actor have a turn at ``time``."""
+        instant, now = self.present, self.now()
+        if instant is None and time <= now.time:
+            return self._call_now(turn, now)
+        if time > now.time:
+            return self._wake_at(turn, self._to_come(time, 1))
+        return self._wake_at(turn, self._to_come(now.time, now.microstep + 1))
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
         """Fire ``actor`` at a tag and rank that are still to come."""
-        turn = self.turn(actor, rank)
-        if tag == self.tag:
-            wake = Wake(tag)
-            turn.wakes.append(wake)
-            self._want(turn)
-        else:
-            instant = self._to_come(tag)
-            wake = Wake(instant.tag)  # which is equal: one tag for all that is to be done
-            instant.wakes.append((turn, wake))
+        turn, now = self.turn(actor, rank), self.now()
+        if tag.time == now.time and tag.microstep == now.microstep:
+            return self._call_now(turn, now)
+        return self._wake_at(turn, self._to_come(tag.time, tag.microstep))
+
+    def _call_now(self, turn: Turn, now: Instant) -> Wake:
+        wake = new_wake(now)
+        turn.add(wake)
+        self.want(turn)
+        return wake
+
+    def _wake_at(self, turn: Turn, instant: Instant) -> Wake:
+        wake = new_wake(instant)
+        instant.add(turn, wake)
         return wake
 
     def turn(self, actor: Actor, rank: int) -> Turn:
         """The turn of a rank, which ``actor`` has: an actor of the model, or who stands in for it."""
-        turn = self._turns.get(rank)
+        turn = self._turns[rank]
         if turn is None:
             turn = self._turns[rank] = Turn(actor, rank, self.ranks)
         return turn
 
-    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Callable[[Any], None]:
+    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
         """What puts tokens into a port at the present tag, and lets its actor fire, or who stands in for it."""
-        turn = self.turn(stand_in or port.actor, self.ranks[port.path])
-        rank, ready = turn.rank, self._ready
-        put, put_channel = port.entry()
-        arrived = port.arrived
-
-        def enter(token: Any) -> None:
-            put(token)
-            put_channel(channel)
-            if not turn.is_wanted:  # as in _want, without the call: this is done for every token that arrives
-                turn.is_wanted = True
-                heappush(ready, rank)
-                if self.present is None:
-                    self._await_present()
-            elif not len(arrived) % REPORTED:
-                self.crowd.add(self.tag, port.path, REPORTED)
-
-        return enter
+        return Entry(self, self.turn(stand_in or port.actor, self.ranks[port.path]), port, channel)
 
     def trigger(self, actor: Actor) -> None:
         """Fire ``actor`` at the present tag."""
-        self._want(self.turn(actor, self.ranks[actor.path]))
+        self.want(self.turn(actor, self.ranks[actor.path]))
 
-    def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
-        """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
-        now = self.tag
-        tag = Tag(now.time + delay, 1) if delay > 0 else Tag(now.time, now.microstep + 1)
-        deliveries = self._to_come(tag).deliveries
-        deliveries.append(self.hold(deliver, token))
+    def later(self, delay: int, way: Way, token: Any) -> None:
+        """Let a token go on after ``delay`` ns; 0 is the next microstep."""
+        now = self.now()
+        instant = self._to_come(now.time + delay, 1) if delay > 0 else self._to_come(now.time, now.microstep + 1)
+        if instant.pending is None:
+            instant.pending = []
+        instant.pending.append(self.hold(way, token))
         self._on_their_way += 1
-        if len(deliveries) > self.crowd.most:
-            raise CrowdError(tag, self.crowd.most, "tokens that are on their way", self._who())
+        if len(instant.pending) > self.crowd.most:
+            raise CrowdError(instant.tag, self.crowd.most, "tokens that are on their way", self._who())
         if self._on_their_way > self._most_times:
-            raise CrowdError(now, self._most_times, "tokens that are on their way, to all times", self._who())
+            raise CrowdError(now.tag, self._most_times, "tokens that are on their way, to all times", self._who())
 
-    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
-        """``deliver(token)``, to be called later."""
-        return partial(deliver, token)
+    def hold(self, way: Way, token: Any) -> Delivery:
+        """What lets a token go on, later."""
+        return Delivery(way, token)
 
     def stop(self, reason: str) -> None:
         """End the run when the present tag has been handled; the first who asks gives the reason."""
@@ -248,120 +188,123 @@ class Director:
     def put_back(self, job: Job) -> None:
         """A firing that was put off is the next one of its actor."""
 
-    def _tag_at(self, time: int) -> Tag:
-        """The tag of a wake-up for ``time``."""
-        now = self.tag
-        if time > now.time:
-            return Tag(time, 1)
-        return now if self.present is None else Tag(now.time, now.microstep + 1)
-
     # -- the agenda -----------------------------------------------------------------------------------------------
 
     def _who(self) -> tuple[str, ...]:
         """The actor that fires now."""
-        turn = self._turns.get(self._rank)
+        turn = None if self._rank < 0 else self._turns[self._rank]
         return () if turn is None else (turn.actor.path,)
 
-    def _want(self, turn: Turn) -> None:
+    def want(self, turn: Turn) -> None:
         """Let an actor have a turn at the present tag."""
         if not turn.is_wanted:
             turn.is_wanted = True
-            heappush(self._ready, turn.rank)
+            self._ready.push(turn.rank)
             if self.present is None:
                 self._await_present()
 
-    def _to_come(self, tag: Tag) -> Instant:
+    def _to_come(self, time: int, microstep: int) -> Instant:
         """What is to be done at a tag after the present one: the next microstep, or the first one of a later time."""
-        if tag.time > self.tag.time:
-            return self._instants.get(tag.time) or self._await(tag)
+        present = self.present
+        if time > (self.now() if present is None else present).time:
+            instant = self._times.at(time)
+            return self._await(time, microstep) if instant is None else instant
         if self._next is None:
-            self._next = Instant(tag)
-            if self.present is None:
+            self._next = new_instant(time, microstep)
+            if present is None:
                 self._await_present()
         return self._next
 
     def _await_present(self) -> None:
         """Between tags: see to it that the present one is going to be handled."""
-        tag = self.tag
-        if tag.time not in self._instants:
-            self._await(tag)
+        now = self.now()
+        if self._times.at(now.time) is None:
+            self._await(now.time, now.microstep)
 
-    def _await(self, tag: Tag) -> Instant:
+    def _await(self, time: int, microstep: int) -> Instant:
         """Put a tag into the agenda."""
-        if len(self._instants) > self._most_times:
-            raise CrowdError(tag, self._most_times, "times at which something is still to come", self._who())
-        heappush(self._times, tag.time)
-        instant = self._instants[tag.time] = Instant(tag)
+        if self._times.size > self._most_times:
+            what = "times at which something is still to come"
+            raise CrowdError(Tag(time, microstep), self._most_times, what, self._who())
+        instant = new_instant(time, microstep)
+        self._times.add(instant)
         return instant
 
     # -- time -----------------------------------------------------------------------------------------------------
 
     def _handle(self, instant: Instant) -> None:
-        tag, turns, ready = instant.tag, self._turns, self._ready
-        for turn, wake in instant.wakes:
-            turn.wakes.append(wake)
-            if not turn.is_wanted:
-                turn.is_wanted = True
-                heappush(ready, turn.rank)
-        if instant.deliveries:
+        turns, ready = self._turns, self._ready
+        if instant.turn is not None and instant.wake is not None:
+            self._wake_up(instant.turn, instant.wake)
+            instant.wake = None  # which knows the instant: without this they would wait for the garbage collector
+        if instant.turns is not None and instant.wakes is not None:
+            for place in range(len(instant.turns)):
+                self._wake_up(instant.turns[place], instant.wakes[place])
+            instant.wakes = None
+        if instant.pending is not None:
             self._rank = -1
-            self._begin(tag)
-            for deliver in instant.deliveries:
-                deliver()
-            self._on_their_way -= len(instant.deliveries)
-        while ready:
-            turn = turns[heappop(ready)]
+            self._begin(instant)
+            for delivery in instant.pending:
+                delivery.arrive()
+            self._on_their_way -= len(instant.pending)
+        while ready.size:
+            turn = turns[ready.pop()]
+            assert turn is not None
             turn.is_wanted = False
             self._rank = turn.rank
-            if turn.wakes and not self._use_wakes(turn):
+            if turn.wake is not None and not self.use_wakes(turn):
                 continue
-            if self.present is not tag:
-                self._begin(tag)
+            if self.present is not instant:
+                self._begin(instant)
             self.fire(turn)
         if self._next is None:
             self.present = None
 
-    def _begin(self, tag: Tag) -> None:
+    def _wake_up(self, turn: Turn, wake: Wake) -> None:
+        turn.add(wake)
+        if not turn.is_wanted:
+            turn.is_wanted = True
+            self._ready.push(turn.rank)
+
+    def _begin(self, instant: Instant) -> None:
         """Something happens at a tag, for the first time."""
-        self.present = self.last = tag
-        if tag.microstep > MAX_MICROSTEPS - 10:
-            if tag.microstep > MAX_MICROSTEPS:
-                raise LoopError(tag.time, tuple(dict.fromkeys(self._recent or ())))
+        self.present = self._last = instant
+        if instant.microstep > self._most_microsteps - 10:
+            if instant.microstep > self._most_microsteps:
+                raise LoopError(instant.time, tuple(dict.fromkeys(self._recent or ())))
             self._recent = self._recent or []
         else:
             self._recent = None
 
-    def _use_wakes(self, turn: Turn) -> bool:
+    def use_wakes(self, turn: Turn) -> bool:
         """Make the wake-ups of a turn due; false if the actor has nothing to fire for after all."""
         return turn.use_wakes()
 
     def fire(self, turn: Turn) -> None:
         """Let an actor fire, in its turn."""
+        if self._is_interrupted:
+            raise KeyboardInterrupt
         self.firings += 1
         if self._recent is not None:
             self._recent.append(turn.actor.path)
-        for port in turn.later:
-            port.hold()
+        if turn.later:
+            turn.hold()
         try:
-            turn.actor.fire()
+            if turn.form is not None:
+                turn.form.fire()
+            else:
+                turn.actor.fire()
         except (ActorError, LoopError, KeyboardInterrupt):  # of an aspect on the way of a token, of the user
             raise
         except BaseException as error:  # whatever an actor raises, sys.exit() too, is its failure
             doing = "run()" if isinstance(turn.actor, Process) else "fire()"
             raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
         finally:
-            for port in turn.ports:
-                port.clear()
-            for port in turn.later:
-                port.release()
+            turn.clear()
 
     def interrupt(self) -> None:
         """Raise ``KeyboardInterrupt`` in the place of the next firing, or of the next instant."""
-
-        def raise_it(_: Any) -> NoReturn:
-            raise KeyboardInterrupt
-
-        vars(self)["fire"] = vars(self.environment)["comes_by"] = raise_it
+        self._is_interrupted = True
 
     def run(
         self,
@@ -376,66 +319,92 @@ class Director:
         Returns why it ended; nothing if that is because ``most`` steps are done, of which each is a tag or an event of
         SimPy's.
         """
-        environment, times = self.environment, self._times
-        last_step = math.inf if most is None else self.steps + most
+        environment, times, queue = self.environment, self._times, self._queue
+        last_step = NEVER if most is None else self.steps + most
+        last_time = NEVER - 1 if stop is None else stop
         here = 0
-        now: float = self.last.time
+        now = self._last.time
         if pace is not None:
             pace.wait_for(now)
         if progress is not None:
             progress(now / 1e9)
         while self.steps < last_step:
-            after, instant = self._stop_after, self._next if self.present is not None else None
-            if after is not None and self.last >= after:
+            instant = None if self.present is None else self._next
+            if self._stop_after is not None and self._last.tag >= self._stop_after:
                 break
-            goes_on, is_of_simpy = instant is not None, False
+            is_of_simpy = False
             if instant is not None:  # more of the present time
-                upcoming: float = instant.tag.time
+                upcoming = instant.time
             else:
-                upcoming = times[0] if times else math.inf
-                if environment.comes_by(upcoming):
-                    upcoming, is_of_simpy = environment.peek(), True
-                if upcoming == math.inf or (after is not None and max(upcoming, self.last.time) > after.time):
+                upcoming = times.first()
+                if queue and queue[0][0] <= upcoming:
+                    is_of_simpy = True
+                    upcoming = math.ceil(min(queue[0][0], NEVER))
+                if upcoming == NEVER:
                     break
-            if stop is not None and upcoming > stop:
+                if self._stop_after is not None and max(upcoming, self._last.time) > self._stop_after.time:
+                    break
+            if upcoming > last_time:
                 if pace is not None:
-                    pace.wait_for(stop)
+                    pace.wait_for(last_time)
                 return "stop time"
             if pace is not None and upcoming > now:
                 pace.wait_for(upcoming)
             try:
+                if self._is_interrupted:
+                    raise KeyboardInterrupt
                 if is_of_simpy:
                     environment.step()
                 elif instant is not None:
                     self._next = None
                     self._handle(instant)
                 else:
-                    environment.move_on(times[0])
-                    self._handle(self._instants.pop(heappop(times)))
+                    environment._now = upcoming
+                    self._handle(times.pop())
             except BaseException as error:
                 self.present = None
                 if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
                     raise
-                found, cause = self._of_process(error, actors)
+                found, cause = of_process(error, actors, self.tag)
                 raise found from cause
-            here = here + (not goes_on) if upcoming == now else 0
+            if upcoming != now:
+                here = 0
+            elif instant is None:
+                here += 1
             now = upcoming
-            if here > MAX_STEPS:
+            if here > self._most_steps:
                 raise LoopError(self.tag.time, ())
             self.steps += 1
-            if progress is not None and self.steps % 16 == 0:
-                progress(now / 1e9)
+            if self.steps % _NOTICED == 0:
+                notice(progress, now)
         else:
             return ""
         return self._reason
 
-    def _of_process(self, error: BaseException, actors: list[Actor]) -> tuple[ActorError, BaseException | None]:
-        """The error of a process that SimPy resumed, and its cause: from there, no firing says whose it was."""
-        for actor in actors:
-            failure = actor.failure if isinstance(actor, Process) else None
-            if isinstance(failure, ActorError):  # of an aspect or a metric, to which the process has sent
-                return failure, failure.__cause__
-            if failure is not None:
-                return ActorError(actor.path, self.tag, "run()", describe(failure)), failure
-        cause = error.__cause__ or error  # SimPy raises a copy of it
-        return ActorError("a SimPy process", self.tag, "its generator", describe(cause)), cause
+
+class Entry(Way):
+    """Where a token gets to an actor: into a port, on one channel."""
+
+    __slots__ = ("channel", "director", "is_plain", "port", "turn")
+
+    def __init__(self, director: Director, turn: Turn, port: InputPort[Any], channel: int) -> None:
+        self.director = director
+        self.turn = turn
+        self.port = port
+        self.channel = channel
+        self.is_plain = type(port).receive is InputPort.receive and port.width == 1
+
+    def go(self, token: Any) -> None:
+        """Put a token in."""
+        turn = self.turn
+        if self.is_plain:
+            self.port.arrived.append(token)
+        else:
+            self.port.receive(token, self.channel)
+        if not turn.is_wanted:  # as in want, without the call: this is done for every token that arrives
+            turn.is_wanted = True
+            self.director._ready.push(turn.rank)
+            if self.director.present is None:
+                self.director._await_present()
+        elif not len(self.port.arrived) % REPORTED:
+            self.director.crowd.add(self.director.tag, self.port.path, REPORTED)

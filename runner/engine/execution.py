@@ -17,7 +17,8 @@ from epicycle.aspects import ActorPoint, Job
 
 from ..text import describe
 from .agenda import Turn
-from .director import ActorError, Director
+from .director import Director
+from .errors import ActorError
 from .local_time import LocalDirector
 
 

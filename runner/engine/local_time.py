@@ -7,7 +7,6 @@ place of the composite (``firing_order``).  What is theirs alone is the time tha
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 import simpy
@@ -16,9 +15,9 @@ from simpy.events import NORMAL, Event, EventPriority
 from epicycle.actors import Actor, Tag, Wake
 
 from ..graph import Clock
+from .agenda import Delivery, Way
 from .director import Director
-
-Deliver = Callable[[Any], None]
+from .way import Call
 
 
 class LocalDirector:
@@ -38,16 +37,16 @@ class LocalDirector:
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at a local time."""
         wake = self._director.wake(actor, self._clock.outer(time))
-        wake.tag = self._clock.tag(wake.tag)
+        wake.when = self._clock.tag(wake.tag)
         return wake
 
     def stop(self, reason: str) -> None:
         """End the run, not only what this composite does."""
         self._director.stop(reason)
 
-    def later(self, delay: int, deliver: Deliver, token: Any) -> None:
-        """Call ``deliver(token)`` after ``delay`` ns of local time."""
-        self._director.later(self._clock.span(self._director.tag.time, delay), deliver, token)
+    def later(self, delay: int, way: Way, token: Any) -> None:
+        """Let a token go on after ``delay`` ns of local time."""
+        self._director.later(self._clock.span(self._director.time, delay), way, token)
 
 
 class LocalEnvironment(simpy.Environment):
@@ -88,22 +87,22 @@ class Passage(Actor):
         self._director = director
         self._lanes: dict[object, _Lane] = {}
 
-    def lane(self, channel: object, onward: Deliver) -> Deliver:
-        """What to do with a token of a channel that has come so far; ``onward`` is called with it when it passes."""
+    def lane(self, channel: object, onward: Way) -> Way:
+        """Where a token of a channel goes that has come so far; ``onward`` is where it goes when it has passed."""
         lane = self._lanes.setdefault(channel, _Lane())
 
         def arrive(token: Any) -> None:
             lane.waiting.append(self._director.hold(onward, token))
             self._director.trigger(self)
 
-        return arrive
+        return Call(arrive)
 
     def fire(self) -> None:
         now = self.tag
         for lane in self._lanes.values():
             if lane.waiting and lane.passed != now:
                 lane.passed = now
-                lane.waiting.popleft()()
+                lane.waiting.popleft().arrive()
         if any(lane.waiting for lane in self._lanes.values()):
             self.wake_in(0)
 
@@ -114,5 +113,5 @@ class _Lane:
     __slots__ = ("passed", "waiting")
 
     def __init__(self) -> None:
-        self.waiting: deque[Callable[[], None]] = deque()
+        self.waiting: deque[Delivery] = deque()
         self.passed: Tag | None = None

@@ -10,6 +10,15 @@ SLOWEST = 1e-9  # model seconds in a second: a nanosecond, than which no step of
 LONGEST = 3_600.0  # s that are slept at once: what the operating system takes has an end
 
 
+def notice(progress: Callable[[float], None] | None, now: int) -> None:
+    """Tell of the progress, at a time (ns).
+
+    A run in C calls this now and then because it is Python: meanwhile signals are handled, and other threads go on.
+    """
+    if progress is not None:
+        progress(now / 1e9)
+
+
 class Pace:
     """Lets model time pass no faster than ``factor`` seconds of it in a second of the wall clock.
 

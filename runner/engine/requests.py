@@ -9,7 +9,7 @@ from epicycle.actors import EpicycleError, to_nanoseconds, to_seconds
 from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
 from ..graph import WovenAspect
-from .local_time import Deliver
+from .way import Deliver
 
 
 class Requests:

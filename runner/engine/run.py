@@ -18,11 +18,13 @@ from ..interrupt import between_steps
 from ..results import EventLog, Record, Results, Signal
 from ..text import describe, raised_at
 from .copies import Copies
-from .director import ActorError, Director
-from .local_time import Deliver
+from .director import Director
+from .errors import ActorError
+from .forms import attach
 from .measurement import Measurement
 from .pace import Pace
 from .trace import Tracer, TracingDirector, TracingLog
+from .way import Deliver
 from .ways import Ways
 
 Keeps = Callable[[str, str, str, str], bool]
@@ -141,6 +143,7 @@ class Run:
         self._ways.begin()
         # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
         self._ways.open()
+        attach(self.director, self.actors, self._ways.executed)
 
     def end(self) -> ActorError | None:
         """Let every actor wrap up, whatever happened before; the first error of these is returned."""

@@ -9,14 +9,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, Tag, Wake
+from epicycle.actors import Actor, InputPort, Tag, Wake, When
 from epicycle.aspects import Job
 
-from ..results import EventLog, Record, Write
+from ..results import EventLog, Names, Record, Writer
 from ..text import Limits
-from .agenda import Turn
+from .agenda import Delivery, Turn, Way
 from .director import Director
 from .execution import is_stand_in
+from .way import Call
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,14 +89,18 @@ class TracingLog(EventLog):
         super().__init__(keeps)
         self._tracer = tracer
 
-    def _new_writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
-        write = super()._new_writer(event, actor, port, channel, aspect)
+    def new_writer(self, names: Names, keep: Callable[[Record], None] | None) -> Writer:
+        return _TracingWriter(self, names, keep, self._tracer)
 
-        def write_and_tell(tag: Tag, value: Any) -> None:
-            write(tag, value)
-            self._tracer.add(Record(tag, event, actor, port, channel, aspect, value))
 
-        return write_and_tell
+class _TracingWriter(Writer):
+    def __init__(self, log: EventLog, names: Names, keep: Callable[[Record], None] | None, tracer: Tracer) -> None:
+        super().__init__(log, names, keep)
+        self._tracer = tracer
+
+    def write(self, when: When, value: Any) -> None:
+        super().write(when, value)
+        self._tracer.add(Record(Tag(when.time, when.microstep), *self.names, value))
 
 
 class TracingDirector(Director):
@@ -115,33 +120,37 @@ class TracingDirector(Director):
             self._asked[wake] = self.tag if self.last.microstep else None
         return wake
 
-    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Callable[[Any], None]:
+    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
         enter = super().entry(port, channel, stand_in)
         if port.actor.path not in self._tracer.actors:
             return enter
 
         def enter_and_tell(token: Any) -> None:
-            enter(token)
+            enter.go(token)
             arrival = Arrival(port.name, channel, token, *self._tracer.origin)
             self._arrivals.setdefault(port.actor.path, []).append(arrival)
 
-        return enter_and_tell
+        return Call(enter_and_tell)
 
-    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
+    def hold(self, way: Way, token: Any) -> Delivery:
         origin = self._tracer.origin
 
-        def release() -> None:
+        def release(token: Any) -> None:
             self._tracer.origin, self._tracer.releasing = origin, True
             try:
-                deliver(token)
+                way.go(token)
             finally:
                 self._tracer.releasing = False
 
-        return release
+        return super().hold(Call(release), token)
 
-    def _use_wakes(self, turn: Turn) -> bool:
-        asked = [(wake, self._asked.pop(wake)) for wake in turn.wakes if wake in self._asked]
-        is_to_fire = super()._use_wakes(turn)
+    def use_wakes(self, turn: Turn) -> bool:
+        asked = [
+            (wake, self._asked.pop(wake))
+            for wake in (turn.wake, *(turn.wakes or ()))
+            if wake is not None and wake in self._asked
+        ]
+        is_to_fire = super().use_wakes(turn)
         self._due = [tag for wake, tag in asked if wake.due and is_to_fire]
         return is_to_fire
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from functools import partial
 from typing import Any, TypeVar
 
@@ -12,8 +12,6 @@ from epicycle.actors import (
     Emit,
     EpicycleError,
     OutputPort,
-    PortError,
-    counted,
     declared_parameters,
 )
 from epicycle.aspects import (
@@ -30,14 +28,17 @@ from epicycle.aspects import (
 )
 
 from ..graph import Clock, Hop, ModelGraph, WovenAspect
-from ..results import EventLog, Signal, Write
+from ..results import EventLog, Signal
 from ..text import describe
+from .agenda import Way
 from .aspect_context import EngineContext
-from .director import ActorError, Director, LoopError
+from .director import Director
+from .errors import ActorError, LoopError
 from .execution import Execution
-from .local_time import Deliver, LocalDirector, Passage
+from .local_time import LocalDirector, Passage
 from .parameters import VaryingParameter
 from .requests import Requests
+from .way import Call, Delayed, Deliver, Screened, Sender, all_of
 
 T = TypeVar("T")
 P = TypeVar("P", bound=JoinPoint)
@@ -116,10 +117,10 @@ class Ways:
             owner, _, name = path.rpartition(".")
             actor = self.actors[owner]
             varying = VaryingParameter(actor, declared_parameters(type(actor))[name])
-            entry: Deliver = varying.set
+            entry: Way = Call(varying.set)
             for woven in reversed(there):
                 entry = self._through(woven, path, path, entry)
-            self._executions[owner].refresh.append(partial(entry, varying.nominal))
+            self._executions[owner].refresh.append(partial(entry.go, varying.nominal))
 
     def director_of(self, path: str) -> Director | LocalDirector:
         """The director that an actor or composite stands under, with its time."""
@@ -142,6 +143,11 @@ class Ways:
         if clock == before:
             return self.director_of(path)
         return self.director if clock.is_global else LocalDirector(self.director, clock)
+
+    @property
+    def executed(self) -> Container[str]:
+        """The actors that aspects stand at, or whose parameters they change."""
+        return self._executions
 
     def open(self) -> None:
         """From now on tokens can be sent."""
@@ -175,56 +181,39 @@ class Ways:
 
     def _open_requests(self) -> None:
         """Find the ways from the request ports of aspects that are models to the actors inside."""
-        ways: dict[str, Deliver] = {}
+        ways: dict[str, Way] = {}
         for requests in self._requests.values():
             for place, path in requests.model.requests.items():
                 if path not in ways:
-                    ways[path] = _all(self._branches(path, ()))
+                    ways[path] = all_of(self._branches(path, ()))
                 passage = self._passages.get(path)
                 onward = ways[path] if passage is None else passage.lane(place, ways[path])
-                requests.entries[place] = self._woven(path, path, onward)
+                requests.entries[place] = self._woven(path, path, onward).go
+
+    def _heard(self, path: str) -> list[Way]:
+        """Who listens to what leaves a port."""
+        return [Call(listener) for listener in self._listeners.get(path, [])]
 
     def _emit(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emit:
         """What ``port.send`` does."""
-        listeners = self._listeners.get(port.path, [])
-        everywhere = _all(listeners + self._branches(port.path, ()))
-        # To single channels, made when the first token takes them: few ever do.
-        ways: dict[int, tuple[Write, Deliver]] = {}
         port.width = len(wires)
-        log, director, path, name = self.log, self.director, port.actor.path, port.name
-        write = log.writer("send", path, name, None, "")
 
-        def emit_one(token: Any, channel: int | None = None) -> None:
-            if channel is None:
-                write(director.present or director.tag, token)
-                everywhere(token)
-                return
-            way = ways.get(channel)
-            if way is None:
-                if not 0 <= channel < len(wires):
-                    known = f"it has {counted(len(wires), 'channel')}, counted from 0"
-                    raise PortError(f"{port.path} has no channel {channel}: {known}")
-                along = _all([*listeners, self._way(wires[channel])])
-                way = ways[channel] = log.writer("send", path, name, channel, ""), along
-            write_one, onward = way
-            write_one(director.present or director.tag, token)
-            onward(token)
+        def sender(channel: int | None, ways: list[Way]) -> Sender:
+            writer = self.log.writer("send", port.actor.path, port.name, channel, "")
+            return Sender(
+                port.path, self.director, writer, all_of([*self._heard(port.path), *ways]), single, port.width
+            )
 
+        def single(channel: int) -> Sender:
+            return sender(channel, [self._way(wires[channel])])
+
+        everywhere = sender(None, self._branches(port.path, ()))
         # An aspect at an output stands before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
-            return emit_one
-        entries: dict[int | None, Deliver] = {}
+            return everywhere.send
+        return Screened(everywhere, lambda onward: self._woven(port.path, port.path, onward)).send
 
-        def emit_woven(token: Any, channel: int | None = None) -> None:
-            entry = entries.get(channel)
-            if entry is None:
-                # The channel of a send travels past the aspects in this closure, for they may forward it later.
-                entry = entries[channel] = self._woven(port.path, port.path, lambda passed: emit_one(passed, channel))
-            entry(token)
-
-        return emit_woven
-
-    def _branches(self, path: str, hops: tuple[Hop, ...]) -> list[Deliver]:
+    def _branches(self, path: str, hops: tuple[Hop, ...]) -> list[Way]:
         """The ways onward from a port, one for each connection that leaves it."""
         ways = []
         for hop in self.graph.outgoing(path):
@@ -232,18 +221,18 @@ class Ways:
             if self.graph.owner(far) in self.actors:
                 onward = self._put(taken)
             else:
-                onward = _all(self._listeners.get(far, []) + self._branches(far, taken))
+                onward = all_of(self._heard(far) + self._branches(far, taken))
             ways.append(self._over(hop, onward, taken))
         return ways
 
-    def _way(self, hops: tuple[Hop, ...]) -> Deliver:
+    def _way(self, hops: tuple[Hop, ...]) -> Way:
         """The way along one wire alone, for tokens that are sent to one channel."""
         onward = self._put(hops)
         for hop in reversed(hops):
-            onward = self._over(hop, _all([*self._listeners.get(hop.destination, []), onward]), hops)
+            onward = self._over(hop, all_of([*self._heard(hop.destination), onward]), hops)
         return onward
 
-    def _over(self, hop: Hop, onward: Deliver, channel: tuple[Hop, ...]) -> Deliver:
+    def _over(self, hop: Hop, onward: Way, channel: tuple[Hop, ...]) -> Way:
         """One connection: its delay, and the aspects and the passage at its far end."""
         far = hop.destination
         passage = self._passages.get(far)
@@ -258,30 +247,28 @@ class Ways:
             onward = self._woven(far, source, onward)
         for woven in reversed(self._woven_on.get((hop.source, far), [])):
             onward = self._through(woven, far, source, onward, f"{hop.source} -> {far}")
-        return onward if hop.delay is None else self._delayed(hop, hop.delay, onward)
+        if hop.delay is None:
+            return onward
+        return Delayed(self._directors[self.graph.director_over(hop)], hop.delay, onward)
 
-    def _put(self, hops: tuple[Hop, ...]) -> Deliver:
+    def _put(self, hops: tuple[Hop, ...]) -> Way:
         """The end of a wire, in the port of an actor."""
         owner, _, name = hops[-1].destination.rpartition(".")
         port, execution = self.actors[owner].inputs[name], self._executions.get(owner)
         return self.director.entry(port, self._channels[hops], None if execution is None else execution.turn_of(port))
 
-    def _delayed(self, hop: Hop, delay: int, onward: Deliver) -> Deliver:
-        later = self._directors[self.graph.director_over(hop)].later
-        return lambda token: later(delay, onward, token)
-
-    def _woven(self, path: str, source: str, onward: Deliver) -> Deliver:
+    def _woven(self, path: str, source: str, onward: Way) -> Way:
         """``onward`` with the aspects that stand at a port before it, the first declared outermost."""
         for woven in reversed(self._woven_at.get(path, [])):
             onward = self._through(woven, path, source, onward)
         return onward
 
-    def _through(self, woven: WovenAspect, path: str, source: str, onward: Deliver, place: str = "") -> Deliver:
+    def _through(self, woven: WovenAspect, path: str, source: str, onward: Way, place: str = "") -> Way:
         """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
         aspect = woven.aspect
         assert isinstance(aspect, PortAspect)
-        point = self._point(JoinPoint, woven, aspect, path, onward, place or path, source)
-        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()")
+        point = self._point(JoinPoint, woven, aspect, path, onward.go, place or path, source)
+        return Call(self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()"))
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
         """``onward`` with the aspects that stand at an actor before it, the first declared outermost."""
@@ -402,15 +389,3 @@ class Ways:
                 raise
             except Exception as error:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
-
-
-def _all(ways: list[Deliver]) -> Deliver:
-    """One way that takes all of them."""
-    if len(ways) == 1:
-        return ways[0]
-
-    def onward(token: Any) -> None:
-        for way in ways:
-            way(token)
-
-    return onward

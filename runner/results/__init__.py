@@ -2,7 +2,7 @@
 
 from .arrow import write_signals
 from .encoding import TokenError, canonical, cell, leaves, plain
-from .log import EventLog, LogError, Record, Write
+from .log import EventLog, LogError, Names, Record, Writer
 from .log_file import LogFile, check_log_path, write_log
 from .outcome import Interval, Outcome
 from .results import Results
@@ -13,6 +13,7 @@ __all__ = [
     "Interval",
     "LogError",
     "LogFile",
+    "Names",
     "Outcome",
     "Past",
     "Record",
@@ -20,7 +21,7 @@ __all__ = [
     "Signal",
     "SignalError",
     "TokenError",
-    "Write",
+    "Writer",
     "canonical",
     "cell",
     "check_log_path",

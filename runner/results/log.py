@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, Tag, to_seconds
+from epicycle.actors import EpicycleError, Tag, When, new_tag, to_seconds
 
 from ..shown import short
 from ..tables import pandas_module
 from .encoding import canonical, plain
+from .packing import AS_THEY_ARE, packed, stamp
 from .signal import Past
 from .waiting import LARGE, WaitingTokens
 
@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     import pandas
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
-_TAG = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 _PIECES = 3_000  # that are hashed together, when a tag is over
 _MOST_PIECES = 30_000
+_BEYOND = 2**63  # whole numbers from here on are texts, and may be too long for that
 
-Write = Callable[["Tag", Any], None]
+
+Names = tuple[str, str, str, "int | None", str]  # event, actor, port, channel, aspect
 
 
 class LogError(EpicycleError):
@@ -47,8 +48,8 @@ class Record:
     def encoded(self, *, microstep: bool = True) -> bytes:
         """The record in the canonical form of which the digest is made; with ``microstep`` false without that."""
         names = map(canonical, (self.event, self.actor, self.port, self.aspect, self.channel))
-        tag = _TAG(b"i", self.tag.time, b"i", self.tag.microstep if microstep else 0)
-        return tag + b"".join(names) + canonical(self.value)
+        tag = self.tag if microstep else Tag(self.tag.time, 0)
+        return stamp(tag) + b"".join(names) + canonical(self.value)
 
     def __str__(self) -> str:
         channel = "" if self.channel is None else f"[{self.channel}]"
@@ -70,11 +71,49 @@ class Record:
         )
 
 
+class Writer:
+    """Appends records with the same names to a log: a tag and a value are all that there is to give for each."""
+
+    __slots__ = ("_head", "_keep", "log", "names")
+
+    def __init__(self, log: EventLog, names: Names, keep: Callable[[Record], None] | None) -> None:
+        event, actor, port, channel, aspect = self.names = names
+        self.log = log
+        self._head = b"".join(map(canonical, (event, actor, port, aspect, channel)))
+        self._keep = keep
+
+    def write(self, when: When, value: Any) -> None:
+        """Append a record; raises what makes it impossible to log the value."""
+        log = self.log
+        pieces = log.pieces
+        if AS_THEY_ARE and type(value) in AS_THEY_ARE and (type(value) is not int or -_BEYOND <= value < _BEYOND):
+            kept = value
+        else:
+            kept = log.tokens[type(value)](value)
+        if when is not log.when:
+            log.turn_to(when)
+        pieces.extend((log.stamp, self._head, kept))
+        if len(pieces) > _MOST_PIECES:  # all of them at one tag, nearly
+            log.hash_many(f"{self.names[1]}.{self.names[2]}")
+        elif type(kept) is bytes and len(kept) > LARGE:
+            log.hash_pieces()
+        if self._keep is not None:
+            self._keep(Record(_tag(when), *self.names, value))
+
+
+def _tag(when: When) -> Tag:
+    return when if type(when) is Tag else new_tag(when.time, when.microstep)
+
+
 class EventLog:
     """Counts and digests every record, and keeps those that ``keeps(event, actor, port, aspect)`` says.
 
     With ``log_to`` it keeps none of these, but gives them to that.
     """
+
+    __slots__ = (
+        "_hash", "_hashed", "_keeps", "_log_to", "_writers", "crowd", "pieces", "records", "stamp", "tokens", "when",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -84,75 +123,59 @@ class EventLog:
         self.records: list[Record] = Past()
         self._log_to = log_to
         self._keeps = keeps
-        self._writers: dict[tuple[str, str, str, str, int | None], Write] = {}
+        self._writers: dict[Names, Writer] = {}
         # What the digest is made of, three pieces a record: tag, names, what was kept of the value.  Many are hashed at
         # a time.
         self._hash = hashlib.sha256()
-        self._pieces: list[Any] = []
-        self._tokens = WaitingTokens()
+        self.pieces: list[Any] = []
+        self.tokens = WaitingTokens()
         self._hashed = 0  # records
-        self._tag: Tag | None = None  # of the last record
-        self._stamp = b""  # the same in bytes
+        self.when: When | None = None  # of the last record
+        self.stamp = b""  # the same in bytes
         self.crowd: Callable[[Tag, str, int], None] | None = None  # is told of many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
-        self.writer(event, actor, port, channel, aspect)(tag, value)
+        self.writer(event, actor, port, channel, aspect).write(tag, value)
 
-    def writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
-        """What appends records with these names: a tag and a value are all that there is to give for each."""
-        names = (event, actor, port, aspect, channel)
-        write = self._writers.get(names)
-        if write is None:
-            write = self._writers[names] = self._new_writer(event, actor, port, channel, aspect)
-        return write
+    def writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Writer:
+        """What appends records with these names."""
+        names = (event, actor, port, channel, aspect)
+        if (writer := self._writers.get(names)) is None:
+            keeps = self._keeps is not None and self._keeps(event, actor, port, aspect)
+            keep = (self._log_to or self.records.append) if keeps else None
+            writer = self._writers[names] = self.new_writer(names, keep)
+        return writer
 
-    def _new_writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Write:
-        head = b"".join(map(canonical, (event, actor, port, aspect, channel)))
-        pieces, tokens = self._pieces, self._tokens
+    def new_writer(self, names: Names, keep: Callable[[Record], None] | None) -> Writer:
+        """A writer that there was none of before."""
+        return Writer(self, names, keep)
 
-        def write(tag: Tag, value: Any) -> None:
-            kept = tokens[type(value)](value)  # raises what cannot be logged
-            if tag is not self._tag:
-                self._turn_to(tag)
-            pieces.extend((self._stamp, head, kept))
-            if len(pieces) > _MOST_PIECES:  # all of them at one tag, nearly
-                if self.crowd is not None:
-                    self.crowd(tag, f"{actor}.{port}", _MOST_PIECES // 3)
-                self._hash_pieces()
-            elif type(kept) is bytes and len(kept) > LARGE:
-                self._hash_pieces()
-
-        if self._keeps is None or not self._keeps(event, actor, port, aspect):
-            return write
-
-        keep = self._log_to or self.records.append
-
-        def write_and_keep(tag: Tag, value: Any) -> None:
-            write(tag, value)
-            keep(Record(tag, event, actor, port, channel, aspect, value))
-
-        return write_and_keep
-
-    def _turn_to(self, tag: Tag) -> None:
+    def turn_to(self, when: When) -> None:
         """The records that follow are of this tag."""
-        self._tag = tag
-        time, microstep = tag
-        self._stamp = _TAG(b"i", time, b"i", microstep)
-        if len(self._pieces) > _PIECES:
-            self._hash_pieces()
+        self.when = when
+        self.stamp = stamp(when)
+        if len(self.pieces) > _PIECES:
+            self.hash_pieces()
 
-    def _hash_pieces(self) -> None:
-        pieces = self._pieces
-        pieces[2::3] = self._tokens.encode(pieces[2::3])
-        self._hash.update(b"".join(pieces))
+    def hash_many(self, port: str) -> None:
+        """There are very many records at one tag, of which a port has just sent one."""
+        if self.crowd is not None and self.when is not None:
+            self.crowd(_tag(self.when), port, _MOST_PIECES // 3)
+        self.hash_pieces()
+
+    def hash_pieces(self) -> None:
+        """Make the bytes of what waits for that."""
+        pieces = self.pieces
+        self._hash.update(packed(pieces, canonical))
+        self.tokens.forget()
         self._hashed += len(pieces) // 3
         pieces.clear()
 
     @property
     def count(self) -> int:
         """The number of records."""
-        return self._hashed + len(self._pieces) // 3
+        return self._hashed + len(self.pieces) // 3
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each record, with the columns of a log file; raises ``LogError`` if the records were not kept."""
@@ -165,5 +188,5 @@ class EventLog:
     @property
     def digest(self) -> str:
         """SHA-256 over all records so far, as hexadecimal text."""
-        self._hash_pieces()
+        self.hash_pieces()
         return self._hash.hexdigest()

@@ -44,16 +44,9 @@ class WaitingTokens(dict[type, Callable[[Any], Any]]):
         self._known[id(token)] = token
         return token
 
-    def encode(self, kept: list[Any]) -> list[bytes]:
-        """The bytes of tokens, from what was kept of them.  Now none of them waits any more."""
+    def forget(self) -> None:
+        """All that was kept has become bytes: no token waits any more."""
         self._known.clear()
-        made: dict[int, bytes] = {}
-        return [each if type(each) is bytes else made.get(id(each)) or _encode(each, made) for each in kept]
-
-
-def _encode(token: Any, made: dict[int, bytes]) -> bytes:
-    encoded = made[id(token)] = canonical(token)
-    return encoded
 
 
 def weight(token: Any) -> int:

@@ -13,6 +13,7 @@ import pytest
 from epicycle.actors import Actor, Clock, InputPort, OutputPort, Tag
 from epicycle.runner import Model, Signal, Simulation
 from epicycle.runner.interrupt import held
+from tests.engine.engine_parts import load
 
 
 class Interrupted(Actor):
@@ -125,3 +126,18 @@ def test_a_signal_can_be_read_wherever_it_was_broken_off(tokens: list[Any]) -> N
             assert steps > 20
             return
     pytest.fail("never whole")
+
+
+def test_a_run_that_is_all_in_c_can_be_interrupted() -> None:
+    """No line of an actor is Python's in it: the director sees to it that signals are handled."""
+    model = load(
+        "actors: {clock: {type: Clock, period: 1 us}, hold: {type: TimeDelay}, seen: {type: Recorder, capacity: 0}}\n"
+        "connections: [clock.output -> hold.input, hold.output -> seen.input]\nrun: {stop: 1000 s}\n"
+    )
+    started = time.perf_counter()
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        Simulation(model).run()
+    timer.join()
+    assert time.perf_counter() - started < 10.0

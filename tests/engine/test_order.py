@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Tag
-from epicycle.runner.engine import LoopError, Simulation, director
+from epicycle.runner.engine import LoopError, Simulation, errors
 from tests.engine.engine_parts import Plan, Probe, load, seen, sends, simulate
 
 
@@ -143,7 +143,7 @@ connections: [hold.output -> scale.input, scale.output -> hold.input, hold.outpu
 
 
 def test_a_loop_through_a_zero_delay_takes_one_microstep_a_lap(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(director, "MAX_MICROSTEPS", 50)
+    monkeypatch.setattr(errors, "MAX_MICROSTEPS", 50)
     model = load(
         "actors: {one: {type: Later}, two: {type: Scale}, probe: {type: Probe}}\n"
         "connections: [one.output -> two.input, two.output -> one.input, one.output -> probe.input]\n"
@@ -174,7 +174,7 @@ def test_a_process_that_waits_for_no_time_is_stopped(monkeypatch: pytest.MonkeyP
 
         actor.context.environment.process(spin())
 
-    monkeypatch.setattr(director, "MAX_STEPS", 1000)
+    monkeypatch.setattr(errors, "MAX_STEPS", 1000)
     monkeypatch.setattr(Plan, "begin", begin)
     with pytest.raises(LoopError, match="more than 1,000 SimPy events"):
         simulate("actors: {a: {type: Plan}}")

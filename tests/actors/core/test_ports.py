@@ -34,12 +34,10 @@ def test_what_ports_declare() -> None:
 def test_what_an_input_holds() -> None:
     port = Hub("hub").many
     assert (port.present, port.tokens) == (False, ())
-    put, put_channel = port.entry()
-    for token, channel in ((5, 1), (6, 0), (7, 1)):
-        put(token)
-        put_channel(channel)
-    assert (port.present, port.tokens, port.value) == (True, (5, 6, 7), 7)
     port.width = 3
+    for token, channel in ((5, 1), (6, 0), (7, 1)):
+        port.receive(token, channel)
+    assert (port.present, port.tokens, port.value) == (True, (5, 6, 7), 7)
     assert port.by_channel() == [[6], [5, 7], []]
     port.clear()
     assert (port.present, port.tokens) == (False, ())

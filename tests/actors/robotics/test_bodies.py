@@ -173,9 +173,7 @@ def test_separation_monitor_takes_the_smallest_pair_and_no_duplicates() -> None:
     harness.fire(0.1, bodies=[body(0, 0, 0.1), body(3, 4, 0.1), body(3, 6, 0.1)])
     assert harness.sent["distance"] == [(0.1, 2.0)]
     port = harness.actor.inputs["bodies"]
-    put, put_channel = port.entry()
-    put(body(9, 0, 0.2))
-    put_channel(0)
+    port.receive(body(9, 0, 0.2), 0)
     harness.fire(0.2, bodies=[body(9, 0, 0.2), body(0, 0, 0.2), body(90, 0, 0.2)])
     assert harness.last("distance") == 9.0
 

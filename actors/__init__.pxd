@@ -1,0 +1,2 @@
+from epicycle.actors.core.inbox cimport Inbox, Moment, Wake, new_wake
+from epicycle.actors.core.order cimport Line, Ranks, Times

@@ -1,0 +1,116 @@
+"""Which core runs: the modules that were compiled when Epicycle was installed, or their Python sources.
+
+Both do the same, to the bit.  A compiled module lies beside its source, where Python prefers it.  If the sources have
+changed since, or EPICYCLE_CORE=python asks for it, all of them are passed over.  This module is imported first, by the
+package, and read by ``setup.py``, which builds the core.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import os
+import sys
+from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+# In the order of their imports.  None does arithmetic on tokens: Cython takes x + 0 for x, which is wrong of -0.0.
+CORE_MODULES = (
+    "epicycle.actors.core.inbox",
+    "epicycle.actors.core.order",
+    "epicycle.actors.core.tag",
+    "epicycle.actors.core.ports",
+    "epicycle.actors.core.port_parameter",
+    "epicycle.actors.core.actor",
+    "epicycle.actors.core.authoring",
+    "epicycle.runner.results.packing",
+    "epicycle.runner.results.log",
+    "epicycle.runner.engine.agenda",
+    "epicycle.runner.engine.forms",
+    "epicycle.runner.engine.director",
+    "epicycle.runner.engine.way",
+)
+MANIFEST = "actors/compiled.json"
+CHOICES = ("python", "compiled")
+
+
+def digests(root: Path) -> dict[str, str]:
+    """What each module of the core is made of: a digest of its files, by name; ``root`` holds the packages."""
+    found = {}
+    for name in CORE_MODULES:
+        source = root.joinpath(*name.split(".")[1:])
+        files = [source.with_suffix(ending) for ending in (".py", ".pxd", ".pyx")]
+        content = b"".join(file.read_bytes() for file in files if file.exists())
+        found[name] = hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+    return found
+
+
+def text_of(source: Path, name: str) -> str:
+    """The text of a class but for its docstrings; native forms know a digest of what they are the forms of."""
+    text = source.read_text(encoding="utf-8")
+    lines = text.splitlines()
+    (found,) = (node for node in ast.parse(text).body if isinstance(node, ast.ClassDef) and node.name == name)
+    told = [
+        range(first.lineno, first.end_lineno + 1)
+        for node in ast.walk(found)
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and isinstance(first := node.body[0], ast.Expr)
+        if first.end_lineno is not None
+    ]
+    return "\n".join(
+        lines[number - 1]
+        for number in range(found.lineno, (found.end_lineno or found.lineno) + 1)
+        if not any(number in each for each in told)
+    )
+
+
+class _Sources:
+    """Finds the Python sources of the core's modules, past what was compiled of them."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+
+    def find_spec(self, name: str, path: object = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        if name not in CORE_MODULES:
+            return None
+        return spec_from_file_location(name, self._root.joinpath(*name.split(".")[1:]).with_suffix(".py"))
+
+
+def choose(wanted: str = "") -> tuple[str, str]:
+    """Which core the process runs, and why if that is Python.
+
+    Raises ``ImportError`` if another one is wanted that cannot be had.
+    """
+    root = Path(__file__).parents[1]
+    if wanted and wanted not in CHOICES:
+        raise ImportError(f"EPICYCLE_CORE={wanted}: the cores are {' and '.join(CHOICES)}", name="EPICYCLE_CORE")
+    if wanted == "python":
+        reason = "EPICYCLE_CORE says so"
+    else:
+        reason = _missing(root)
+    if not reason:
+        return "compiled", ""
+    if wanted == "compiled":
+        raise ImportError(f"EPICYCLE_CORE=compiled cannot be had: {reason}", name="EPICYCLE_CORE")
+    finder: Any = _Sources(root)
+    sys.meta_path.insert(0, finder)
+    return "python", reason
+
+
+def _missing(root: Path) -> str:
+    """Why the compiled core cannot serve, if so."""
+    try:
+        built = json.loads((root / MANIFEST).read_bytes())
+    except (OSError, ValueError):
+        return "the core was not compiled at install; install Epicycle once more where there is a C compiler"
+    if built.get("python") != sys.implementation.cache_tag:
+        return f"the core was compiled for {built.get('python')}; install Epicycle once more"
+    if built.get("modules") != digests(root):
+        return "the sources have changed since the core was compiled; install Epicycle once more"
+    return ""
+
+
+CORE, CORE_REASON = ("", "") if __name__ == "setup" else choose(os.environ.get("EPICYCLE_CORE", ""))

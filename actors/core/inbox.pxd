@@ -1,0 +1,26 @@
+# Types for C; what everything is for is said in inbox.py.
+
+cimport cython
+
+
+@cython.freelist(64)
+cdef class Wake:
+    cdef public object when
+    cdef public bint cancelled, due
+
+
+cdef class Moment:
+    cdef public long long time
+    cdef public long microstep
+    cdef public object _tag
+
+
+cpdef Wake new_wake(when)
+
+
+cdef class Inbox:
+    cdef public str path
+    cdef public Py_ssize_t width
+    cdef public list arrived, channels, shown
+    cpdef empty(self)
+    cpdef receive(self, token, channel)

@@ -1,0 +1,46 @@
+# Types for C; what everything is for is said in agenda.py.
+
+cimport cython
+from epicycle.actors cimport Inbox, Moment, Wake
+
+
+cdef class Turn:
+    cdef public object actor
+    cdef public Form form
+    cdef public long rank
+    cdef public list ports, later, wakes
+    cdef public Wake wake
+    cdef public bint is_wanted
+    cpdef add(self, Wake wake)
+    cpdef list take_wakes(self)
+    @cython.locals(wake=Wake, port=Inbox, due=cython.bint)
+    cpdef bint use_wakes(self) except -1
+    @cython.locals(port=Inbox)
+    cpdef hold(self)
+    @cython.locals(port=Inbox)
+    cpdef clear(self)
+
+
+cdef class Form:
+    cpdef fire(self)
+
+
+cdef class Instant(Moment):
+    cdef public list pending, turns, wakes
+    cdef public Turn turn
+    cdef public Wake wake
+    cpdef add(self, Turn turn, Wake wake)
+
+
+@cython.locals(instant=Instant)
+cpdef Instant new_instant(long long time, long microstep)
+
+
+cdef class Way:
+    cpdef go(self, token)
+
+
+cdef class Delivery:
+    cdef public Way way
+    cdef public object token
+    cpdef arrive(self)

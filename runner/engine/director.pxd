@@ -1,0 +1,59 @@
+# Types for C; what everything is for is said in director.py.
+
+cimport cython
+from epicycle.actors cimport Inbox, Moment, Ranks, Times, Wake, new_wake
+from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, Way, new_instant
+
+
+cdef class Director:
+    cdef public object environment, seed, crowd, ranks, _stop_after, _reason
+    cdef public list _queue, _recent, _turns
+    cdef public Ranks _ready
+    cdef public Times _times
+    cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps
+    cdef public long _rank
+    cdef public Instant present, _last, _next
+    cdef public bint _is_interrupted
+    @cython.locals(last=Instant, time=cython.longlong)
+    cpdef Instant now(self)
+    cpdef wake(self, actor, long long time)
+    @cython.locals(now=Instant, instant=Instant)
+    cpdef Wake wake_turn(self, Turn turn, long long time)
+    @cython.locals(turn=Turn, now=Instant)
+    cpdef call(self, actor, tag, long rank)
+    @cython.locals(wake=Wake)
+    cpdef Wake _call_now(self, Turn turn, Instant now)
+    @cython.locals(wake=Wake)
+    cpdef Wake _wake_at(self, Turn turn, Instant instant)
+    cpdef Turn turn(self, actor, long rank)
+    @cython.locals(now=Instant, instant=Instant)
+    cpdef later(self, long long delay, way, token)
+    cpdef Delivery hold(self, way, token)
+    cpdef want(self, Turn turn)
+    @cython.locals(instant=Instant, present=Instant)
+    cpdef Instant _to_come(self, long long time, long microstep)
+    @cython.locals(now=Instant)
+    cpdef _await_present(self)
+    @cython.locals(instant=Instant)
+    cpdef Instant _await(self, long long time, long microstep)
+    @cython.locals(turn=Turn, delivery=Delivery, turns=list, ready=Ranks, place=cython.Py_ssize_t)
+    cpdef _handle(self, Instant instant)
+    cpdef _wake_up(self, Turn turn, Wake wake)
+    cpdef _begin(self, Instant instant)
+    cpdef bint use_wakes(self, Turn turn) except -1
+    cpdef fire(self, Turn turn)
+    @cython.locals(
+        times=Times, instant=Instant, queue=list, is_of_simpy=cython.bint, here=cython.longlong, now=cython.longlong,
+        upcoming=cython.longlong, last_time=cython.longlong, last_step=cython.longlong,
+    )
+    cpdef run(self, stop, list actors, progress=*, pace=*, most=*)
+
+
+cdef class Entry(Way):
+    cdef public Director director
+    cdef public Turn turn
+    cdef public Inbox port
+    cdef public object channel
+    cdef public bint is_plain
+    @cython.locals(turn=Turn)
+    cpdef go(self, token)

@@ -1,0 +1,42 @@
+# Types for C; what everything is for is said in way.py.
+
+cimport cython
+from epicycle.runner.engine.agenda cimport Way
+from epicycle.runner.engine.director cimport Director
+from epicycle.runner.results cimport Writer
+
+
+cdef class Call(Way):
+    cdef public object function
+    cpdef go(self, token)
+
+
+cdef class Fork(Way):
+    cdef public list ways
+    @cython.locals(way=Way)
+    cpdef go(self, token)
+
+
+cdef class Delayed(Way):
+    cdef public object director, delay
+    cdef public Way onward
+    cpdef go(self, token)
+
+
+cdef class Sender(Way):
+    cdef public str path
+    cdef public Director director
+    cdef public Writer writer
+    cdef public Way onward
+    cdef public object channels
+    cdef public Py_ssize_t width
+    cdef public dict single
+    cpdef go(self, token)
+    cpdef send(self, token, channel=*)
+    cpdef Sender to(self, channel)
+
+
+cdef class Screened(Way):
+    cdef public Sender sender
+    cdef public object woven
+    cdef public dict entries

@@ -1,0 +1,1 @@
+from epicycle.runner.results.log cimport EventLog, Writer

@@ -1,0 +1,27 @@
+# Types for C; what everything is for is said in log.py.
+
+cimport cython
+
+cdef Py_ssize_t _PIECES, _MOST_PIECES
+
+
+cdef class Writer:
+    cdef public EventLog log
+    cdef public tuple names
+    cdef public bytes _head
+    cdef public object _keep
+    @cython.locals(log=EventLog, pieces=list)
+    cpdef write(self, when, value)
+
+
+cdef class EventLog:
+    cdef public list pieces
+    cdef public object records
+    cdef public object tokens
+    cdef public object when, crowd, _hash, _keeps, _log_to
+    cdef public dict _writers
+    cdef public bytes stamp
+    cdef public long long _hashed
+    cpdef turn_to(self, when)
+    cpdef hash_many(self, port)
+    cpdef hash_pieces(self)

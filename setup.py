@@ -1,0 +1,126 @@
+"""Builds the compiled core, where there is a compiler; all else about the package is in pyproject.toml.
+
+Its modules are the Python sources themselves, with types for C beside them (``.pxd``), or have a twin in Cython
+(``.pyx``).  They are compiled from a copy under ``build``, where folders have the names under which they are imported.
+A manifest says of which sources they are: others are not replaced by them (``actors/compiled.py``).
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import os
+import re
+import runpy
+import shutil
+import sys
+from pathlib import Path
+
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+
+ROOT = Path(__file__).parent
+TREE = ROOT / "build" / "core"
+core = runpy.run_path(str(ROOT / "actors" / "compiled.py"), run_name="setup")
+# The same bits everywhere: no fused multiplication and addition, no reordering.
+FLAGS = [] if sys.platform == "win32" else ["-O2", "-ffp-contract=off", "-fno-fast-math", "-Wno-unused-function"]
+
+
+def check_forms() -> None:
+    """Refuse to build native forms of actors that have changed."""
+    told = re.findall(
+        r'"([\w/]+\.py)", "(\w+)", "(\w*)"', (ROOT / "runner/engine/forms.pyx").read_text(encoding="utf-8")
+    )
+    for file, name, digest in told:
+        found = hashlib.sha256(core["text_of"](ROOT / "actors" / file, name).encode()).hexdigest()[:16]
+        if found != digest:
+            sys.exit(
+                f"{name} in actors/{file} has changed since its native form was written: see that the form in "
+                f"runner/engine/forms.pyx does the same, and write {found} there"
+            )
+
+
+def for_cython(source: Path) -> str:
+    """A source without the imports in whose place the types for C are: those for type checkers, those of the .pxd."""
+    text = source.read_text(encoding="utf-8")
+    types = source.with_suffix(".pxd")
+    cimported = re.findall(r"cimport (.*)", types.read_text(encoding="utf-8")) if types.exists() else []
+    names = {name.strip() for line in cimported for name in line.split(",")}
+    lines = text.splitlines()
+    for node in ast.parse(text).body:
+        left = ""
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            left = "if False: pass"
+            last = node.body[-1].end_lineno
+        elif isinstance(node, ast.ImportFrom) and names & {each.name for each in node.names}:
+            node.names = [each for each in node.names if each.name not in names]
+            left = ast.unparse(node) if node.names else ""
+            last = node.end_lineno
+        else:
+            continue
+        lines[node.lineno - 1 : last] = [left] + [""] * (last - node.lineno)  # places of errors stay
+    return "\n".join(lines) + "\n"
+
+
+def copied() -> list[Path]:
+    """Lay the sources where their names as modules say; those to compile."""
+    found = []
+    for face in ROOT.glob("*/**/__init__.pxd"):
+        if face.is_relative_to(ROOT / "build"):
+            continue
+        target = TREE / "epicycle" / face.relative_to(ROOT)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(face, target)
+    for name in core["CORE_MODULES"]:
+        source = ROOT / Path(*name.split(".")[1:])
+        target = TREE / Path(*name.split("."))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        for ending in (".pxd", ".pyx", ".py"):
+            if source.with_suffix(ending).exists():
+                shutil.copy2(source.with_suffix(ending), target.with_suffix(ending))
+        found.append(target.with_suffix(".pyx" if target.with_suffix(".pyx").exists() else ".py"))
+        if found[-1].suffix == ".pyx":  # of which the Python source is the twin
+            target.with_suffix(".py").unlink(missing_ok=True)
+        else:
+            found[-1].write_text(for_cython(found[-1]), encoding="utf-8")
+    return found
+
+
+class BuildCore(build_ext):
+    """Builds all modules of the core or, if one cannot be built, leaves no manifest: then Python serves."""
+
+    def run(self) -> None:
+        """Build what has changed."""
+        check_forms()
+        self.parallel = self.parallel or os.cpu_count()
+        try:
+            from Cython.Build import cythonize
+
+            options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False}
+            pairs = zip(core["CORE_MODULES"], copied(), strict=True)
+            made = [Extension(name, [str(path)], extra_compile_args=FLAGS) for name, path in pairs]
+            made = cythonize(made, include_path=[str(TREE)], compiler_directives=options, quiet=True)
+        except Exception as error:  # no Cython, or one that is too old
+            print(f"the core is not compiled, Python serves: {error}", file=sys.stderr)
+            self.extensions = []
+            return
+        # setuptools has filled in what it needs to know of the first ones.
+        for extension, ready in zip(self.extensions, made, strict=True):
+            extension.sources, extension.depends = ready.sources, ready.depends
+            extension.include_dirs = [*extension.include_dirs, *ready.include_dirs]
+        super().run()
+        self._say()
+
+    def _say(self) -> None:
+        files = [Path(self.get_ext_fullpath(each.name)) for each in self.extensions]
+        if all(file.exists() for file in files):
+            place = files[0].parents[len(core["CORE_MODULES"][0].split(".")) - 2] / core["MANIFEST"]
+            built = {"python": sys.implementation.cache_tag, "modules": core["digests"](ROOT)}
+            place.write_text(json.dumps(built, indent=1), encoding="utf-8")
+
+
+setup(
+    ext_modules=[Extension(name, [], optional=True, extra_compile_args=FLAGS) for name in core["CORE_MODULES"]],
+    cmdclass={"build_ext": BuildCore},
+)
