@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from .collection import seldom_collecting
 from .commands import COMMANDS
@@ -20,7 +21,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     open_streams()
     options = parser().parse_args(arguments)
     options.given = ["epicycle", *arguments]
-    from epicycle.actors import EpicycleError
+    try:
+        from epicycle.actors import EpicycleError
+    except ImportError as error:
+        if error.name != "EPICYCLE_CORE":
+            raise
+        print(f"error: {error}", file=sys.stderr)  # what complains otherwise imports the same
+        return BAD_INPUT
 
     try:
         with seldom_collecting():
@@ -47,11 +54,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
+class _Version(argparse.Action):
+    """Tells the version, and which core runs, which only the actors know."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, **given: Any) -> None:
+        super().__init__(option_strings, dest, nargs=0, **given)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        try:
+            from epicycle.actors import CORE, CORE_REASON
+        except ImportError as error:
+            parser.error(str(error))
+        from .provenance import versions
+
+        found, why = versions(), f" ({CORE_REASON})" if CORE_REASON else ""
+        print(f"epicycle {found['epicycle']}, {CORE} core{why}, Python {found['python']}")
+        parser.exit()
+
+
 def parser() -> argparse.ArgumentParser:
     """The options of all commands."""
     top = argparse.ArgumentParser(
         prog="epicycle", description="Discrete-event simulation of actor models that are written in YAML."
     )
+    top.add_argument("--version", action=_Version, help="show the version, and which core makes the runs")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     for each in COMMANDS:
         command = commands.add_parser(each.name, help=each.summary, description=each.description)

@@ -58,9 +58,11 @@ def packaged_ones(kind: str) -> str:
 
 def find(name: str, kind: str, problems: Problems, position: Position | None = None) -> Path | None:
     """The file that a name means: a path if it looks like one, otherwise what is packaged under it."""
+    if is_path(name):
+        return Path(name)
     known = packaged_files(kind)
-    if not is_path(name) and name not in known:
+    if name not in known:
         problems.add(
             f"there is no packaged {kind} {name!r}{did_you_mean(name, list(known))}", position, packaged_ones(kind)
         )
-    return Path(name) if is_path(name) else known.get(name)
+    return known.get(name)

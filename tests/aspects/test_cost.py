@@ -10,7 +10,8 @@ from benchmarks import aspects
 @pytest.fixture(scope="module", autouse=True)
 def imported() -> None:
     """What is imported when it is needed is there from now on."""
-    aspects.calls(aspects.model("nowhere", "25 ms"))
+    for place in ("nowhere", "elsewhere", "around", "here"):
+        aspects.calls(aspects.model(place, "25 ms"))
 
 
 def further(place: str, stop: str) -> int:
@@ -26,5 +27,5 @@ def test_an_aspect_that_is_off_costs_nothing() -> None:
 
 @pytest.mark.parametrize("place", ["nowhere", "elsewhere", "around"])
 def test_an_aspect_elsewhere_costs_the_same_however_long_the_run(place: str) -> None:
-    assert 0 < further(place, "25 ms") == further(place, "75 ms") < 100
+    assert 0 < further(place, "25 ms") == further(place, "75 ms") <= 100
     assert further("here", "75 ms") > 2.5 * further("here", "25 ms") > 500 / 3
