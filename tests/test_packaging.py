@@ -17,6 +17,8 @@ from pathlib import Path
 
 import pytest
 
+from epicycle.actors import CORE_MODULES
+
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("actors", "aspects", "models", "runner")
 CODE_FOLDERS = ("actors", "aspects", "runner")
@@ -31,7 +33,10 @@ def shipped_files() -> list[Path]:
         path.relative_to(ROOT)
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
-        if (path.suffix in {".py", ".yaml", ".css", ".mplstyle"} or path.name in {"py.typed", "schema.json"})
+        if (
+            path.suffix in {".py", ".yaml", ".css", ".mplstyle", ".pxd", ".pyx"}
+            or path.name in {"py.typed", "schema.json"}
+        )
         and "__pycache__" not in path.parts
     )
 
@@ -183,7 +188,12 @@ def test_nothing_is_imported_twice() -> None:
         print(json.dumps({n: getattr(m, "__file__", None) for n, m in sys.modules.items()}))
     """
     done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(script)], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-c", textwrap.dedent(script)],
+        cwd=ROOT,
+        env={**os.environ, "EPICYCLE_CORE": "python"},  # compiled modules are files of another name
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     names: dict[str, list[str]] = {}
@@ -209,8 +219,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the wheel from a copy, without a download and without leaving a build folder behind."""
     source = tmp_path_factory.mktemp("source")
     for folder in FOLDERS:
-        shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "LICENSE", "README.md"):
+        built_here = shutil.ignore_patterns("__pycache__", "*.so", "*.pyd", "compiled.json")
+        shutil.copytree(ROOT / folder, source / folder, ignore=built_here)
+    for name in ("pyproject.toml", "setup.py", "LICENSE", "README.md"):
         if (ROOT / name).is_file():
             shutil.copy(ROOT / name, source)
     target = tmp_path_factory.mktemp("wheel")
@@ -339,7 +350,12 @@ def test_what_is_shared_is_imported_from_the_root(folder: str) -> None:
 def test_wheel_holds_every_file_and_no_other(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         found = [name for name in archive.namelist() if ".dist-info/" not in name]
-    assert sorted(found) == sorted(f"epicycle/{file.as_posix()}" for file in shipped_files())
+    core = {name for name in found if name.endswith((".so", ".pyd", "/compiled.json"))}
+    assert sorted(set(found) - core) == sorted(f"epicycle/{file.as_posix()}" for file in shipped_files())
+    # All of the compiled core or, where there is no compiler, nothing of it.
+    modules = {name.partition(".")[0].replace("/", ".") for name in core if not name.endswith(".json")}
+    assert modules in ({*CORE_MODULES}, set())
+    assert ("epicycle/actors/compiled.json" in core) == bool(modules)
 
 
 @pytest.mark.slow

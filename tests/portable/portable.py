@@ -65,6 +65,8 @@ def settings() -> list[Setting]:
         Setting("NumPy's plain loops", {"NPY_DISABLE_CPU_FEATURES": numpy_features()}),
         Setting("kernels for any processor", {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}),
         Setting("kernels not compiled", {"NUMBA_DISABLE_JIT": "1"}),
+        Setting("the core in Python", {"EPICYCLE_CORE": "python"}),
+        Setting("native forms off", {"EPICYCLE_FORMS": "off"}),
     ]  # fmt: skip
     if platform.machine() in ("x86_64", "AMD64"):
         flags = set(Path("/proc/cpuinfo").read_text().split()) if Path("/proc/cpuinfo").exists() else set()

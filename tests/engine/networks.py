@@ -1,0 +1,235 @@
+"""Random networks of actors, and what their runs come to: the same with every core.
+
+As a program it makes runs with the core that EPICYCLE_CORE asks for: a line of JSON in, one out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any, Protocol
+
+from simpy.events import Event
+
+from epicycle.actors import CORE, Actor, InputPort, OutputPort, Process, Recorder
+from epicycle.runner import Simulation, load_model
+from epicycle.runner.engine import ActorError, LoopError, errors
+from epicycle.runner.text import ModelError
+from tests.engine.engine_parts import Join, Ticker
+
+
+class Numbers(Protocol):
+    """Where a network comes from: ``random.Random``, or Hypothesis in its place."""
+
+    def random(self) -> float: ...
+    def randint(self, low: int, high: int, /) -> int: ...
+    def choice(self, items: Any, /) -> Any: ...
+
+
+class Moody(Actor):
+    """Asks for wake-ups and cancels them, sends to single channels, and fails now and then."""
+
+    input: InputPort[Any] = InputPort(required=False, multi=True)
+    output: OutputPort[Any] = OutputPort(float, multi=True, depends_on=())
+
+    def initialize(self) -> None:
+        self.wakes = [self.wake_in(0.5 * number) for number in range(3)]
+
+    def fire(self) -> None:
+        stream = self.random
+        due = sum(wake.due for wake in self.wakes)
+        self.wakes = [wake for wake in self.wakes if not wake.due]
+        if self.wakes and stream.random() < 0.3:
+            self.wakes.pop().cancel()
+        if len(self.wakes) < 4:
+            self.wakes.append(self.wake_in(stream.choice([0.0, 0.25, 1.0])))
+        if stream.random() < 0.02:
+            raise ValueError(f"{self.path} is out of sorts at {self.tag}")
+        for _ in range(due):
+            if self.output.width and stream.random() < 0.5:
+                self.output.send(float(due), int(stream.integers(self.output.width)))
+            else:
+                self.output.send(self.now)
+
+
+class Patient(Process):
+    """Reads and waits in turn, and yields to SimPy's own events."""
+
+    input: InputPort[Any] = InputPort(required=False)
+    output: OutputPort[Any] = OutputPort(float)
+
+    def run(self) -> Generator[Event, Any, None]:
+        while True:
+            token = yield self.read(self.input)
+            yield self.wait(0.25)
+            self.output.send(token)
+            yield self.environment.timeout(130_000_000)
+            self.output.send(token)
+
+
+TYPES = [Moody, Patient, Ticker, Join]
+TIMES = ("0 s", "100 ms", "250 ms", "0.5 s", "1 s")
+
+
+def _source(numbers: Numbers) -> dict[str, Any]:
+    kind = numbers.choice(["Clock", "Clock", "PoissonClock", "Ticker", "Const", "SingleEvent", "Moody"])
+    if kind == "Clock":
+        period = numbers.choice([0.25, 0.3, 1.0])
+        given: dict[str, Any] = {"period": period}
+        if numbers.random() < 0.5:
+            given["values"] = numbers.choice([[1.5], [1, 2.5, -3], [7]])
+        if numbers.random() < 0.3:
+            given["offsets"] = numbers.choice([[0.0, 0.1], [0.0, 0.0, 0.2]])
+        if numbers.random() < 0.3:
+            given["stop_time"] = 3
+        return {"type": kind, **given}
+    if kind == "PoissonClock":
+        return {"type": kind, "mean_interval": numbers.choice([0.2, 0.7]), "fire_at_start": numbers.random() < 0.5}
+    if kind == "Ticker":
+        return {"type": kind, "period": 0.5, "limit": numbers.randint(1, 12)}
+    return {"type": kind} if kind == "Moody" else {"type": kind, "value": numbers.choice([1, 2.0, -0.0])}
+
+
+def _between(numbers: Numbers) -> tuple[dict[str, Any], list[str]]:
+    """An actor with inputs and the names of these."""
+    distribution = numbers.choice(
+        [{"type": "Exponential", "mean": 0.3}, {"type": "Uniform", "high": 0.5}, {"type": "Constant", "value": 0.25}]
+    )
+    kinds: list[tuple[dict[str, Any], list[str]]] = [
+        ({"type": "TimeDelay", "delay": numbers.choice(TIMES)}, ["input"]),
+        ({"type": "TimeDelay"}, ["input", "delay"]),
+        ({"type": "Scale", "factor": numbers.choice([2, 0.1, -1.5]), "offset": numbers.choice([0, 1, 0.5])}, ["input"]),
+        ({"type": "Scale"}, ["input", "factor"]),
+        ({"type": "AddSubtract"}, ["plus", "minus", "plus"]),
+        ({"type": "MultiplyDivide"}, ["multiply", "divide"]),
+        ({"type": "Server", "distribution": distribution, "servers": numbers.choice([1, 2, None])}, ["input"]),
+        ({"type": "Server", "service_time": numbers.choice(TIMES), "capacity": numbers.choice([None, 2])}, ["input"]),
+        ({"type": "Queue", "persistent_trigger": numbers.random() < 0.5}, ["input", "trigger"]),
+        ({"type": "Merge", "discard": numbers.random() < 0.3}, ["input", "input"]),
+        ({"type": "Counter"}, ["increment", "decrement", "increment"]),
+        ({"type": "Integrator", "method": numbers.choice(["hold", "trapezoid"])}, ["input", "trigger"]),
+        ({"type": "Accumulator"}, ["input", "reset"]),
+        ({"type": "Random", "distribution": distribution}, ["trigger"]),
+        (
+            {"type": "Expression", "expression": numbers.choice(["a + 2 * b", "a / b", "a > b", "-a * b - time"])},
+            ["a", "b"],
+        ),
+        ({"type": "Router"}, ["input"]),
+        ({"type": "Sampler"}, ["input", "trigger"]),
+        ({"type": "MostRecent"}, ["input", "trigger"]),
+        ({"type": "Moody"}, ["input"]),
+        ({"type": "Patient"}, ["input"]),
+        ({"type": "Join"}, ["input", "input"]),
+    ]
+    return numbers.choice(kinds)  # type: ignore[no-any-return]
+
+
+OUTPUTS = {"Server": ["output", "size", "rejected"], "Queue": ["output", "size"]}
+ASPECTS: list[dict[str, Any]] = [
+    {"type": "PacketLoss", "probability": 0.3},
+    {"type": "Latency", "delay": 0.1},
+    {"type": "Duplicate", "probability": 0.3},
+    {"type": "Probe"},
+]
+AT_ACTORS: list[dict[str, Any]] = [
+    {"type": "ExecutionTime", "time": "50 ms"},
+    {"type": "CrashRestart", "mtbf": 1.5, "repair": 0.3},
+]
+
+
+def network(numbers: Numbers) -> dict[str, Any]:
+    """A model, as a file in JSON holds it, which need not be a good one."""
+    actors: dict[str, Any] = {}
+    sources: list[str] = []
+    connections: list[dict[str, Any]] = []
+    for index in range(numbers.randint(1, 2)):
+        actors[f"s{index}"] = _source(numbers)
+        sources.append(f"s{index}.output")
+    ends: list[str] = []
+    for index in range(numbers.randint(1, 6)):
+        actors[f"a{index}"], inputs = _between(numbers)
+        for place, name in enumerate(inputs):
+            if place and name == inputs[0] and numbers.random() < 0.5:
+                continue
+            wire: dict[str, Any] = {"from": numbers.choice(sources), "to": f"a{index}.{name}"}
+            if numbers.random() < 0.25:
+                wire["delay"] = numbers.choice(TIMES)
+            connections.append(wire)
+        outputs = OUTPUTS.get(actors[f"a{index}"]["type"], ["output"])
+        sources += [f"a{index}.{name}" for name in outputs]
+        ends.append(f"a{index}.{numbers.choice(outputs)}")
+    crossings = [wire["to"] for wire in connections if wire["to"].rpartition(".")[2] in ("plus", "increment")]
+    if crossings and numbers.random() < 0.5:  # a loop
+        wire = {"from": numbers.choice(ends), "to": numbers.choice(crossings), "delay": numbers.choice(TIMES)}
+        connections.append(wire)
+    actors["sink"] = {"type": "Recorder", "capacity": numbers.choice([0, 3, None])}
+    connections += [{"from": port, "to": "sink.input"} for port in dict.fromkeys(ends)]
+    model: dict[str, Any] = {"actors": actors, "connections": connections}
+    if numbers.random() < 0.4:
+        model["aspects"] = {"one": {**numbers.choice(ASPECTS), "at": numbers.choice(connections)["to"]}}
+    if numbers.random() < 0.15:
+        path = numbers.choice([name for name in actors if name != "sink"])
+        model.setdefault("aspects", {})["two"] = {**numbers.choice(AT_ACTORS), "at": path}
+    if numbers.random() < 0.3:
+        part = {"actors": dict(actors), "connections": connections, "director": {"start": 1}}
+        if numbers.random() < 0.5:
+            part["director"] = {"drift": 1.5}
+        elif numbers.random() < 0.3:
+            del part["director"]
+        model = {"composites": {"Part": part}, "actors": {"part": {"type": "Part"}}}
+        ends = [f"part.{port}" for port in ends]
+    model["run"] = {"stop": numbers.choice([3, 6.05]), "seed": numbers.randint(0, 5), "record": ends[:2]}
+    model["metrics"] = {"mean": {"of": ends[0], "take": numbers.choice(["count", "rate"])}}
+    return model
+
+
+def outcome(model: dict[str, Any], way: str) -> list[str]:
+    """All that a run comes to, as texts; ``way``: at once, in steps, or by way of a snapshot."""
+    try:
+        path = Path(tempfile.gettempdir()) / f"network-{os.getpid()}.yaml"
+        path.write_text(json.dumps({"model": "network", **model}), encoding="utf-8")
+        made = load_model(path, types=TYPES)
+        path.unlink()
+    except ModelError as error:
+        return [error.problems[0].message]
+    errors.MAX_MICROSTEPS = 200
+    simulation = Simulation(made, keep_log=True)
+    try:
+        if way == "steps":
+            while simulation.step():
+                pass
+        elif way == "snapshot":
+            for _ in range(7):
+                simulation.step()
+            snapshot = simulation.snapshot()
+            simulation.advance(until=2.0)
+            simulation.restore(snapshot)
+        results = simulation.finish() if way == "steps" else simulation.run()
+    except (ActorError, LoopError) as error:
+        results = simulation.results("an error")
+        end = [str(error).replace(str(path), "network.yaml")]
+    else:
+        end = []
+    recorders = [actor for actor in simulation.actors.values() if type(actor) is Recorder]
+    return [
+        *end,
+        results.digest,
+        str(results.events),
+        repr(results.outcomes),
+        repr(results.aspects),
+        repr({name: (signal.tags, signal.tokens) for name, signal in results.signals.items()}),
+        f"{results.end} {results.stopped} {results.firings} {simulation.tag}",
+        repr([[vars(each).get(name) for name in ("seen", "tokens", "tags")] for each in recorders]),
+        hashlib.sha256(b"".join(record.encoded() for record in simulation.log.records)).hexdigest(),
+    ]
+
+
+if __name__ == "__main__":
+    print(CORE, flush=True)
+    for line in sys.stdin:
+        print(json.dumps(outcome(**json.loads(line))), flush=True)
