@@ -8,13 +8,15 @@ DEV := $(VENV)/installed-dev
 LINKED := $(VENV)/linked
 
 .NOTPARALLEL:
-.PHONY: help run paper test check bench fuzz mutants robust portable lint reference wheel clean
+.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
 	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
 	@echo "make portable  every digest under settings that stand for other machines (10 min)"
+	@echo "make core   compile the core anew, after a change of its sources"
+	@echo "make cores  100,000 random networks: does each core make the same runs? (20 min)"
 	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, the order of imports, and types"
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
@@ -51,6 +53,13 @@ robust: $(DEV)
 	$(BIN)/python -m tests.actors.robotics.numerics.robustness
 	$(BIN)/python -m tests.actors.robotics.numerics.robustness --gap 0.03
 
+core: $(DEV)
+	$(PIP) install --editable .
+	$(BIN)/epicycle --version
+
+cores: $(DEV)
+	$(BIN)/python -m tests.engine.cores
+
 portable: $(DEV)
 	$(BIN)/python -m tests.portable.portable
 
@@ -86,12 +95,12 @@ $(LINKED): | $(BIN)/python
 	for folder in actors aspects runner; do ln -sfn "$(CURDIR)/$$folder" "$$site/epicycle-stubs/$$folder"; done
 	@touch $@
 
-$(USE): pyproject.toml | $(BIN)/python $(LINKED)
+$(USE): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle into $(VENV) (first time only, and when pyproject.toml changes)"
 	@$(PIP) install --editable .
 	@touch $@
 
-$(DEV): pyproject.toml | $(BIN)/python $(LINKED)
+$(DEV): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[dev] into $(VENV) (first time only, and when pyproject.toml changes)"
 	@$(PIP) install --editable '.[dev]'
 	@touch $(USE) $@

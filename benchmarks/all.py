@@ -17,6 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from benchmarks.measure import pace, table
+from epicycle.actors import CORE
 
 HERE = Path(__file__).parent
 PARTS = ("controllers", "studies", "events", "growth", "start")
@@ -35,7 +36,7 @@ def machine() -> str:
     packages = ", ".join(f"{each} {version(each)}" for each in PACKAGES)
     return (
         f"{name}, {os.cpu_count()} cores, {platform.system()}; "
-        f"{platform.python_implementation()} {platform.python_version()}, {packages}."
+        f"{platform.python_implementation()} {platform.python_version()}, {packages}; {CORE} core."
     )
 
 

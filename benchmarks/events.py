@@ -7,13 +7,14 @@ SimPy's events:
 - full pipeline: the same with the period of the clock equal to the delays, so that all actors are busy at each tick;
 - queue: Poisson -> server -> sink, from the same random numbers on all sides.
 
-Ours checks nothing less than in any run: firing order, event log and its digest are there.  Neither SimPy program has
-them.  A fourth contender tells what the log alone leaves: the bare callbacks, with our event log behind each send.
+Ours checks nothing less than in any run: firing order, event log and its digest are there.  No SimPy program has them.
+Ours runs twice: as it is, and with native forms off, which is how actors in plain Python run, those of users, too.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
@@ -23,10 +24,9 @@ from typing import Any
 import simpy
 
 from benchmarks.measure import Row, compare, cpu_seconds, table, take_turns
-from epicycle.actors import Tag, random_stream
+from epicycle.actors import CORE, random_stream
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.build import Model
-from epicycle.runner.engine import EventLog
 
 HOPS = 200_000  # in each of five rounds
 JOBS = 200_000
@@ -61,11 +61,9 @@ connections:
 run: {{stop: {stop} s, seed: 1}}
 """
 
-LOGGED = "SimPy's bare callbacks with our log"
-REASON = (
-    "with our event log, by which runs are compared, not even bare callbacks are so much faster than SimPy with "
-    "Stores, and they have neither ports nor a firing order; docs/performance.md counts what ours take beyond that"
-)
+PLAIN = "ours, without native forms"
+GOALS = {"compiled": ((20.0, 20.0, 10.0), (8.0, 8.0, 2.5)), "python": ((1.6, 1.6, 0.9),) * 2}
+REASON = "docs/performance.md says what a hop and a job consist of"
 
 Events = Generator[simpy.Event, Any, None]
 
@@ -81,14 +79,16 @@ def model(text: str, **values: object) -> Model:
 class Ours:
     """A model of ours; ``done`` is how many tokens came to its sink."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, forms: str = "on") -> None:
         self.model = model
+        self.forms = forms
         self.done = 0
 
     def __call__(self) -> float:
+        os.environ["EPICYCLE_FORMS"] = self.forms
         simulation = Simulation(self.model)
         seconds = cpu_seconds(simulation.run)
-        self.done = self.model.graph.actors["sink"].seen  # type: ignore[attr-defined]
+        self.done = simulation["sink"].seen  # type: ignore[attr-defined]
         return seconds
 
 
@@ -174,10 +174,6 @@ def queue_of_stores(simulation: Stores) -> None:
 class Callbacks(Stores):
     """Functions that call each other, or let SimPy call them later."""
 
-    def logged(self, name: str, onward: Callable[[Any], None]) -> Callable[[Any], None]:
-        """``onward``, as what the actor of that name sends is not logged."""
-        return onward
-
     def after(self, delay: float, call: Callable[[simpy.Event], None], value: Any = None) -> None:
         """Let SimPy call a function."""
         callbacks = self.environment.timeout(delay, value).callbacks
@@ -187,29 +183,6 @@ class Callbacks(Stores):
     def count(self, token: Any) -> None:
         """Take whatever comes."""
         self.done += 1
-
-
-class Logged(Callbacks):
-    """The same, with our event log: what a director and actors that take no time at all would reach."""
-
-    def __call__(self) -> float:
-        self.log = EventLog()
-        return super().__call__()
-
-    def logged(self, name: str, onward: Callable[[Any], None]) -> Callable[[Any], None]:
-        """``onward`` behind a record in the log."""
-        write, environment = self.log.writer("send", name, "output", None, ""), self.environment
-        tag = Tag(0, 1)
-
-        def through(token: Any) -> None:
-            nonlocal tag
-            now = int(environment.now * 1e9)
-            if now != tag.time:
-                tag = Tag(now, 1)
-            write(tag, token)
-            onward(token)
-
-        return through
 
 
 def pipeline_of_callbacks(period: float) -> Callable[[Stores], None]:
@@ -224,13 +197,11 @@ def pipeline_of_callbacks(period: float) -> Callable[[Stores], None]:
     def build(simulation: Stores) -> None:
         assert isinstance(simulation, Callbacks)
         onward: Callable[[Any], None] = simulation.count
-        for number in reversed(range(PAIRS)):
-            onward = scale(simulation.logged(f"scale[{number}]", onward))
-            onward = delay(simulation, simulation.logged(f"delay[{number}]", onward))
-        first = simulation.logged("clock", onward)
+        for _ in range(PAIRS):
+            onward = delay(simulation, scale(onward))
 
         def tick(_: object) -> None:
-            first(1.0)
+            onward(1.0)
             simulation.after(period, tick)
 
         tick(None)
@@ -244,17 +215,12 @@ def queue_of_callbacks(simulation: Stores) -> None:
     between, service = random_stream(1, "source"), random_stream(1, "server")
     waiting: deque[int] = deque()
     busy = False
-    number = size = 0
-    sent = simulation.logged("source", waiting.append)
-    served = simulation.logged("server", simulation.count)
-    resized = simulation.logged("server.size", lambda size: None)
+    number = 0
 
     def come(_: object) -> None:
-        nonlocal number, size
-        sent(number)
+        nonlocal number
+        waiting.append(number)
         number += 1
-        size += 1
-        resized(size)
         serve()
         simulation.after(between.exponential(1.0), come)
 
@@ -265,11 +231,9 @@ def queue_of_callbacks(simulation: Stores) -> None:
             simulation.after(service.exponential(BUSY), leave, waiting.popleft())
 
     def leave(event: simpy.Event) -> None:
-        nonlocal busy, size
+        nonlocal busy
         busy = False
-        served(event.value)
-        size -= 1
-        resized(size)
+        simulation.count(event.value)
         serve()
 
     simulation.after(between.exponential(1.0), come)
@@ -280,21 +244,22 @@ def rows(rounds: int = 5) -> Iterator[Row]:
     length = 2 * PAIRS
     ticks = HOPS // length
     work = [
-        ("pipeline of 20 actors, one token at a time", SPARSE, HOPS, 7.0),
-        ("pipeline of 20 actors, all busy", FULL, HOPS, 7.0),
-        ("Poisson -> server -> sink", 0.0, JOBS, 2.5),
+        ("pipeline of 20 actors, one token at a time", SPARSE, HOPS),
+        ("pipeline of 20 actors, all busy", FULL, HOPS),
+        ("Poisson -> server -> sink", 0.0, JOBS),
     ]
-    for name, period, size, goal in work:
+    for (name, period, size), goal, goal_of_plain in zip(work, *GOALS[CORE], strict=True):
         if period:
             stop = period * ticks
             build, build_bare = pipeline_of_stores(period), pipeline_of_callbacks(period)
-            ours = Ours(model(PIPELINE, period=period, stop=stop))
+            made = model(PIPELINE, period=period, stop=stop)
         else:
             stop = float(size)
             build, build_bare = queue_of_stores, queue_of_callbacks
-            ours = Ours(model(QUEUE, stop=stop))
-        stores, bare, logged = Stores(build, stop), Callbacks(build_bare, stop), Logged(build_bare, stop)
-        contenders = {"ours": ours, "SimPy, Stores": stores, "SimPy, bare callbacks": bare, LOGGED: logged}
+            made = model(QUEUE, stop=stop)
+        ours, plain = Ours(made), Ours(made, "off")
+        stores, bare = Stores(build, stop), Callbacks(build_bare, stop)
+        contenders = {"ours": ours, PLAIN: plain, "SimPy, Stores": stores, "SimPy, bare callbacks": bare}
         results = take_turns(contenders, rounds)
         # Rounding to nanoseconds may move a job over the end.
         assert ours.done > 0.9 * size / (length if period else 1)
@@ -305,7 +270,8 @@ def rows(rounds: int = 5) -> Iterator[Row]:
         title = f"{name}: {rounds * size:,} {what}"
         yield compare(title, results, "SimPy, Stores", "ours", how=how, reason=REASON, goal=goal, unit=unit)
         yield compare(title, results, "SimPy, bare callbacks", "ours", how=how, unit=unit)
-        yield compare(f"{LOGGED}: {name}", results, "SimPy, Stores", LOGGED, how=how, unit=unit)
+        title = f"{name}, without native forms"
+        yield compare(title, results, "SimPy, Stores", PLAIN, how=how, reason=REASON, goal=goal_of_plain, unit=unit)
 
 
 if __name__ == "__main__":
