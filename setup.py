@@ -114,7 +114,9 @@ class BuildCore(build_ext):
 
     def _say(self) -> None:
         files = [Path(self.get_ext_fullpath(each.name)) for each in self.extensions]
-        if all(file.exists() for file in files):
+        made = [Path(each.sources[0]).stat().st_mtime for each in self.extensions]
+        # One that could not be compiled may have left an older one in its place.
+        if all(file.exists() and file.stat().st_mtime >= time for file, time in zip(files, made, strict=True)):
             place = files[0].parents[len(core["CORE_MODULES"][0].split(".")) - 2] / core["MANIFEST"]
             built = {"python": sys.implementation.cache_tag, "modules": core["digests"](ROOT)}
             place.write_text(json.dumps(built, indent=1), encoding="utf-8")

@@ -50,15 +50,15 @@ def digests(root: Path) -> dict[str, str]:
 
 
 def text_of(source: Path, name: str) -> str:
-    """The text of a class but for its docstrings; native forms know a digest of what they are the forms of."""
+    """The text of a class or function but for its docstrings, of which native forms know a digest."""
     text = source.read_text(encoding="utf-8")
     lines = text.splitlines()
-    (found,) = (node for node in ast.parse(text).body if isinstance(node, ast.ClassDef) and node.name == name)
+    (found,) = (node for node in ast.parse(text).body if getattr(node, "name", "") == name)
     told = [
         range(first.lineno, first.end_lineno + 1)
         for node in ast.walk(found)
         if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and isinstance(first := node.body[0], ast.Expr)
-        if first.end_lineno is not None
+        if isinstance(first.value, ast.Constant) and first.end_lineno is not None
     ]
     return "\n".join(
         lines[number - 1]

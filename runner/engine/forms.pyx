@@ -151,7 +151,7 @@ cdef class Ticking(Native):
 
     cdef public Sender output
     cdef public object values
-    cdef public long long stop, tick
+    cdef public long long stop
 
     cdef bint take(self) except -1:
         self.output = self.sender("output")
@@ -306,11 +306,15 @@ SOURCES = (
     ("distributions.py", "Exponential", "f14ea8a70640a74a"),
     ("queues.py", "Server", "2445f4d1853973a9"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
-    ("sources.py", "Clock", "8aebe7b9ac5c2245"),
-    ("sources.py", "PoissonClock", "0cab49d597b1632f"),
-    ("sources.py", "_Ticking", "86749c80f076ae35"),
+    ("sources.py", "Clock", "4ed40b10da22b8e9"),
+    ("sources.py", "PoissonClock", "3d48035a29d3f078"),
+    ("sources.py", "_Ticking", "3720b339ddf2994e"),
     ("arithmetic.py", "Scale", "3aafcbc1e5e5c3de"),
     ("timing.py", "TimeDelay", "b8778dbbc9a75614"),
+    ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
+    ("core/laws.py", "exponential", "dd3e701d840f2744"),
+    ("core/tag.py", "to_nanoseconds", "f5f096bec4165fd2"),
+    ("core/tag.py", "to_seconds", "f6c6aae6371c52a3"),
     ("core/authoring.py", "Pending", "faf6cabccebf5d58"),
 )
 FORMS = {
