@@ -22,5 +22,5 @@ cdef class Inbox:
     cdef public str path
     cdef public Py_ssize_t width
     cdef public list arrived, channels, shown
-    cpdef empty(self)
+    cpdef clear(self)
     cpdef receive(self, token, channel)

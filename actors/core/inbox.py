@@ -77,10 +77,10 @@ class Inbox:
     def __init__(self, path: str = "") -> None:
         self.path = path
         self.width = 0
-        self.empty()
+        self.clear()
 
-    def empty(self) -> None:
-        """Engine: begin without tokens."""
+    def clear(self) -> None:
+        """Engine: forget what has come."""
         self.arrived: list[Any] = []
         self.channels: list[int] = []  # of these tokens, where there are several connections
         self.shown = self.arrived
@@ -117,25 +117,13 @@ class Inbox:
         if self.width > 1:
             self.channels.append(channel)
 
-    def clear(self) -> None:
-        """Engine: forget the tokens that have come."""
-        self.empty()
-
     def take(self) -> tuple[list[Any], list[int]]:
         """Engine: take the tokens out, as if they had not come yet."""
         taken = self.arrived[:], self.channels[:]
-        self.empty()
+        self.clear()
         return taken
 
     def give(self, taken: tuple[list[Any], list[int]]) -> None:
         """Engine: show tokens that were taken out."""
         self.arrived, self.channels = taken[0][:], taken[1][:]
-        self.shown = self.arrived
-
-    def hold(self) -> None:
-        """Engine: until ``release`` show nothing, and keep what is there and what comes."""
-        self.shown = NOTHING
-
-    def release(self) -> None:
-        """Engine: show what has come."""
         self.shown = self.arrived

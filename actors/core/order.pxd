@@ -4,11 +4,11 @@ from epicycle.actors.core.inbox cimport Moment, Wake
 
 
 cdef class Ranks:
-    cdef long* items
+    cdef long long* items
     cdef readonly Py_ssize_t size
     cdef Py_ssize_t room
-    cdef int push(self, long rank) except -1
-    cdef long pop(self)
+    cdef int push(self, long long rank) except -1
+    cdef long long pop(self)
 
 
 cdef struct Slot:
@@ -17,12 +17,12 @@ cdef struct Slot:
 
 
 cdef class Times:
+    cdef Ranks heap
     cdef list instants
-    cdef long long* heap
     cdef Py_ssize_t* free  # places in the list
     cdef Slot* table
     cdef readonly Py_ssize_t size
-    cdef Py_ssize_t room, mask, unused
+    cdef Py_ssize_t room, mask, unused  # room of free
     cdef long long first(self)
     cdef object at(self, long long time)
     cdef int add(self, Moment instant) except -1

@@ -25,11 +25,11 @@ cdef class Ranks:
         for rank in ranks:
             self.push(rank)
 
-    cdef int push(self, long rank) except -1:
+    cdef int push(self, long long rank) except -1:
         cdef Py_ssize_t place = self.size, above
-        cdef long* items = self.items
+        cdef long long* items = self.items
         if self.size == self.room:
-            items = <long*>PyMem_Realloc(items, (2 * self.room + 8) * sizeof(long))
+            items = <long long*>PyMem_Realloc(items, (2 * self.room + 8) * sizeof(long long))
             if items == NULL:
                 raise MemoryError
             self.items, self.room = items, 2 * self.room + 8
@@ -43,9 +43,9 @@ cdef class Ranks:
         items[place] = rank
         return 0
 
-    cdef long pop(self):
-        cdef long* items = self.items
-        cdef long least = items[0], last
+    cdef long long pop(self):
+        cdef long long* items = self.items
+        cdef long long least = items[0], last
         cdef Py_ssize_t place = 0, below
         self.size -= 1
         last = items[self.size]
@@ -68,16 +68,16 @@ cdef class Times:
 
     def __cinit__(self):
         self.mask = -1
+        self.heap = Ranks()
         self.instants = []
 
     def __dealloc__(self):
-        PyMem_Free(self.heap)
         PyMem_Free(self.free)
         PyMem_Free(self.table)
 
     @property
     def content(self):
-        return tuple((self.heap[place], self.at(self.heap[place])) for place in range(self.size))
+        return tuple((time, self.at(time)) for time in self.heap.content)
 
     @content.setter
     def content(self, instants):
@@ -87,7 +87,7 @@ cdef class Times:
             self.put_in(time, instant)
 
     cdef long long first(self):
-        return self.heap[0] if self.size else LAST
+        return self.heap.items[0] if self.size else LAST
 
     cdef object at(self, long long time):
         cdef Py_ssize_t place
@@ -104,15 +104,9 @@ cdef class Times:
         return self.put_in(instant.time, instant)
 
     cdef int put_in(self, long long time, instant) except -1:
-        cdef Py_ssize_t place, above
-        cdef long long* heap = self.heap
         cdef Py_ssize_t* free
         cdef Py_ssize_t number
         if self.size == self.room:
-            heap = <long long*>PyMem_Realloc(heap, (2 * self.room + 8) * sizeof(long long))
-            if heap == NULL:
-                raise MemoryError
-            self.heap = heap
             free = <Py_ssize_t*>PyMem_Realloc(self.free, (2 * self.room + 8) * sizeof(Py_ssize_t))
             if free == NULL:
                 raise MemoryError
@@ -127,16 +121,8 @@ cdef class Times:
             number = len(self.instants)
             self.instants.append(instant)
         self._put(time, number)
-        place = self.size
         self.size += 1
-        while place > 0:
-            above = (place - 1) >> 1
-            if heap[above] <= time:
-                break
-            heap[place] = heap[above]
-            place = above
-        heap[place] = time
-        return 0
+        return self.heap.push(time)
 
     cdef int _widen(self) except -1:
         cdef Slot* before = self.table
@@ -162,23 +148,10 @@ cdef class Times:
         self.table[place].number = number
 
     cdef object pop(self):
-        cdef long long* heap = self.heap
-        cdef long long time = heap[0], last
-        cdef Py_ssize_t place = 0, below, home, number
+        cdef long long time = self.heap.pop()
+        cdef Py_ssize_t place, below, home, number
         cdef object found
         self.size -= 1
-        last = heap[self.size]
-        while True:
-            below = 2 * place + 1
-            if below >= self.size:
-                break
-            if below + 1 < self.size and heap[below + 1] < heap[below]:
-                below += 1
-            if heap[below] >= last:
-                break
-            heap[place] = heap[below]
-            place = below
-        heap[place] = last
         place = hashed(time) & self.mask
         while self.table[place].time != time or self.table[place].number < 0:
             place = (place + 1) & self.mask

@@ -92,7 +92,7 @@ class InputPort(_Port[T], Inbox):
     def bind(self, actor: Any) -> InputPort[T]:
         bound: InputPort[T] = super().bind(actor)
         bound.width = 0
-        bound.empty()
+        bound.clear()
         return bound
 
     if TYPE_CHECKING:  # what an inbox of any tokens has, with the port's own type

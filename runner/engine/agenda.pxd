@@ -12,7 +12,6 @@ cdef class Turn:
     cdef public Wake wake
     cdef public bint is_wanted
     cpdef add(self, Wake wake)
-    cpdef list take_wakes(self)
     @cython.locals(wake=Wake, port=Inbox, due=cython.bint)
     cpdef bint use_wakes(self) except -1
     @cython.locals(port=Inbox)

@@ -40,12 +40,6 @@ class Turn:
         else:
             self.wakes.append(wake)
 
-    def take_wakes(self) -> list[Wake]:
-        """The wake-ups of the present tag, which are forgotten."""
-        wakes = [] if self.wake is None else [self.wake, *(self.wakes or ())]
-        self.wake = self.wakes = None
-        return wakes
-
     def use_wakes(self) -> bool:
         """Make the wake-ups due; false if all were cancelled and there is nothing else to fire for."""
         due = False

@@ -36,7 +36,7 @@ cdef class Sender(Way):
     cpdef Sender to(self, channel)
 
 
-cdef class Screened(Way):
+cdef class Screened:
     cdef public Sender sender
     cdef public object woven
     cdef public dict entries

@@ -110,7 +110,7 @@ class Sender(Way):
         return sender
 
 
-class Screened(Way):
+class Screened:
     """A sender behind aspects: what they drop has not been sent.
 
     The channel of a send travels past them in the way behind, for they may forward it later.
