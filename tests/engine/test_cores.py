@@ -125,8 +125,7 @@ def test_the_choice_of_this_process() -> None:
 def test_what_a_form_is_a_form_of(tmp_path: Path) -> None:
     """Docstrings do not count, whatever else stands first does."""
     source = tmp_path / "one.py"
-    source.write_text(
-        'class A:\n    """Doc."""\n    def fire(self):\n        self.send(1)\n\n\ndef f(x):\n    """Doc."""\n    return x\n'
-    )
+    kind = 'class A:\n    """Doc."""\n    def fire(self):\n        self.send(1)\n'
+    source.write_text(f'{kind}\n\ndef f(x):\n    """Doc."""\n    return x\n')
     assert MODULE["text_of"](source, "A") == "class A:\n    def fire(self):\n        self.send(1)"
     assert MODULE["text_of"](source, "f") == "def f(x):\n    return x"
