@@ -23,6 +23,7 @@ from setuptools.command.build_ext import build_ext
 ROOT = Path(__file__).parent
 TREE = ROOT / "build" / "core"
 core = runpy.run_path(str(ROOT / "actors" / "compiled.py"), run_name="setup")
+OF_TYPES = "classmethod(__import__('types').GenericAlias)"  # what makes InputPort[float] a name of a type
 # The same bits everywhere: no fused multiplication and addition, no reordering.
 FLAGS = [] if sys.platform == "win32" else ["-O2", "-ffp-contract=off", "-fno-fast-math", "-Wno-unused-function"]
 
@@ -42,24 +43,38 @@ def check_forms() -> None:
 
 
 def for_cython(source: Path) -> str:
-    """A source without the imports in whose place the types for C are: those for type checkers, those of the .pxd."""
+    """A source as classes in C take it.
+
+    Left out are the imports in whose place the types for C are (those for type checkers, those of the .pxd), overloads,
+    and the parameters of generic classes.
+    """
     text = source.read_text(encoding="utf-8")
     types = source.with_suffix(".pxd")
-    cimported = re.findall(r"cimport (.*)", types.read_text(encoding="utf-8")) if types.exists() else []
-    names = {name.strip() for line in cimported for name in line.split(",")}
+    told = types.read_text(encoding="utf-8") if types.exists() else ""
+    names = {name.strip() for line in re.findall(r"cimport (.*)", told) for name in line.split(",")}
+    in_c = set(re.findall(r"cdef class (\w+)", told))
     lines = text.splitlines()
-    for node in ast.parse(text).body:
-        left = ""
+
+    def put(first: int, last: int, left: str) -> None:
+        lines[first - 1 : last] = [left] + [""] * (last - first)  # places of errors stay
+
+    for node in ast.walk(ast.parse(text)):
+        last = getattr(node, "end_lineno", 0)
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            left = "if False: pass"
-            last = node.body[-1].end_lineno
+            put(node.lineno, node.body[-1].end_lineno, " " * node.col_offset + "if False: pass")
         elif isinstance(node, ast.ImportFrom) and names & {each.name for each in node.names}:
             node.names = [each for each in node.names if each.name not in names]
-            left = ast.unparse(node) if node.names else ""
-            last = node.end_lineno
-        else:
-            continue
-        lines[node.lineno - 1 : last] = [left] + [""] * (last - node.lineno)  # places of errors stay
+            put(node.lineno, last, ast.unparse(node) if node.names else "")
+        elif isinstance(node, ast.FunctionDef) and [ast.unparse(each) for each in node.decorator_list] == ["overload"]:
+            put(node.lineno - 1, last, "")
+        elif isinstance(node, ast.ClassDef) and node.name in in_c:
+            bases = [ast.unparse(each).partition("[")[0] for each in node.bases]
+            generic = "Generic" in bases
+            bases = [each for each in bases if each != "Generic"]
+            head = f"class {node.name}({', '.join(bases)}):" if bases else f"class {node.name}:"
+            put(node.lineno, node.lineno, head)
+            if generic:
+                lines[node.body[0].end_lineno - 1] += f"; __class_getitem__ = {OF_TYPES}"
     return "\n".join(lines) + "\n"
 
 

@@ -18,12 +18,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-# In the order of their imports.  None does arithmetic on tokens: Cython takes x + 0 for x, which is wrong of -0.0.
+# In the order of their imports.
 CORE_MODULES = (
-    "epicycle.actors.core.inbox",
-    "epicycle.actors.core.order",
+    "epicycle.actors.core.primitives",
     "epicycle.actors.core.tag",
+    "epicycle.actors.core.moment",
+    "epicycle.actors.core.order",
     "epicycle.actors.core.ports",
+    "epicycle.actors.core.parameter",
     "epicycle.actors.core.port_parameter",
     "epicycle.actors.core.actor",
     "epicycle.actors.core.authoring",

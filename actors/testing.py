@@ -48,6 +48,11 @@ class Harness:
         self.sent[name].append((self.tag.seconds, token))
         self.channels[name].append(channel)
 
+    @property
+    def time(self) -> int:
+        """The time of the present tag (ns)."""
+        return self.tag.time
+
     def wake(self, actor: Actor, time: int) -> Wake:
         """What the actor asks for with ``wake_in`` and ``wake_at``."""
         tag = Tag(time, 1) if time > self.tag.time else Tag(self.tag.time, self.tag.microstep + 1)

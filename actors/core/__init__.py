@@ -5,7 +5,6 @@ from .actor import Actor, Context, declared_ports, has_own_ports
 from .authoring import ABSENT, Latest, Pending, present, rounds
 from .errors import EpicycleError
 from .files import irregular, open_regular, read_regular, read_table
-from .inbox import NOTHING, Moment, PortError, Wake, When, new_wake
 from .laws import normal_quantile, normal_share
 from .messages import (
     abridged,
@@ -21,6 +20,7 @@ from .messages import (
     visible_character,
     visible_lines,
 )
+from .moment import Moment, Wake, When, new_wake
 from .order import NEVER, Line, Ranks, Times
 from .parameter import (
     REQUIRED,
@@ -37,7 +37,7 @@ from .parameter import (
 )
 from .port_parameter import PortParameter
 from .port_types import accepts, shaped, token_type, type_name
-from .ports import Emit, InputPort, OutputPort
+from .ports import Emitter, InputPort, OutputPort, PortError, Way
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
@@ -45,11 +45,11 @@ from .tag import NANOSECONDS_PER_SECOND, Tag, new_tag, to_nanoseconds, to_second
 from .units import UnitError, convert, parse_unit
 
 __all__ = [
-    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NOTHING", "REQUIRED", "Actor", "Configurable", "Context",
-    "Emit", "EpicycleError", "InputPort", "Latest", "Line", "MappingParameter", "Moment", "OutputPort", "Parameter",
+    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "REQUIRED", "Actor", "Configurable", "Context", "Emitter",
+    "EpicycleError", "InputPort", "Latest", "Line", "MappingParameter", "Moment", "OutputPort", "Parameter",
     "ParameterError", "Pending", "PortError", "PortParameter", "Process", "Quantity", "Ranks", "Stream", "Tag", "Times",
-    "UnitError", "Wake", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
-    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "UnitError", "Wake", "Way", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert",
+    "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
     "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share",
     "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular", "read_table",
     "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type",

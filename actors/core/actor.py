@@ -33,10 +33,10 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
 
-from .inbox import PortError, Wake
+from .moment import Wake
 from .parameter import Configurable, ParameterError
 from .port_parameter import ParameterPort, PortParameter
-from .ports import InputPort, OutputPort
+from .ports import InputPort, OutputPort, PortError
 from .random import Stream, random_stream
 from .tag import Tag, to_nanoseconds, to_seconds
 
@@ -47,6 +47,10 @@ class Context(Protocol):
     @property
     def tag(self) -> Tag:
         """The present tag."""
+
+    @property
+    def time(self) -> int:
+        """Its time (ns)."""
 
     @property
     def seed(self) -> int:
@@ -107,10 +111,6 @@ class Actor(Configurable):
         return False
 
     def __init__(self, path: str, **parameters: object) -> None:
-        try:
-            self._configure(parameters)
-        except ParameterError as error:
-            raise ParameterError(f"{path}: {error}") from None
         self.path = path
         self.is_part = False  # of a model
         self.context: Context = _NoContext(self)  # the run that the actor is part of
@@ -125,6 +125,10 @@ class Actor(Configurable):
                 self.inputs[name] = bound
             else:
                 self.outputs[name] = bound
+        try:
+            self._configure(parameters)
+        except ParameterError as error:
+            raise ParameterError(f"{path}: {error}") from None
         for name, port in self.own_ports().items():
             self._add_own(name, port)
         self.check()
@@ -204,7 +208,7 @@ class Actor(Configurable):
     @property
     def now(self) -> float:
         """The present time in seconds."""
-        return to_seconds(self.context.tag.time)
+        return to_seconds(self.context.time)
 
     @property
     def random(self) -> Stream:
@@ -219,7 +223,7 @@ class Actor(Configurable):
 
     def wake_in(self, delay: float) -> Wake:
         """Ask to be fired after ``delay`` seconds."""
-        return self.context.wake(self, self.context.tag.time + to_nanoseconds(delay))
+        return self.context.wake(self, self.context.time + to_nanoseconds(delay))
 
     def wake_at(self, time: float) -> Wake:
         """Ask to be fired at ``time`` seconds."""

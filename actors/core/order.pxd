@@ -1,6 +1,6 @@
 # Types for C; what everything is for is said in order.py.
 
-from epicycle.actors.core.inbox cimport Moment, Wake
+from epicycle.actors.core.moment cimport Moment, Wake
 
 
 cdef class Ranks:

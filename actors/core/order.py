@@ -9,7 +9,7 @@ from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .inbox import Wake, When
+    from .moment import Wake, When
 
 NEVER = 2**63 - 1  # ns
 

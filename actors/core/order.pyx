@@ -3,7 +3,7 @@
 
 from cpython.mem cimport PyMem_Free, PyMem_Malloc, PyMem_Realloc
 
-from epicycle.actors.core.inbox cimport Moment, Wake
+from epicycle.actors.core.moment cimport Moment, Wake
 
 NEVER = 2**63 - 1
 cdef long long LAST = 2**63 - 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import types
 from collections.abc import Callable, Mapping, Sequence
@@ -69,8 +68,6 @@ class Parameter(Generic[T]):
     A parameter that takes values of several kinds names one parameter for each kind as its ``forms``.
     """
 
-    forms: tuple[Parameter[Any], ...] = ()
-
     def __init__(
         self,
         type: type[T] | types.UnionType,
@@ -98,6 +95,7 @@ class Parameter(Generic[T]):
         self.optional = optional or default is None
         self.doc = doc
         self.name = ""
+        self.forms: tuple[Parameter[Any], ...] = ()
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name.rstrip("_")  # `from_` is the parameter 'from': keywords of Python are no names in it
@@ -119,6 +117,11 @@ class Parameter(Generic[T]):
     def store(self, instance: object, value: T | None) -> None:
         """Give an instance its value."""
         setattr(instance, self.name, value)
+
+    def value_in(self, instance: object) -> T | None:
+        """What an instance was given."""
+        value: T | None = vars(instance).get(self.name)
+        return value
 
     @property
     def required(self) -> bool:
@@ -148,7 +151,8 @@ class Parameter(Generic[T]):
         """The same parameter, counted in this unit if it has none of its own."""
         if self.unit or self.type not in (float, int | float):
             return self
-        changed = copy.copy(self)
+        changed = type(self).__new__(type(self))
+        vars(changed).update(vars(self))
         changed.unit = unit
         return changed
 
@@ -375,9 +379,9 @@ class Configurable:
     def __repr__(self) -> str:
         """The parameters that are not left at their defaults."""
         values = ", ".join(
-            f"{name}={self.__dict__.get(name)!r}"
+            f"{name}={parameter.value_in(self)!r}"
             for name, parameter in declared_parameters(type(self)).items()
-            if parameter.required or self.__dict__.get(name) is not parameter.default_value
+            if parameter.required or parameter.value_in(self) is not parameter.default_value
         )
         return f"{type(self).__name__}({values})"
 

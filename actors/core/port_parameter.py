@@ -13,40 +13,52 @@ _NOTHING: Any = object()
 
 
 class ParameterPort(InputPort[T]):
-    """The port of a ``PortParameter``: remembers the latest token beyond its tag."""
+    """The port of a ``PortParameter``, which holds its value: remembers the latest token beyond its tag."""
+
+    __slots__ = ("_before", "_current", "_parameter", "_received", "given", "has_received")
 
     copies_share = ("_parameter",)  # the declaration is the class's
 
     def __init__(self, parameter: PortParameter[T], type: Any, doc: str) -> None:
-        super().__init__(type, required=False, doc=doc)
+        InputPort.__init__(self, type, required=False, doc=doc)
         self._parameter = parameter
-        self._received: Any = _NOTHING
-        self._current: Any = _NOTHING
-        self.has_received = False  # which is asked first: most have not, and are read for every token
-        self._before: Any = _NOTHING  # what had been received, and not been read, before the present tag
+        self.has_received = False
+        self.start_with(_NOTHING)
 
-    def receive(self, token: T, channel: int) -> None:
+    def tell(self, bound: Any) -> None:
+        InputPort.tell(self, bound)
+        bound._parameter, bound.has_received = self._parameter, False
+        bound.start_with(self.given)
+
+    def start_with(self, value: T | None) -> None:
+        """Take the value that the model gives, which counts until a token comes."""
+        self.given: Any = value
+        if not self.has_received:
+            self.reset()
+
+    def reset(self) -> None:
+        """Forget what came: the given value counts again."""
+        self._current = self.given
+        self._received = self._before = _NOTHING  # before: what had come and not been read when the present tag began
+        self.has_received = False
+
+    def receive(self, token: Any, channel: int) -> None:
         if not self.arrived:
             self._before = self._received
-        super().receive(token, channel)
+        InputPort.receive(self, token, channel)
         self._received = token
         self.has_received = True
 
-    def take(self) -> tuple[list[T], list[int]]:
+    def take(self) -> tuple[list[Any], list[int]]:
         self._received = self._before
-        return super().take()
+        return InputPort.take(self)
 
-    def give(self, taken: tuple[list[T], list[int]]) -> None:
-        super().give(taken)
+    def give(self, taken: tuple[list[Any], list[int]]) -> None:
+        InputPort.give(self, taken)
         self._received = taken[0][-1]
         self.has_received = True
 
-    def reset(self) -> None:
-        """Forget what came: the declared value counts again."""
-        self._received = self._current = _NOTHING
-        self.has_received = False
-
-    def current(self, initial: T) -> T:
+    def current(self) -> T:
         """The value at present: the latest token that came, or else the value given in the model."""
         if self._received is not _NOTHING:
             # Converted when it is read, so that a bad token is the receiver's error and not the sender's.
@@ -55,7 +67,7 @@ class ParameterPort(InputPort[T]):
                 self._current = self._parameter.convert(token)
             except ParameterError as error:
                 raise ParameterError(f"{self.path}: {error}") from None
-        result: T = initial if self._current is _NOTHING else self._current
+        result: T = self._current
         return result
 
 
@@ -67,11 +79,11 @@ class PortParameter(Parameter[T]):
     """
 
     def __init__(self, type: type[T] | types.UnionType, *arguments: Any, **keywords: Any) -> None:
-        super().__init__(type, *arguments, **keywords)
+        Parameter.__init__(self, type, *arguments, **keywords)
         self.port: ParameterPort[T] = ParameterPort(self, type, self.doc)
 
     def __set_name__(self, owner: type, name: str) -> None:
-        super().__set_name__(owner, name)
+        Parameter.__set_name__(self, owner, name)
         self.port.__set_name__(owner, name)
 
     @overload
@@ -81,13 +93,15 @@ class PortParameter(Parameter[T]):
     def __get__(self, instance: Any, owner: type) -> PortParameter[T] | T:
         if instance is None:
             return self
-        port: ParameterPort[T] = instance.inputs[self.name]
-        initial: T = instance.__dict__[self.name]
-        return port.current(initial) if port.has_received else initial
-
-    def store(self, instance: object, value: T | None) -> None:
-        instance.__dict__[self.name] = value  # past __set__
+        port: ParameterPort[T] = instance.inputs[self.port.name]
+        return port.current()
 
     def __set__(self, instance: Any, value: T) -> None:
-        # That it exists makes Python ask __get__ before the instance's __dict__, where the value given first lies.
         raise AttributeError(f"{instance.path}.{self.name} changes by a token at its port alone")
+
+    def store(self, instance: Any, value: T | None) -> None:
+        instance.inputs[self.port.name].start_with(value)
+
+    def value_in(self, instance: Any) -> T | None:
+        value: T | None = instance.inputs[self.port.name].given
+        return value

@@ -7,11 +7,12 @@ An output port hands a token on at once; who gets it, and through which delays a
 from __future__ import annotations
 
 import types
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Generic, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic
 
-from .inbox import Inbox, PortError
+from .errors import EpicycleError
 from .port_types import shaped, type_name
+from .primitives import empty
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -23,17 +24,49 @@ else:
     T = TypeVar("T")
 
 _ANY: Any = Any
+_NOTHING: list[Any] = []  # what a port shows that keeps its tokens to itself
 
 
-class Emit(Protocol):
+class PortError(EpicycleError):
+    """A port was read or written in a way that its declaration or the model does not allow."""
+
+
+class Way:
+    """Where a token goes on to."""
+
+    __slots__ = ()
+
+    def go(self, token: Any) -> None:
+        """Let a token go on."""
+        raise NotImplementedError
+
+
+class Emitter(Way):
     """What ``send`` does in a running model."""
 
-    def __call__(self, token: Any, channel: int | None = None) -> None:
+    __slots__ = ()
+
+    def send(self, token: Any, channel: int | None = None) -> None:
         """Send a token to all channels, or to one."""
+        raise NotImplementedError
 
 
-class _Port(Generic[T]):
+class _Told(Emitter):
+    """Hands what is sent to a function."""
+
+    __slots__ = ("function",)
+
+    def __init__(self, function: Callable[..., None]) -> None:
+        self.function = function
+
+    def send(self, token: Any, channel: int | None = None) -> None:
+        self.function(token, channel)
+
+
+class Port(Generic[T]):
     """What both directions share: the declaration, and where the instance stands."""
+
+    __slots__ = ("actor", "doc", "multi", "name", "path", "type", "width")
 
     direction = ""
 
@@ -44,6 +77,7 @@ class _Port(Generic[T]):
         self.name = ""
         self.path = ""
         self.actor: Any = None
+        self.width = 0
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -51,19 +85,21 @@ class _Port(Generic[T]):
     def bind(self, actor: Any) -> Any:
         """The port of one instance."""
         bound = type(self).__new__(type(self))
-        # One by one: an instance whose __dict__ was never asked for keeps its attributes in itself, where they take a
-        # third of the space and are found sooner.
-        for name, value in vars(self).items():
-            setattr(bound, name, value)
+        self.tell(bound)
         bound.actor = actor
         bound.path = f"{actor.path}.{self.name}"
         return bound
+
+    def tell(self, bound: Any) -> None:
+        """Give what is declared to the port of an instance."""
+        bound.type, bound.multi, bound.doc, bound.name = self.type, self.multi, self.doc, self.name
+        bound.width = 0
 
     def __repr__(self) -> str:
         return f"<{self.direction} port {self.path or self.name}: {type_name(self.type)}>"
 
 
-class InputPort(_Port[T], Inbox):
+class InputPort(Port[T]):
     """Where tokens arrive: of any type if none is given.
 
     ``shape`` is that of a ``numpy`` array, as for parameters: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
@@ -72,7 +108,14 @@ class InputPort(_Port[T], Inbox):
     actor only takes note of it, which takes no time, and works with it later.
     """
 
+    __slots__ = ("arrived", "channels", "required", "shown", "triggers")
+
     direction = "input"
+
+    if TYPE_CHECKING:
+        arrived: list[Any]
+        channels: list[int] | None  # of these tokens, where there are several connections
+        shown: list[Any]  # the same as arrived, or nothing while they are hidden
 
     def __init__(
         self,
@@ -84,32 +127,91 @@ class InputPort(_Port[T], Inbox):
         triggers: bool = True,
         doc: str = "",
     ) -> None:
-        super().__init__(type, shape=shape, multi=multi, doc=doc)
+        Port.__init__(self, type, shape=shape, multi=multi, doc=doc)
         self.required = required
         self.triggers = triggers
-        Inbox.__init__(self)
+        self.prepare()
 
-    def bind(self, actor: Any) -> InputPort[T]:
-        bound: InputPort[T] = super().bind(actor)
-        bound.width = 0
-        bound.clear()
-        return bound
+    def tell(self, bound: Any) -> None:
+        Port.tell(self, bound)
+        bound.required, bound.triggers = self.required, self.triggers
+        bound.prepare()
 
-    if TYPE_CHECKING:  # what an inbox of any tokens has, with the port's own type
+    @property
+    def present(self) -> bool:
+        """Whether a token has arrived at the present tag."""
+        return bool(self.shown)
 
-        @property
-        def value(self) -> T: ...
-        @property
-        def tokens(self) -> tuple[T, ...]: ...
-        def by_channel(self) -> list[list[T]]: ...
+    @property
+    def value(self) -> T:
+        """The token of the present tag, the latest if there are several; raises ``PortError`` if there is none."""
+        if not self.shown:
+            raise PortError(f"{self.path} has no token at this tag; ask 'present' before 'value'")
+        token: T = self.shown[-1]
+        return token
+
+    @property
+    def tokens(self) -> tuple[T, ...]:
+        """All tokens of the present tag in the order of their arrival."""
+        return tuple(self.shown)
+
+    def by_channel(self) -> list[list[T]]:
+        """The tokens of the present tag, a list for each channel."""
+        if self.width == 1:
+            return [list(self.shown)]
+        result: list[list[T]] = [[] for _ in range(self.width)]
+        for token, channel in zip(self.shown, self.channels or (), strict=False):
+            result[channel].append(token)
+        return result
+
+    def receive(self, token: Any, channel: int) -> None:
+        """Engine: a token arrives."""
+        self.arrived.append(token)
+        if self.width > 1:
+            if self.channels is None:
+                self.channels = []
+            self.channels.append(channel)
+
+    def prepare(self) -> None:
+        """Make room: no token has come yet."""
+        self.arrived = self.shown = []
+        self.channels = None
+
+    def clear(self) -> None:
+        """Engine: forget what has come."""
+        empty(self.arrived)
+        if self.channels is not None:
+            empty(self.channels)
+        self.shown = self.arrived
+
+    def hide(self) -> None:
+        """Engine: show nothing until they are cleared or shown."""
+        self.shown = _NOTHING
+
+    def show(self) -> None:
+        """Engine: show what has come."""
+        self.shown = self.arrived
+
+    def take(self) -> tuple[list[Any], list[int]]:
+        """Engine: take the tokens out, as if they had not come yet."""
+        taken = self.arrived[:], [] if self.channels is None else self.channels[:]
+        self.clear()
+        return taken
+
+    def give(self, taken: tuple[list[Any], list[int]]) -> None:
+        """Engine: show tokens that were taken out."""
+        self.arrived, self.channels = taken[0][:], taken[1][:] or None
+        self.shown = self.arrived
 
 
-class OutputPort(_Port[T]):
+class OutputPort(Port[T]):
     """Where tokens leave: of any type if none is given.
 
     ``depends_on`` names the inputs that a token may depend on within the same tag; ``None`` means all of them, ``()``
     none (an actor that delays), which lets the port stand in a loop.
     """
+
+    __slots__ = ("depends_on", "emitter")
 
     direction = "output"
 
@@ -122,21 +224,26 @@ class OutputPort(_Port[T]):
         depends_on: tuple[str, ...] | None = None,
         doc: str = "",
     ) -> None:
-        super().__init__(type, shape=shape, multi=multi, doc=doc)
+        Port.__init__(self, type, shape=shape, multi=multi, doc=doc)
         self.depends_on = depends_on
-        self.width = 0
+        self.emitter: Emitter | None = None
+
+    def tell(self, bound: Any) -> None:
+        Port.tell(self, bound)
+        bound.depends_on, bound.emitter = self.depends_on, None
 
     def send(self, token: T, channel: int | None = None) -> None:
         """Send a token at the present tag: to all channels, or to the one given."""
-        raise PortError(
-            f"{self.path or self.name} cannot send now: tokens are sent in fire() or run() of a running model"
-        )
+        if self.emitter is None:
+            raise PortError(
+                f"{self.path or self.name} cannot send now: tokens are sent in fire() or run() of a running model"
+            )
+        self.emitter.send(token, channel)
 
-    def connect(self, emit: Emit) -> None:
-        """Engine: what ``send`` does from now on."""
-        self.send = emit  # type: ignore[method-assign]  # a call less for each token
+    def connect(self, emit: Emitter | Callable[..., None]) -> None:
+        """Engine: what ``send`` does from now on; a function is given token and channel."""
+        self.emitter = emit if isinstance(emit, Emitter) else _Told(emit)
 
     def disconnect(self) -> None:
         """Engine: from now on nothing can be sent."""
-        with suppress(AttributeError):
-            del self.send
+        self.emitter = None

@@ -18,7 +18,7 @@ from simpy.events import Event
 from simpy.events import Process as SimPyProcess
 
 from .actor import Actor
-from .inbox import Wake
+from .moment import Wake
 from .ports import InputPort
 
 

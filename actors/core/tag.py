@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from .primitives import nearest
+
 NANOSECONDS_PER_SECOND = 1_000_000_000
 # Where time ends: about 146 years. Beyond it a time is a mistake, and int64 columns could not hold it.
 LATEST = 2**62
@@ -35,6 +37,10 @@ def new_tag(time: int, microstep: int) -> Tag:
 
 def to_nanoseconds(seconds: float) -> int:
     """The nearest whole nanosecond; raises ``ValueError`` for NaN, infinities and times past ``LATEST``."""
+    if type(seconds) is float:  # nearly always
+        product = seconds * 1e9
+        if -LATEST <= product <= LATEST:
+            return nearest(product)
     if not math.isfinite(seconds):
         raise ValueError(f"{seconds!r} is not a time")
     # Compared first as floats: the product may be infinite, which has no whole number.

@@ -141,7 +141,7 @@ class Weaving(View):
             self._problem(
                 f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut, about=about
             )
-        elif vars(self.graph.actors[actor])[name] is None:
+        elif parameter.value_in(self.graph.actors[actor]) is None:
             self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
         elif path in self.graph.ports and self.graph.incoming(path):
             sender = self.graph.incoming(path)[0].source

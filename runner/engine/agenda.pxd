@@ -1,7 +1,7 @@
 # Types for C; what everything is for is said in agenda.py.
 
 cimport cython
-from epicycle.actors cimport Inbox, Moment, Wake
+from epicycle.actors cimport InputPort, Moment, Wake, Way
 
 
 cdef class Turn:
@@ -12,11 +12,11 @@ cdef class Turn:
     cdef public Wake wake
     cdef public bint is_wanted
     cpdef add(self, Wake wake)
-    @cython.locals(wake=Wake, port=Inbox, due=cython.bint)
+    @cython.locals(wake=Wake, port=InputPort, due=cython.bint)
     cpdef bint use_wakes(self) except -1
-    @cython.locals(port=Inbox)
+    @cython.locals(port=InputPort)
     cpdef hold(self)
-    @cython.locals(port=Inbox)
+    @cython.locals(port=InputPort)
     cpdef clear(self)
 
 
@@ -33,10 +33,6 @@ cdef class Instant(Moment):
 
 @cython.locals(instant=Instant)
 cpdef Instant new_instant(long long time, long microstep)
-
-
-cdef class Way:
-    cpdef go(self, token)
 
 
 cdef class Delivery:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from epicycle.actors import NOTHING, Actor, Moment, Wake
-
-if TYPE_CHECKING:
-    from epicycle.actors import InputPort
+from epicycle.actors import Actor, InputPort, Moment, Wake, Way
 
 
 class Turn:
@@ -59,17 +56,15 @@ class Turn:
     def hold(self) -> None:
         """The actor fires: it does not see yet what is for a later turn."""
         for port in self.later:
-            port.shown = NOTHING
+            port.hide()
 
     def clear(self) -> None:
         """The actor has fired: what it has not read is gone."""
         for port in self.ports:
             if port.arrived:
-                port.arrived = port.shown = []
-                if port.channels:
-                    port.channels = []
+                port.clear()
         for port in self.later:
-            port.shown = port.arrived
+            port.show()
 
 
 class Form:
@@ -113,16 +108,6 @@ def new_instant(time: int, microstep: int) -> Instant:
     instant.time, instant.microstep = time, microstep
     instant._tag = instant.pending = instant.turn = instant.wake = instant.turns = instant.wakes = None
     return instant
-
-
-class Way:
-    """Where a token goes on to."""
-
-    __slots__ = ()
-
-    def go(self, token: Any) -> None:
-        """Let a token go on."""
-        raise NotImplementedError
 
 
 class Delivery:

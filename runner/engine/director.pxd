@@ -1,8 +1,8 @@
 # Types for C; what everything is for is said in director.py.
 
 cimport cython
-from epicycle.actors cimport Inbox, Moment, Ranks, Times, Wake, new_wake
-from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, Way, new_instant
+from epicycle.actors cimport InputPort, Moment, Ranks, Times, Wake, Way, new_wake
+from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, new_instant
 
 
 cdef class Director:
@@ -52,7 +52,7 @@ cdef class Director:
 cdef class Entry(Way):
     cdef public Director director
     cdef public Turn turn
-    cdef public Inbox port
+    cdef public InputPort port
     cdef public object channel
     cdef public bint is_plain
     @cython.locals(turn=Turn)

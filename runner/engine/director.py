@@ -27,11 +27,11 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import NEVER, InputPort, Process, Ranks, Tag, Times, Wake, new_wake
+from epicycle.actors import NEVER, InputPort, Process, Ranks, Tag, Times, Wake, Way, new_wake
 
 from ..text import NORMAL, Limits, describe
 from . import errors
-from .agenda import Delivery, Instant, Turn, Way, new_instant
+from .agenda import Delivery, Instant, Turn, new_instant
 from .environment import Environment
 from .errors import ActorError, Crowd, CrowdError, LoopError, of_process
 from .pace import notice
@@ -392,7 +392,7 @@ class Entry(Way):
         self.turn = turn
         self.port = port
         self.channel = channel
-        self.is_plain = type(port).receive is InputPort.receive and port.width == 1
+        self.is_plain = type(port) is InputPort and port.width == 1
 
     def go(self, token: Any) -> None:
         """Put a token in."""

@@ -66,6 +66,11 @@ class Execution:
         """The present tag."""
         return self._local.tag
 
+    @property
+    def time(self) -> int:
+        """Its time (ns)."""
+        return self._local.time
+
     def wake(self, actor: Actor, time: int) -> Wake:
         """Let the actor have a turn at ``time``."""
         wake = self._local.wake(self._own, time)

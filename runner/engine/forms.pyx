@@ -12,12 +12,12 @@ from cpython.float cimport PyFloat_FromDouble
 from libc.math cimport frexp, rint
 from libc.stdint cimport uint64_t
 
-from epicycle.actors cimport Inbox, Line, Wake
+from epicycle.actors cimport InputPort, Line, Wake
 from epicycle.runner.engine.agenda cimport Form, Instant, Turn
 from epicycle.runner.engine.director cimport Director
 from epicycle.runner.engine.way cimport Sender
 
-from epicycle.actors import Clock, Exponential, InputPort, PoissonClock, Recorder, Scale, Server, TimeDelay
+from epicycle.actors import Clock, Exponential, PoissonClock, Recorder, Scale, Server, TimeDelay
 from epicycle.actors import to_nanoseconds as exactly_to_nanoseconds
 from epicycle.actors import to_seconds as exactly_to_seconds
 from epicycle.actors.core.elementary import log as far_log
@@ -87,11 +87,10 @@ cdef class Native(Form):
         return True
 
     cdef Sender sender(self, name):
-        send = self.actor.outputs[name].send
-        target = getattr(send, "__self__", None)
-        return target if type(target) is Sender else None
+        emitter = self.actor.outputs[name].emitter
+        return emitter if type(emitter) is Sender else None
 
-    cdef Inbox inbox(self, name):
+    cdef InputPort input_port(self, name):
         return self.actor.inputs[name]
 
     cdef long long now(self):
@@ -103,13 +102,13 @@ cdef class Native(Form):
 
 cdef class DelayForm(Native):
     __slots__ = ("actor", "delay", "director", "input", "line", "output", "turn")
-    cdef public Inbox input
+    cdef public InputPort input
     cdef public Sender output
     cdef public Line line
     cdef public long long delay
 
     cdef bint take(self) except -1:
-        self.input, self.output = self.inbox("input"), self.sender("output")
+        self.input, self.output = self.input_port("input"), self.sender("output")
         self.line = self.actor._held._line
         self.delay = to_nanoseconds(self.actor.delay)
         return self.output is not None
@@ -126,12 +125,12 @@ cdef class DelayForm(Native):
 
 cdef class ScaleForm(Native):
     __slots__ = ("actor", "director", "input", "number", "offset_number", "output", "turn")
-    cdef public Inbox input
+    cdef public InputPort input
     cdef public Sender output
     cdef public double number, offset_number
 
     cdef bint take(self) except -1:
-        self.input, self.output = self.inbox("input"), self.sender("output")
+        self.input, self.output = self.input_port("input"), self.sender("output")
         self.number, self.offset_number = self.actor.factor, self.actor.offset
         return self.output is not None
 
@@ -221,7 +220,7 @@ cdef class ServerForm(Native):
         "actor", "capacity", "director", "input", "line", "mean", "output", "rejected", "servers", "size", "stream",
         "turn", "waiting",
     )
-    cdef public Inbox input
+    cdef public InputPort input
     cdef public Sender output, size, rejected
     cdef public Line line
     cdef public object waiting, stream
@@ -230,7 +229,7 @@ cdef class ServerForm(Native):
 
     cdef bint take(self) except -1:
         actor = self.actor
-        self.input, self.output = self.inbox("input"), self.sender("output")
+        self.input, self.output = self.input_port("input"), self.sender("output")
         self.size, self.rejected = self.sender("size"), self.sender("rejected")
         self.line, self.waiting = actor._served._line, actor._waiting
         self.capacity = 2**62 if actor.capacity is None else min(actor.capacity, 2**62)
@@ -281,11 +280,11 @@ cdef class ServerForm(Native):
 
 cdef class RecorderForm(Native):
     __slots__ = ("actor", "capacity", "director", "input", "turn")
-    cdef public Inbox input
+    cdef public InputPort input
     cdef public object capacity
 
     cdef bint take(self) except -1:
-        self.input = self.inbox("input")
+        self.input = self.input_port("input")
         self.capacity = self.actor.capacity
         return True
 
@@ -313,7 +312,7 @@ SOURCES = (
     ("timing.py", "TimeDelay", "b8778dbbc9a75614"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),
-    ("core/tag.py", "to_nanoseconds", "f5f096bec4165fd2"),
+    ("core/tag.py", "to_nanoseconds", "db763a894f2e56d4"),
     ("core/tag.py", "to_seconds", "f6c6aae6371c52a3"),
     ("core/authoring.py", "Pending", "faf6cabccebf5d58"),
 )

@@ -12,10 +12,10 @@ from typing import Any
 import simpy
 from simpy.events import NORMAL, Event, EventPriority
 
-from epicycle.actors import Actor, Tag, Wake
+from epicycle.actors import Actor, Tag, Wake, Way
 
 from ..graph import Clock
-from .agenda import Delivery, Way
+from .agenda import Delivery
 from .director import Director
 from .way import Call
 
@@ -33,6 +33,11 @@ class LocalDirector:
     def tag(self) -> Tag:
         """The present tag in local time."""
         return self._clock.tag(self._director.tag)
+
+    @property
+    def time(self) -> int:
+        """Its time (ns)."""
+        return self.tag.time
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at a local time."""

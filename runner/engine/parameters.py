@@ -15,7 +15,7 @@ class VaryingParameter:
     def __init__(self, actor: Actor, parameter: Parameter[Any]) -> None:
         self.actor = actor
         self.parameter = parameter
-        self.nominal = vars(actor)[parameter.name]
+        self.nominal = parameter.value_in(actor)
 
     def set(self, value: Any) -> None:
         """Give it the value that comes behind the aspects; raises ``ParameterError`` if it does not take it."""

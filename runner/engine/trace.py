@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, Tag, Wake, When
+from epicycle.actors import Actor, InputPort, Tag, Wake, Way, When
 from epicycle.aspects import Job
 
 from ..results import EventLog, Names, Record, Writer
 from ..text import Limits
-from .agenda import Delivery, Turn, Way
+from .agenda import Delivery, Turn
 from .director import Director
 from .execution import is_stand_in
 from .way import Call

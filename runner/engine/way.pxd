@@ -1,7 +1,7 @@
 # Types for C; what everything is for is said in way.py.
 
 cimport cython
-from epicycle.runner.engine.agenda cimport Way
+from epicycle.actors cimport Emitter, Way
 from epicycle.runner.engine.director cimport Director
 from epicycle.runner.results cimport Writer
 
@@ -23,7 +23,7 @@ cdef class Delayed(Way):
     cpdef go(self, token)
 
 
-cdef class Sender(Way):
+cdef class Sender(Emitter):
     cdef public str path
     cdef public Director director
     cdef public Writer writer
@@ -36,7 +36,8 @@ cdef class Sender(Way):
     cpdef Sender to(self, channel)
 
 
-cdef class Screened:
+cdef class Screened(Emitter):
     cdef public Sender sender
     cdef public object woven
     cdef public dict entries
+    cpdef send(self, token, channel=*)

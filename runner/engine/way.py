@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
-from epicycle.actors import PortError, counted
-
-from .agenda import Way
+from epicycle.actors import Emitter, PortError, Way, counted
 
 if TYPE_CHECKING:
     from ..results import Writer
@@ -62,7 +61,7 @@ class Delayed(Way):
         self.director.later(self.delay, self.onward, token)
 
 
-class Sender(Way):
+class Sender(Emitter):
     """What ``send`` does at an output port: a token is logged, and goes on by all channels or by one.
 
     ``channels`` makes the way along one channel, with what logs its sends; ``width`` is their number.
@@ -110,7 +109,7 @@ class Sender(Way):
         return sender
 
 
-class Screened:
+class Screened(Emitter):
     """A sender behind aspects: what they drop has not been sent.
 
     The channel of a send travels past them in the way behind, for they may forward it later.
@@ -127,7 +126,7 @@ class Screened:
         """Send a token to all channels, or to one."""
         entry = self.entries.get(channel)
         if entry is None:
-            onward: Way = self.sender if channel is None else Call(lambda passed: self.sender.send(passed, channel))
+            onward: Way = self.sender if channel is None else Call(partial(self.sender.send, channel=channel))
             entry = self.entries[channel] = self.woven(onward)
         entry.go(token)
 

@@ -9,9 +9,10 @@ from typing import Any, TypeVar
 from epicycle.actors import (
     Actor,
     Context,
-    Emit,
+    Emitter,
     EpicycleError,
     OutputPort,
+    Way,
     declared_parameters,
 )
 from epicycle.aspects import (
@@ -30,7 +31,6 @@ from epicycle.aspects import (
 from ..graph import Clock, Hop, ModelGraph, WovenAspect
 from ..results import EventLog, Signal
 from ..text import describe
-from .agenda import Way
 from .aspect_context import EngineContext
 from .director import Director
 from .errors import ActorError, LoopError
@@ -101,7 +101,7 @@ class Ways:
             for path, actor in actors.items()
             if path in self._woven_at or path in changed
         }
-        self._emits = self._find()
+        self._emitters = self._find()
         self._vary_parameters(aspects)
         for path, execution in self._executions.items():
             execution.way = self._scheduled(path, execution.execute)
@@ -151,15 +151,15 @@ class Ways:
 
     def open(self) -> None:
         """From now on tokens can be sent."""
-        for output, emit in self._emits:
-            output.connect(emit)
+        for output, emitter in self._emitters:
+            output.connect(emitter)
 
     def close(self) -> None:
         """From now on none can."""
-        for output, _ in self._emits:
+        for output, _ in self._emitters:
             output.disconnect()
 
-    def _find(self) -> list[tuple[OutputPort[Any], Emit]]:
+    def _find(self) -> list[tuple[OutputPort[Any], Emitter]]:
         # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
         leaving: dict[str, list[tuple[Hop, ...]]] = {}
         for actor in self.actors.values():
@@ -171,13 +171,13 @@ class Ways:
                     leaving.setdefault(wire.source.path, []).append(wire.hops)
         for hops in leaving.values():
             hops.sort(key=lambda way: [hop.order for hop in way])  # as they are declared
-        emits = [
-            (output, self._emit(output, leaving.get(output.path, [])))
+        emitters = [
+            (output, self._emitter(output, leaving.get(output.path, [])))
             for actor in self.actors.values()
             for output in actor.outputs.values()
         ]
         self._open_requests()
-        return emits
+        return emitters
 
     def _open_requests(self) -> None:
         """Find the ways from the request ports of aspects that are models to the actors inside."""
@@ -194,7 +194,7 @@ class Ways:
         """Who listens to what leaves a port."""
         return [Call(listener) for listener in self._listeners.get(path, [])]
 
-    def _emit(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emit:
+    def _emitter(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emitter:
         """What ``port.send`` does."""
         port.width = len(wires)
 
@@ -210,8 +210,8 @@ class Ways:
         everywhere = sender(None, self._branches(port.path, ()))
         # An aspect at an output stands before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
-            return everywhere.send
-        return Screened(everywhere, lambda onward: self._woven(port.path, port.path, onward)).send
+            return everywhere
+        return Screened(everywhere, lambda onward: self._woven(port.path, port.path, onward))
 
     def _branches(self, path: str, hops: tuple[Hop, ...]) -> list[Way]:
         """The ways onward from a port, one for each connection that leaves it."""

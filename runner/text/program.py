@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import linecache
 import os
+import re
 import sys
 import sysconfig
 from collections.abc import Mapping as AnyMapping
@@ -19,6 +20,7 @@ from epicycle.actors import MAX_DEPTH, Configurable, EpicycleError, is_too_deep
 from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import ModelError, Position, Problem
 
+_OURS = re.compile(r"'epicycle\.[\w.]+\.(?=[A-Z]\w*' )")  # as Python calls classes in C
 _LIBRARIES = tuple(sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib"))
 
 
@@ -82,6 +84,7 @@ def describe(error: BaseException) -> str:
     text = str(error).strip()
     if isinstance(error, EpicycleError):
         return text
+    text = _OURS.sub("'", text)
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 

@@ -166,7 +166,8 @@ def parts_of(model: Model) -> dict[str, Any]:
     for path, actor in model.graph.actors.items():
         found |= {f"{path}.{name}": value for name, value in vars(actor).items() if name not in ("inputs", "outputs")}
         for name, port in {**actor.inputs, **actor.outputs}.items():
-            found |= {f"{path}.{name}.{each}": value for each, value in vars(port).items()}
+            slots = {each for base in type(port).__mro__ for each in getattr(base, "__slots__", ())}
+            found |= {f"{path}.{name}.{each}": getattr(port, each) for each in slots}
     for woven in model.aspects:
         found |= {f"{woven.name}.{name}": value for name, value in vars(woven.aspect).items()}
         found |= {f"{woven.name}: {name}": value for name, value in vars(woven).items()}

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in inbox.py.
+# Types for C; what everything is for is said in moment.py.
 
 cimport cython
 
@@ -16,11 +16,3 @@ cdef class Moment:
 
 
 cpdef Wake new_wake(when)
-
-
-cdef class Inbox:
-    cdef public str path
-    cdef public Py_ssize_t width
-    cdef public list arrived, channels, shown
-    cpdef clear(self)
-    cpdef receive(self, token, channel)

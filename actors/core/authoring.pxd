@@ -1,0 +1,10 @@
+# Types for C; what everything is for is said in authoring.py.
+
+from epicycle.actors.core.order cimport Line
+
+
+cdef class Pending:
+    cdef public object _actor
+    cdef public Line _line
+    cpdef put(self, value, delay)
+    cpdef due(self)

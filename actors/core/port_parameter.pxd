@@ -1,0 +1,23 @@
+# Types for C; what everything is for is said in port_parameter.py.
+
+cimport cython
+from epicycle.actors.core.parameter cimport Parameter
+from epicycle.actors.core.ports cimport InputPort
+
+cdef object _NOTHING
+
+
+cdef class ParameterPort(InputPort):
+    cdef public object given, _before, _current, _parameter, _received
+    cdef public bint has_received
+    cpdef tell(self, bound)
+    cpdef start_with(self, value)
+    cpdef reset(self)
+    cpdef receive(self, token, channel)
+    cpdef take(self)
+    cpdef give(self, taken)
+    cpdef current(self)
+
+
+cdef class PortParameter(Parameter):
+    cdef public ParameterPort port
