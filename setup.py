@@ -112,7 +112,7 @@ class BuildCore(build_ext):
         try:
             from Cython.Build import cythonize
 
-            options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False}
+            options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False, "binding": False}
             pairs = zip(core["CORE_MODULES"], copied(), strict=True)
             made = [Extension(name, [str(path)], extra_compile_args=FLAGS) for name, path in pairs]
             made = cythonize(made, include_path=[str(TREE)], compiler_directives=options, quiet=True)

@@ -5,7 +5,8 @@ cimport cython
 
 @cython.freelist(64)
 cdef class Wake:
-    cdef public object when
+    cdef public long long time
+    cdef public long microstep
     cdef public bint cancelled, due
 
 
@@ -15,4 +16,5 @@ cdef class Moment:
     cdef public object _tag
 
 
-cpdef Wake new_wake(when)
+@cython.locals(wake=Wake)
+cpdef Wake new_wake(long long time, long microstep)

@@ -37,26 +37,31 @@ class Moment:
 class Wake:
     """A wake-up that an actor asked for: ``due`` becomes true at its tag; ``cancel()`` before that removes it."""
 
-    __slots__ = ("cancelled", "due", "when")
+    __slots__ = ("cancelled", "due", "microstep", "time")
 
     def __init__(self, when: When) -> None:
-        self.when = when
+        self.move(when)
         self.due = False
         self.cancelled = False
 
     @property
     def tag(self) -> Tag:
         """When it is due."""
-        return self.when if type(self.when) is Tag else new_tag(self.when.time, self.when.microstep)
+        return new_tag(self.time, self.microstep)
+
+    def move(self, when: When) -> None:
+        """Engine: tell another tag."""
+        self.time = when.time
+        self.microstep = when.microstep
 
     def cancel(self) -> None:
         """Ask the director to forget it."""
         self.cancelled = True
 
 
-def new_wake(when: When) -> Wake:
+def new_wake(time: int, microstep: int) -> Wake:
     """A wake-up, without a detour through its class."""
     wake = Wake.__new__(Wake)
-    wake.when = when
+    wake.time, wake.microstep = time, microstep
     wake.due = wake.cancelled = False
     return wake

@@ -45,6 +45,8 @@ cdef class Line:
     cdef Py_ssize_t size, room, unused
     cdef public long long number
     cpdef push(self, Wake wake, value)
+    cdef int put(self, long long time, long microstep, Wake wake, value) except -1
+    cdef bint is_before(self, long long time, long microstep) noexcept
     cpdef bint is_due(self) except -1
     cpdef pop(self)
     cdef int _insert(self, Item item, wake, value) except -1

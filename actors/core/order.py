@@ -83,8 +83,7 @@ class Line:
 
     def push(self, wake: Wake, value: Any) -> None:
         """Put one in."""
-        when = wake.when
-        heappush(self.content, (when.time, when.microstep, self.number, wake, value))
+        heappush(self.content, (wake.time, wake.microstep, self.number, wake, value))
         self.number += 1
 
     def is_due(self) -> bool:

@@ -210,16 +210,14 @@ cdef class Line:
             self._insert(item, wake, value)
 
     cpdef push(self, Wake wake, value):
+        self.put(wake.time, wake.microstep, wake, value)
+
+    cdef int put(self, long long time, long microstep, Wake wake, value) except -1:
         cdef Item item
-        cdef Moment moment
-        if isinstance(wake.when, Moment):
-            moment = wake.when
-            item.time, item.microstep = moment.time, moment.microstep
-        else:
-            item.time, item.microstep = wake.when.time, wake.when.microstep
-        item.number = self.number
+        item.time, item.microstep, item.number = time, microstep, self.number
         self._insert(item, wake, value)
         self.number += 1
+        return 0
 
     cdef int _insert(self, Item item, wake, value) except -1:
         cdef Py_ssize_t place, above
@@ -255,6 +253,13 @@ cdef class Line:
 
     cpdef bint is_due(self) except -1:
         return self.size > 0 and (<Wake>self.wakes[self.heap[0].place]).due
+
+    cdef bint is_before(self, long long time, long microstep) noexcept:
+        """Whether the first waits for this tag, or for one before it."""
+        cdef Item* heap = self.heap
+        if not self.size:
+            return False
+        return heap[0].time < time or (heap[0].time == time and heap[0].microstep <= microstep)
 
     cpdef pop(self):
         cdef Item* heap = self.heap

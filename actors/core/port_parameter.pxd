@@ -21,3 +21,4 @@ cdef class ParameterPort(InputPort):
 
 cdef class PortParameter(Parameter):
     cdef public ParameterPort port
+    cpdef ParameterPort port_of(self, instance)

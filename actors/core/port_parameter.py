@@ -93,15 +93,19 @@ class PortParameter(Parameter[T]):
     def __get__(self, instance: Any, owner: type) -> PortParameter[T] | T:
         if instance is None:
             return self
-        port: ParameterPort[T] = instance.inputs[self.port.name]
-        return port.current()
+        return self.port_of(instance).current()
 
     def __set__(self, instance: Any, value: T) -> None:
         raise AttributeError(f"{instance.path}.{self.name} changes by a token at its port alone")
 
     def store(self, instance: Any, value: T | None) -> None:
-        instance.inputs[self.port.name].start_with(value)
+        self.port_of(instance).start_with(value)
 
     def value_in(self, instance: Any) -> T | None:
-        value: T | None = instance.inputs[self.port.name].given
+        value: T | None = self.port_of(instance).given
         return value
+
+    def port_of(self, instance: Any) -> ParameterPort[T]:
+        """The port of one instance."""
+        port: ParameterPort[T] = instance.inputs[self.port.name]
+        return port

@@ -3,6 +3,8 @@
 cimport cython
 from epicycle.actors.core.primitives cimport nearest
 
+cdef double _FAR
+
 
 @cython.locals(product=cython.double)
 cpdef to_nanoseconds(seconds)

@@ -10,6 +10,7 @@ from .primitives import nearest
 NANOSECONDS_PER_SECOND = 1_000_000_000
 # Where time ends: about 146 years. Beyond it a time is a mistake, and int64 columns could not hold it.
 LATEST = 2**62
+_FAR = 2.0**62
 
 
 class Tag(NamedTuple):
@@ -39,7 +40,7 @@ def to_nanoseconds(seconds: float) -> int:
     """The nearest whole nanosecond; raises ``ValueError`` for NaN, infinities and times past ``LATEST``."""
     if type(seconds) is float:  # nearly always
         product = seconds * 1e9
-        if -LATEST <= product <= LATEST:
+        if -_FAR <= product <= _FAR:
             return nearest(product)
     if not math.isfinite(seconds):
         raise ValueError(f"{seconds!r} is not a time")

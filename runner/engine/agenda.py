@@ -89,10 +89,10 @@ class Instant(Moment):
     turn: Turn | None
     wake: Wake | None
     turns: list[Turn] | None
-    wakes: list[Wake] | None  # of each of these turns
+    wakes: list[Wake | None] | None  # of each of these turns
 
-    def add(self, turn: Turn, wake: Wake) -> None:
-        """Let an actor have a turn for a wake-up."""
+    def add(self, turn: Turn, wake: Wake | None) -> None:
+        """Let an actor have a turn, for a wake-up if there is one."""
         if self.turn is None:
             self.turn, self.wake = turn, wake
         elif self.turns is None or self.wakes is None:

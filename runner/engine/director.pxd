@@ -21,6 +21,8 @@ cdef class Director:
     cpdef Wake wake_turn(self, Turn turn, long long time)
     @cython.locals(turn=Turn, now=Instant)
     cpdef call(self, actor, tag, long rank)
+    @cython.locals(now=Instant, instant=Instant)
+    cpdef Instant want_at(self, Turn turn, long long time)
     @cython.locals(wake=Wake)
     cpdef Wake _call_now(self, Turn turn, Instant now)
     @cython.locals(wake=Wake)

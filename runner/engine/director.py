@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import NEVER, InputPort, Process, Ranks, Tag, Times, Wake, Way, new_wake
+from epicycle.actors import NEVER, InputPort, Moment, Process, Ranks, Tag, Times, Wake, Way, new_wake
 
 from ..text import NORMAL, Limits, describe
 from . import errors
@@ -127,14 +127,24 @@ class Director:
             return self._call_now(turn, now)
         return self._wake_at(turn, self._to_come(tag.time, tag.microstep))
 
+    def want_at(self, turn: Turn, time: int) -> Moment:
+        """Let an actor have a turn at ``time`` that it cannot call off; at which tag."""
+        now = self.now()
+        if self.present is None and time <= now.time:
+            self.want(turn)
+            return now
+        instant = self._to_come(time, 1) if time > now.time else self._to_come(now.time, now.microstep + 1)
+        instant.add(turn, None)
+        return instant
+
     def _call_now(self, turn: Turn, now: Instant) -> Wake:
-        wake = new_wake(now)
+        wake = new_wake(now.time, now.microstep)
         turn.add(wake)
         self.want(turn)
         return wake
 
     def _wake_at(self, turn: Turn, instant: Instant) -> Wake:
-        wake = new_wake(instant)
+        wake = new_wake(instant.time, instant.microstep)
         instant.add(turn, wake)
         return wake
 
@@ -234,13 +244,11 @@ class Director:
 
     def _handle(self, instant: Instant) -> None:
         turns, ready = self._turns, self._ready
-        if instant.turn is not None and instant.wake is not None:
+        if instant.turn is not None:
             self._wake_up(instant.turn, instant.wake)
-            instant.wake = None  # which knows the instant: without this they would wait for the garbage collector
         if instant.turns is not None and instant.wakes is not None:
             for place in range(len(instant.turns)):
                 self._wake_up(instant.turns[place], instant.wakes[place])
-            instant.wakes = None
         if instant.pending is not None:
             self._rank = -1
             self._begin(instant)
@@ -260,8 +268,9 @@ class Director:
         if self._next is None:
             self.present = None
 
-    def _wake_up(self, turn: Turn, wake: Wake) -> None:
-        turn.add(wake)
+    def _wake_up(self, turn: Turn, wake: Wake | None) -> None:
+        if wake is not None:
+            turn.add(wake)
         if not turn.is_wanted:
             turn.is_wanted = True
             self._ready.push(turn.rank)

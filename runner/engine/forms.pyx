@@ -99,6 +99,16 @@ cdef class Native(Form):
     cdef Wake wake_at(self, long long time):
         return self.director.wake_turn(self.turn, time)
 
+    cdef int keep(self, Line line, long long time, value) except -1:
+        """Let a value wait for its time; who fires it cannot call off, and so needs no wake-up that says so."""
+        cdef Instant instant = self.director.want_at(self.turn, time)
+        line.put(instant.time, instant.microstep, None, value)
+        return 0
+
+    cdef bint is_due(self, Line line):
+        cdef Instant now = self.director.present
+        return line.is_before(now.time, now.microstep)
+
 
 cdef class DelayForm(Native):
     __slots__ = ("actor", "delay", "director", "input", "line", "output", "turn")
@@ -116,11 +126,11 @@ cdef class DelayForm(Native):
     cpdef fire(self):
         cdef Py_ssize_t place
         cdef list tokens
-        while self.line.is_due():
+        while self.is_due(self.line):
             self.output.go(self.line.pop())
         tokens = self.input.shown
         for place in range(len(tokens)):
-            self.line.push(self.wake_at(self.now() + self.delay), tokens[place])
+            self.keep(self.line, self.now() + self.delay, tokens[place])
 
 
 cdef class ScaleForm(Native):
@@ -244,7 +254,7 @@ cdef class ServerForm(Native):
         cdef Py_ssize_t place
         cdef list tokens
         cdef double time
-        while self.line.is_due():
+        while self.is_due(self.line):
             token, rest = self.line.pop()
             size -= 1
             self.actor._size = size
@@ -271,7 +281,7 @@ cdef class ServerForm(Native):
     cdef int serve(self, token, double time) except -1:
         cdef long long nanoseconds = to_nanoseconds(time)
         cdef double rest = time - to_seconds(nanoseconds)
-        self.line.push(self.wake_at(self.now() + nanoseconds), (token, rest))
+        self.keep(self.line, self.now() + nanoseconds, (token, rest))
         return 0
 
     cdef double draw(self) except? -1.0:
@@ -312,7 +322,7 @@ SOURCES = (
     ("timing.py", "TimeDelay", "b8778dbbc9a75614"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),
-    ("core/tag.py", "to_nanoseconds", "db763a894f2e56d4"),
+    ("core/tag.py", "to_nanoseconds", "150cad21f6cd87f7"),
     ("core/tag.py", "to_seconds", "f6c6aae6371c52a3"),
     ("core/authoring.py", "Pending", "faf6cabccebf5d58"),
 )

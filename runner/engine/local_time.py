@@ -42,7 +42,7 @@ class LocalDirector:
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at a local time."""
         wake = self._director.wake(actor, self._clock.outer(time))
-        wake.when = self._clock.tag(wake.tag)
+        wake.move(self._clock.tag(wake.tag))
         return wake
 
     def stop(self, reason: str) -> None:

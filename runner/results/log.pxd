@@ -2,7 +2,9 @@
 
 cimport cython
 
-cdef Py_ssize_t _PIECES, _MOST_PIECES
+from epicycle.runner.results.packing cimport TAKES_NUMBERS, Sheet
+
+cdef Py_ssize_t _MANY, _MOST
 
 
 cdef class Writer:
@@ -10,18 +12,17 @@ cdef class Writer:
     cdef public tuple names
     cdef public bytes _head
     cdef public object _keep
-    @cython.locals(log=EventLog, pieces=list)
+    @cython.locals(log=EventLog, sheet=Sheet)
     cpdef write(self, when, value)
 
 
 cdef class EventLog:
-    cdef public list pieces
+    cdef public Sheet sheet
     cdef public object records
     cdef public object tokens
     cdef public object when, crowd, _hash, _keeps, _log_to
     cdef public dict _writers
-    cdef public bytes stamp
     cdef public long long _hashed
     cpdef turn_to(self, when)
     cpdef hash_many(self, port)
-    cpdef hash_pieces(self)
+    cpdef hash_records(self)

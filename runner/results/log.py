@@ -13,7 +13,7 @@ from epicycle.actors import EpicycleError, Tag, When, new_tag, to_seconds
 from ..shown import short
 from ..tables import pandas_module
 from .encoding import canonical, plain
-from .packing import AS_THEY_ARE, packed, stamp
+from .packing import TAKES_NUMBERS, Sheet, stamp
 from .signal import Past
 from .waiting import LARGE, WaitingTokens
 
@@ -21,9 +21,8 @@ if TYPE_CHECKING:
     import pandas
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
-_PIECES = 3_000  # that are hashed together, when a tag is over
-_MOST_PIECES = 30_000
-_BEYOND = 2**63  # whole numbers from here on are texts, and may be too long for that
+_MANY = 1_000  # records that are hashed together, when a tag is over
+_MOST = 10_000
 
 
 Names = tuple[str, str, str, "int | None", str]  # event, actor, port, channel, aspect
@@ -85,18 +84,16 @@ class Writer:
     def write(self, when: When, value: Any) -> None:
         """Append a record; raises what makes it impossible to log the value."""
         log = self.log
-        pieces = log.pieces
-        if AS_THEY_ARE and type(value) in AS_THEY_ARE and (type(value) is not int or -_BEYOND <= value < _BEYOND):
-            kept = value
-        else:
-            kept = log.tokens[type(value)](value)
+        sheet = log.sheet
         if when is not log.when:
             log.turn_to(when)
-        pieces.extend((log.stamp, self._head, kept))
-        if len(pieces) > _MOST_PIECES:  # all of them at one tag, nearly
+        if not (TAKES_NUMBERS and sheet.add(self._head, value)):
+            kept = log.tokens[type(value)](value)
+            sheet.keep(self._head, kept)
+            if type(kept) is bytes and len(kept) > LARGE:
+                log.hash_records()
+        if sheet.size > _MOST:  # all of them at one tag, nearly
             log.hash_many(f"{self.names[1]}.{self.names[2]}")
-        elif type(kept) is bytes and len(kept) > LARGE:
-            log.hash_pieces()
         if self._keep is not None:
             self._keep(Record(_tag(when), *self.names, value))
 
@@ -112,7 +109,7 @@ class EventLog:
     """
 
     __slots__ = (
-        "_hash", "_hashed", "_keeps", "_log_to", "_writers", "crowd", "pieces", "records", "stamp", "tokens", "when",
+        "_hash", "_hashed", "_keeps", "_log_to", "_writers", "crowd", "records", "sheet", "tokens", "when",
     )  # fmt: skip
 
     def __init__(
@@ -124,14 +121,11 @@ class EventLog:
         self._log_to = log_to
         self._keeps = keeps
         self._writers: dict[Names, Writer] = {}
-        # What the digest is made of, three pieces a record: tag, names, what was kept of the value.  Many are hashed at
-        # a time.
         self._hash = hashlib.sha256()
-        self.pieces: list[Any] = []
+        self.sheet = Sheet()  # what is to be hashed, many records at a time
         self.tokens = WaitingTokens()
         self._hashed = 0  # records
         self.when: When | None = None  # of the last record
-        self.stamp = b""  # the same in bytes
         self.crowd: Callable[[Tag, str, int], None] | None = None  # is told of many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
@@ -154,28 +148,27 @@ class EventLog:
     def turn_to(self, when: When) -> None:
         """The records that follow are of this tag."""
         self.when = when
-        self.stamp = stamp(when)
-        if len(self.pieces) > _PIECES:
-            self.hash_pieces()
+        self.sheet.turn_to(when)
+        if self.sheet.size > _MANY:
+            self.hash_records()
 
     def hash_many(self, port: str) -> None:
         """There are very many records at one tag, of which a port has just sent one."""
         if self.crowd is not None and self.when is not None:
-            self.crowd(_tag(self.when), port, _MOST_PIECES // 3)
-        self.hash_pieces()
+            self.crowd(_tag(self.when), port, _MOST)
+        self.hash_records()
 
-    def hash_pieces(self) -> None:
+    def hash_records(self) -> None:
         """Make the bytes of what waits for that."""
-        pieces = self.pieces
-        self._hash.update(packed(pieces, canonical))
+        size = self.sheet.size
+        self._hash.update(self.sheet.taken(canonical))
+        self._hashed += size
         self.tokens.forget()
-        self._hashed += len(pieces) // 3
-        pieces.clear()
 
     @property
     def count(self) -> int:
         """The number of records."""
-        return self._hashed + len(self.pieces) // 3
+        return self._hashed + self.sheet.size
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each record, with the columns of a log file; raises ``LogError`` if the records were not kept."""
@@ -188,5 +181,5 @@ class EventLog:
     @property
     def digest(self) -> str:
         """SHA-256 over all records so far, as hexadecimal text."""
-        self.hash_pieces()
+        self.hash_records()
         return self._hash.hexdigest()

@@ -8,8 +8,7 @@ from typing import Any, Final
 
 from epicycle.actors import When
 
-AS_THEY_ARE: Final[frozenset[type]] = frozenset()  # types of tokens that wait to be packed; Python is no faster so
-
+TAKES_NUMBERS: Final = False  # whether a sheet writes them down at once: in Python that is no faster
 _TAG: Final = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 
 
@@ -18,18 +17,42 @@ def stamp(when: When) -> bytes:
     return _TAG(b"i", when.time, b"i", when.microstep)
 
 
-def packed(pieces: list[Any], encode: Callable[[Any], bytes]) -> bytes:
-    """All pieces one after the other: three for each record, of which the last are bytes or tokens to ``encode``.
+class Sheet:
+    """Records that wait until the event log makes bytes of them, many at a time."""
 
-    Tokens are often logged again and again, by who sends them, by channels that hand them on, by aspects on their way:
-    their bytes are made once.
-    """
-    made: dict[int, bytes] = {}
-    for place in range(2, len(pieces), 3):
-        token = pieces[place]
-        if type(token) is not bytes:
-            known = made.get(id(token))
-            if known is None:
-                known = made[id(token)] = encode(token)
-            pieces[place] = known
-    return b"".join(pieces)
+    __slots__ = ("_pieces", "_stamp", "size")
+
+    def __init__(self) -> None:
+        self.size = 0  # records
+        self._stamp = b""
+        self._pieces: list[Any] = []  # three for each: tag, names, what was kept of the value
+
+    def turn_to(self, when: When) -> None:
+        """The records that follow are of this tag."""
+        self._stamp = stamp(when)
+
+    def add(self, head: bytes, value: Any) -> bool:
+        """Put a record in, if its value is a number or the like."""
+        return False
+
+    def keep(self, head: bytes, kept: Any) -> None:
+        """Put a record in, with the bytes of its value, or with a token that cannot change until they are made."""
+        self._pieces.extend((self._stamp, head, kept))
+        self.size += 1
+
+    def taken(self, encode: Callable[[Any], bytes]) -> bytes:
+        """Take all records out, as bytes.
+
+        Tokens are often logged again and again, by who sends them, by channels that hand them on, by aspects on their
+        way: they are encoded once.
+        """
+        made: dict[int, bytes] = {}
+        pieces, self._pieces, self.size = self._pieces, [], 0
+        for place in range(2, len(pieces), 3):
+            token = pieces[place]
+            if type(token) is not bytes:
+                known = made.get(id(token))
+                if known is None:
+                    known = made[id(token)] = encode(token)
+                pieces[place] = known
+        return b"".join(pieces)

@@ -96,8 +96,8 @@ def test_a_core_that_cannot_be_had() -> None:
         (lambda root: None, ""),
         (lambda root: (root / "actors/compiled.json").unlink(), MISSING),
         (lambda root: (root / "actors/compiled.json").write_text("{"), MISSING),
-        (lambda root: (root / "actors/core/inbox.py").write_text("changed"), CHANGED),
-        (lambda root: (root / "actors/core/inbox.pxd").unlink(), CHANGED),
+        (lambda root: (root / "actors/core/moment.py").write_text("changed"), CHANGED),
+        (lambda root: (root / "actors/core/moment.pxd").unlink(), CHANGED),
         (
             lambda root: (root / "actors/compiled.json").write_text('{"python": "cpython-27"}'),
             "the core was compiled for cpython-27; install Epicycle once more",
