@@ -5,6 +5,9 @@ from epicycle.actors cimport InputPort, Moment, Ranks, Times, Wake, Way, new_wak
 from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, new_instant
 
 
+cdef long long _NOTICED
+
+
 cdef class Director:
     cdef public object environment, seed, crowd, ranks, _stop_after, _reason
     cdef public list _queue, _recent, _turns
@@ -47,6 +50,7 @@ cdef class Director:
     @cython.locals(
         times=Times, instant=Instant, queue=list, is_of_simpy=cython.bint, here=cython.longlong, now=cython.longlong,
         upcoming=cython.longlong, last_time=cython.longlong, last_step=cython.longlong,
+        never=cython.longlong,
     )
     cpdef run(self, stop, list actors, progress=*, pace=*, most=*)
 

@@ -331,7 +331,7 @@ class Director:
         environment, times, queue = self.environment, self._times, self._queue
         last_step = NEVER if most is None else self.steps + most
         last_time = NEVER - 1 if stop is None else stop
-        here = 0
+        here, never = 0, NEVER
         now = self._last.time
         if pace is not None:
             pace.wait_for(now)
@@ -349,7 +349,7 @@ class Director:
                 if queue and queue[0][0] <= upcoming:
                     is_of_simpy = True
                     upcoming = math.ceil(min(queue[0][0], NEVER))
-                if upcoming == NEVER:
+                if upcoming == never:
                     break
                 if self._stop_after is not None and max(upcoming, self._last.time) > self._stop_after.time:
                     break
