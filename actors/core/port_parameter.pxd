@@ -19,6 +19,7 @@ cdef class ParameterPort(InputPort):
     cpdef current(self)
 
 
+@cython.final
 cdef class PortParameter(Parameter):
     cdef public ParameterPort port
     cpdef ParameterPort port_of(self, instance)
