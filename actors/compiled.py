@@ -28,11 +28,16 @@ CORE_MODULES = (
     "epicycle.actors.core.actor",
     "epicycle.actors.core.authoring",
     "epicycle.runner.results.packing",
+    "epicycle.runner.results.samples",
     "epicycle.runner.results.log",
     "epicycle.runner.engine.agenda",
     "epicycle.runner.engine.forms",
     "epicycle.runner.engine.director",
     "epicycle.runner.engine.way",
+    "epicycle.runner.engine.batches",
+    "epicycle.runner.engine.statistic",
+    "epicycle.runner.engine.measurement",
+    "epicycle.runner.engine.listeners",
 )
 MANIFEST = "actors/compiled.json"
 CHOICES = ("python", "compiled")

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
+from ..core import Quantity
 from .evaluation import evaluate
 from .syntax import ExpressionError, free_names, parse
 from .values import BINARY, CONSTANTS, FUNCTIONS
@@ -25,7 +26,7 @@ UNDECIDED: Final = (ArithmeticError, TypeError, ValueError)
 _FLOAT, _NUMBER, _TRUTH = "float", "number", "truth value"  # kinds: what is a float, may be one, is none
 
 
-class _Unfit(Exception):
+class _UnfitError(Exception):
     """What has to be left to the evaluator."""
 
 
@@ -39,7 +40,7 @@ def of_floats(source: str, names: tuple[str, ...]) -> Callable[..., Any] | None:
     writer = _Writer(source, names)
     try:
         text = writer.end(writer.write(parse(source)))
-    except _Unfit:
+    except _UnfitError:
         return None
     exact = "".join(f"type({name}) is " for name in writer.names.values())
     known = {"__builtins__": {}, "type": type, "float": float, "beyond": _beyond, "power": BINARY[ast.Pow]}
@@ -74,7 +75,7 @@ class _Writer:
         return f"(w{self._held} if -1e999 < (w{self._held} := {text}) < 1e999 else beyond())", kind
 
     def write(self, node: ast.expr) -> tuple[str, str]:
-        """A node's text and kind; raises ``_Unfit``."""
+        """A node's text and kind; raises ``_UnfitError``."""
         if not free_names(node, frozenset()) - CONSTANTS.keys():
             return self._constant(node)
         match node:
@@ -101,17 +102,17 @@ class _Writer:
                 parts = [self._finite(each) for each in node.args]
                 if _common(parts) == _FLOAT:
                     return f"{name}({', '.join(text for text, _ in parts)})", _FLOAT
-        raise _Unfit
+        raise _UnfitError
 
     def _constant(self, node: ast.expr) -> tuple[str, str]:
         end = node.end_col_offset
         try:
             value = evaluate(self._source[node.col_offset : end], {})
         except ExpressionError:
-            raise _Unfit from None
-        if type(value) not in (bool, int, float) or not math.isfinite(value):  # type: ignore[arg-type]
-            raise _Unfit
-        return f"({value!r})", {bool: _TRUTH, float: _FLOAT}.get(type(value), _NUMBER)
+            raise _UnfitError from None
+        if not isinstance(value, (bool, int, float)) or isinstance(value, Quantity) or not math.isfinite(value):
+            raise _UnfitError
+        return f"({value!r})", _TRUTH if isinstance(value, bool) else _FLOAT if isinstance(value, float) else _NUMBER
 
     def _operation(self, node: ast.BinOp) -> tuple[str, str]:
         """Two numbers, one of them a float: whole numbers have bounds of their own."""
@@ -120,7 +121,7 @@ class _Writer:
         left, kind = self.write(node.left) if keeps_left else self._finite(node.left)
         right, other = self.write(node.right) if keeps_right else self._finite(node.right)
         if _FLOAT not in (kind, other):
-            raise _Unfit
+            raise _UnfitError
         if isinstance(node.op, ast.Pow):
             return f"power({left}, {right})", _FLOAT
         return f"({left}{_SIGNS[type(node.op)]}{right})", _FLOAT

@@ -21,6 +21,8 @@ LEAST_OF_MSER = 10  # batches
 class TokenBatches:
     """Sums over batches of equally many tokens."""
 
+    __slots__ = ("_count", "_size", "_sum", "_sums")
+
     def __init__(self) -> None:
         self._size = 1
         self._sums: list[float] = []
@@ -48,6 +50,8 @@ class TimeBatches:
 
     ``most`` slices are kept; if more are needed, each two become one.
     """
+
+    __slots__ = ("_covered", "_most", "_start", "_sums", "_width")
 
     def __init__(self, start: int, width: int = 1, most: int = MOST) -> None:
         self._start, self._width, self._most = start, width, most
