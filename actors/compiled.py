@@ -31,6 +31,8 @@ CORE_MODULES = (
     "epicycle.runner.results.samples",
     "epicycle.runner.results.log",
     "epicycle.runner.engine.agenda",
+    "epicycle.runner.engine.native",
+    "epicycle.runner.engine.computing",
     "epicycle.runner.engine.forms",
     "epicycle.runner.engine.director",
     "epicycle.runner.engine.way",

@@ -74,13 +74,15 @@ class Expression(Actor):
         self._latest = Latest(list(self.inputs.values()), hold=self.hold)
 
     def fire(self) -> None:
-        formula = self.expression
         for values in self._latest.rounds():
-            values["time"] = self.now
-            value = formula.of_floats(*map(values.get, formula.names))
-            if value is None:
-                value = formula({name: operand(token) for name, token in values.items()})
-            self.output.send(self._checked(value))
+            self.output.send(self._value(values))
+
+    def _value(self, values: dict[str, Any]) -> Any:
+        formula, values["time"] = self.expression, self.now
+        value = formula.of_floats(*map(values.get, formula.names))
+        if value is None:
+            value = formula({name: operand(token) for name, token in values.items()})
+        return self._checked(value)
 
     def _checked(self, value: Any) -> Any:
         if _IS_KIND[self._kind](value):

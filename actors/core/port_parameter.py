@@ -9,7 +9,7 @@ from .parameter import Parameter, ParameterError
 from .ports import InputPort
 
 T = TypeVar("T")
-_NOTHING: Any = object()
+NOTHING_YET: Any = object()
 
 
 class ParameterPort(InputPort[T]):
@@ -20,10 +20,10 @@ class ParameterPort(InputPort[T]):
     def __init__(self, parameter: PortParameter[T], type: Any, doc: str) -> None:
         super().__init__(type, required=False, doc=doc)
         self._parameter = parameter
-        self._received: Any = _NOTHING
-        self._current: Any = _NOTHING
+        self._received: Any = NOTHING_YET
+        self._current: Any = NOTHING_YET
         self.has_received = False  # which is asked first: most have not, and are read for every token
-        self._before: Any = _NOTHING  # what had been received, and not been read, before the present tag
+        self._before: Any = NOTHING_YET  # what had been received, and not been read, before the present tag
 
     def receive(self, token: T, channel: int) -> None:
         if not self.arrived:
@@ -43,19 +43,19 @@ class ParameterPort(InputPort[T]):
 
     def reset(self) -> None:
         """Forget what came: the declared value counts again."""
-        self._received = self._current = _NOTHING
+        self._received = self._current = NOTHING_YET
         self.has_received = False
 
     def current(self, initial: T) -> T:
         """The value at present: the latest token that came, or else the value given in the model."""
-        if self._received is not _NOTHING:
+        if self._received is not NOTHING_YET:
             # Converted when it is read, so that a bad token is the receiver's error and not the sender's.
-            token, self._received = self._received, _NOTHING
+            token, self._received = self._received, NOTHING_YET
             try:
                 self._current = self._parameter.convert(token)
             except ParameterError as error:
                 raise ParameterError(f"{self.path}: {error}") from None
-        result: T = initial if self._current is _NOTHING else self._current
+        result: T = initial if self._current is NOTHING_YET else self._current
         return result
 
 

@@ -38,7 +38,7 @@ class Formula:
     Raises ``ExpressionError`` if the text is no expression.
     """
 
-    __slots__ = ("_of_floats", "is_condition", "names", "source")
+    __slots__ = ("function", "is_condition", "names", "source")
 
     def __init__(self, source: str) -> None:
         tree = parse(source)
@@ -52,18 +52,18 @@ class Formula:
         self.source = source
         self.is_condition = _is_condition(tree)
         self.names = tuple(sorted(free, key=places.__getitem__))
-        self._of_floats = of_floats(source, self.names)
+        self.function = of_floats(source, self.names)
 
     def of_floats(self, *values: Any) -> Any:
         """The value for those of the names, in their order, in less time; None if that takes more than floats."""
         try:
-            return None if self._of_floats is None else self._of_floats(*values)
+            return None if self.function is None else self.function(*values)
         except UNDECIDED:
             return None
 
     def __call__(self, values: Mapping[str, object]) -> Any:
         """The value of the expression; raises ``EpicycleError`` telling the values of its names."""
-        if self._of_floats is not None and CONSTANTS.keys().isdisjoint(values):
+        if self.function is not None and CONSTANTS.keys().isdisjoint(values):
             found = self.of_floats(*map(values.get, self.names))
             if found is not None:
                 return found
