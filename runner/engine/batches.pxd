@@ -15,11 +15,11 @@ cdef class TimeBatches:
     cdef public Py_ssize_t _most
     cdef public list _sums, _covered
     @cython.locals(
-        first=Py_ssize_t, last=Py_ssize_t, index=Py_ssize_t, edge=cython.longlong, length=cython.double,
-        sums=list, covered=list,
+        last=cython.longlong, index=cython.longlong, edge=cython.longlong, width=cython.longlong, length=cython.double,
+        before=cython.double, sums=list, covered=list,
     )
     cpdef add(self, double value, long long begin, long long end)
-    @cython.locals(index=Py_ssize_t)
+    @cython.locals(index=cython.longlong, missing=cython.longlong)
     cpdef Py_ssize_t _slice(self, long long time) except -1
-    @cython.locals(index=Py_ssize_t, sums=list)
+    @cython.locals(index=cython.longlong)
     cpdef count(self, long long time)

@@ -61,12 +61,14 @@ class TimeBatches:
     def add(self, value: float, begin: int, end: int) -> None:
         """Take in a value that stands from ``begin`` to ``end``, neither before the start."""
         last = self._slice(end - 1)  # which may make them wider
-        first = (begin - self._start) // self._width
-        for index in range(first, last + 1):
-            edge = self._start + index * self._width
-            length = float(min(end, edge + self._width) - max(begin, edge))
-            self._sums[index] += value * length
-            self._covered[index] += length
+        sums, covered, width = self._sums, self._covered, self._width
+        for index in range((begin - self._start) // width, last + 1):
+            edge = self._start + index * width
+            length = float(min(end, edge + width) - max(begin, edge))
+            before: float = sums[index]
+            sums[index] = before + value * length
+            before = covered[index]
+            covered[index] = before + length
 
     def _slice(self, time: int) -> int:
         """The number of the slice in which a time lies; there is one."""

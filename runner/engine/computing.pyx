@@ -33,8 +33,8 @@ cdef class ScaleForm(Native):
 
 
 cdef class ExpressionForm(Native):
-    __slots__ = ("actor", "director", "function", "holds", "latest", "names", "output", "ports", "turn", "wants_number")
-    cdef public list ports, names
+    __slots__ = ("actor", "director", "function", "holds", "inputs", "latest", "names", "output", "ports", "turn", "wants_number")
+    cdef public list ports, inputs, names  # ports, what they are called, and the names of the expression
     cdef public Sender output
     cdef public dict latest
     cdef public object function
@@ -43,14 +43,16 @@ cdef class ExpressionForm(Native):
     cdef bint take(self) except -1:
         actor = self.actor
         self.ports, self.names = actor._latest._ports, list(actor.expression.names)
+        self.inputs = [port.name for port in self.ports]
         self.output, self.latest, self.holds = self.sender("output"), actor._latest._tokens, actor.hold
         self.function, self.wants_number = actor.expression.function, actor._kind in ("number", "any value")
-        is_whole = {"time", *(port.name for port in self.ports)}.issuperset(self.names)
+        is_whole = {"time", *self.inputs}.issuperset(self.names)
         return self.output is not None and self.function is not None and is_whole
 
     cpdef fire(self):
         cdef Inbox port
         cdef bint has_come = False
+        cdef Py_ssize_t place
         cdef list given = []
         for port in self.ports:
             if count_of(port) > 1:  # of which each has a round of its own
@@ -58,9 +60,10 @@ cdef class ExpressionForm(Native):
                 return
         if not self.holds:
             self.latest.clear()
-        for port in self.ports:
+        for place in range(len(self.ports)):
+            port = self.ports[place]
             if count_of(port):
-                self.latest[(<object>port).name] = tokens_of(port)[0]
+                self.latest[self.inputs[place]] = tokens_of(port)[0]
                 has_come = True
         if not has_come or len(self.latest) < len(self.ports):
             return

@@ -2,9 +2,7 @@
 
 cimport cython
 from epicycle.runner.engine.batches cimport TimeBatches, TokenBatches
-from epicycle.runner.engine.statistic cimport Statistic
-
-cdef double _MOST
+from epicycle.runner.engine.statistic cimport MOST, Statistic
 
 
 cdef class Measurement:
@@ -12,7 +10,7 @@ cdef class Measurement:
     cdef public _Kept _kept
     cdef public _Taking _taking
     cdef public dict _holds
-    cdef public bint _is_beyond, _is_of_floats
+    cdef public bint _is_beyond, _is_of_floats, _is_of_numbers
     cpdef add(self, str port, long long time, token)
     @cython.locals(number=cython.double)
     cpdef _value(self, token)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -18,10 +17,10 @@ from ..graph import Metric
 from ..results import Outcome
 from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
-from .statistic import Statistic, statistic_of
+from .statistic import MOST, Statistic, statistic_of
 
 _HELD = 1024  # whole numbers of which it is known whether a condition holds
-_MOST = sys.float_info.max
+_EXACT = 2**53  # whole numbers up to here are floats
 
 
 @dataclass(frozen=True)
@@ -34,15 +33,16 @@ class _Unfit:
 class Measurement:
     """Takes in what the ports of a metric send."""
 
-    __slots__ = ("_holds", "_is_beyond", "_is_of_floats", "_kept", "_measure", "_ports", "_taking")
+    __slots__ = ("_holds", "_is_beyond", "_is_of_floats", "_is_of_numbers", "_kept", "_measure", "_ports", "_taking")
 
     def __init__(self, metric: Metric) -> None:
         measure = self._measure = metric.measure
         self._ports = metric.ports
         self._kept: _Kept | None = None
         self._is_beyond = False  # of all numbers
-        # What most tokens are is known without looking further: a float counts as it is, and a condition holds or not.
-        self._is_of_floats = measure.when is None
+        # What most tokens count is known without looking further: floats as they are, whole numbers as floats or not.
+        self._is_of_numbers = measure.when is None
+        self._is_of_floats = measure.when is None and measure.take not in _AS_THEY_ARE
         self._holds: dict[int, Any] | None = None if measure.when is None else {}
         start = 0
         if measure.after == MSER5:
@@ -68,9 +68,13 @@ class Measurement:
     def _value(self, token: Any) -> Any:
         if type(token) is float:
             number: float = token
-            if self._is_of_floats and -_MOST <= number <= _MOST:
+            if self._is_of_numbers and -MOST <= number <= MOST:
                 return token
-        elif self._holds is not None and type(token) is int:
+        elif type(token) is not int:
+            pass
+        elif self._is_of_floats and -_EXACT <= token <= _EXACT:
+            return float(token)
+        elif self._holds is not None:
             value = self._holds.get(token)
             if value is None:
                 value = _measured(self._measure, token)
@@ -108,6 +112,7 @@ class Measurement:
 
 
 _AS_SENT = ("first", "last", "min", "max")  # of which infinity is a value as any other
+_AS_THEY_ARE = (*_AS_SENT, "sum", "count", "rate")  # whole numbers stay whole
 
 
 def _measured(measure: Measure, token: Any) -> Any:
@@ -124,7 +129,7 @@ def _measured(measure: Measure, token: Any) -> Any:
         return _Unfit(f"{short(token)}, which is no number,")
     if math.isnan(number) or (math.isinf(number) and measure.take not in _AS_SENT):
         return _Unfit(f"{number}")
-    return token if measure.take in (*_AS_SENT, "sum") else number
+    return token if measure.take in _AS_THEY_ARE else number
 
 
 def _holds(when: Formula, token: Any) -> float | _Unfit:

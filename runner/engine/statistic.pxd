@@ -2,6 +2,9 @@
 
 cimport cython
 
+cdef double MOST
+cdef Py_ssize_t _KEPT
+
 
 cdef class Total:
     cdef public list _terms

@@ -7,6 +7,7 @@ bits on every machine.
 from __future__ import annotations
 
 import math
+import sys
 from array import array
 from fractions import Fraction
 from itertools import chain
@@ -14,6 +15,7 @@ from typing import Any
 
 from ..catalogue import Measure
 
+MOST = sys.float_info.max
 _KEPT = 512  # numbers until they are summed up
 
 
@@ -27,7 +29,7 @@ class Total:
 
     def add(self, value: float) -> None:
         """One more number; raises ``OverflowError`` as soon as it is clear that the sum is beyond all floats."""
-        if value in (math.inf, -math.inf):
+        if not -MOST <= value <= MOST:
             raise OverflowError
         self._terms.append(value)
         if len(self._terms) > _KEPT:
