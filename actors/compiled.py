@@ -27,6 +27,7 @@ CORE_MODULES = (
     "epicycle.actors.core.port_parameter",
     "epicycle.actors.core.actor",
     "epicycle.actors.core.authoring",
+    "epicycle.actors.core.process",
     "epicycle.runner.results.packing",
     "epicycle.runner.results.samples",
     "epicycle.runner.results.log",

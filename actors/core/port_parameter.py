@@ -28,7 +28,7 @@ class ParameterPort(InputPort[T]):
     def receive(self, token: T, channel: int) -> None:
         if not self.arrived:
             self._before = self._received
-        super().receive(token, channel)
+        InputPort.receive(self, token, channel)  # past super(), as this is done for each token
         self._received = token
         self.has_received = True
 

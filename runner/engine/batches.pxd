@@ -3,6 +3,10 @@
 cimport cython
 
 
+@cython.locals(found=list, index=Py_ssize_t, first=cython.double, second=cython.double)
+cpdef list _pairs(list sums)
+
+
 cdef class TokenBatches:
     cdef public long long _size, _count
     cdef public double _sum

@@ -98,9 +98,14 @@ class TimeBatches:
         return self._sums[first:full], self._covered[first:full]
 
 
-def _pairs(sums: Sequence[float]) -> list[float]:
+def _pairs(sums: list[float]) -> list[float]:
     """Each two of them together; the last one alone, perhaps."""
-    return [sums[index] + sums[index + 1] if index + 1 < len(sums) else sums[index] for index in range(0, len(sums), 2)]
+    found = []
+    for index in range(0, len(sums) - 1, 2):
+        first: float = sums[index]
+        second: float = sums[index + 1]
+        found.append(first + second)
+    return found + sums[len(sums) & ~1 :]
 
 
 def batch_interval(sums: Sequence[float], weights: Sequence[float], value: float, level: float) -> Interval | None:

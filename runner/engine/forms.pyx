@@ -324,7 +324,7 @@ SOURCES = (
     ("core/laws.py", "standard_gamma", "047c145471ee3512"),
     ("core/laws.py", "standard_normal", "4c8196a1bb6687ad"),
     ("core/laws.py", "uniform", "36b3b17c5a3d5e40"),
-    ("core/port_parameter.py", "ParameterPort", "ca16dcae51fe620d"),
+    ("core/port_parameter.py", "ParameterPort", "307f9a5242e6df8b"),
     ("core/elementary/sums.py", "total", "dc84358727c0bc10"),
     ("distributions.py", "Exponential", "f14ea8a70640a74a"),
     ("queues.py", "Server", "2445f4d1853973a9"),
