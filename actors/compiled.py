@@ -29,12 +29,20 @@ CORE_MODULES = (
     "epicycle.actors.core.port_parameter",
     "epicycle.actors.core.actor",
     "epicycle.actors.core.authoring",
+    "epicycle.actors.core.process",
     "epicycle.runner.results.packing",
+    "epicycle.runner.results.samples",
     "epicycle.runner.results.log",
     "epicycle.runner.engine.agenda",
+    "epicycle.runner.engine.native",
+    "epicycle.runner.engine.computing",
     "epicycle.runner.engine.forms",
     "epicycle.runner.engine.director",
     "epicycle.runner.engine.way",
+    "epicycle.runner.engine.batches",
+    "epicycle.runner.engine.statistic",
+    "epicycle.runner.engine.measurement",
+    "epicycle.runner.engine.listeners",
 )
 MANIFEST = "actors/compiled.json"
 CHOICES = ("python", "compiled")

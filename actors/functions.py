@@ -31,6 +31,12 @@ from .expression import FormulaParameter, operand
 
 FUNCTION_GROUP = "epicycle.functions"
 _KINDS: dict[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
+_IS_KIND: dict[str, Callable[[Any], bool]] = {
+    "number": lambda value: type(value) is float or (isinstance(value, (int, float)) and not isinstance(value, bool)),
+    "truth value": lambda value: isinstance(value, bool),
+    "text": lambda value: isinstance(value, str),
+    "any value": lambda value: True,
+}
 
 
 class Expression(Actor):
@@ -69,17 +75,17 @@ class Expression(Actor):
 
     def fire(self) -> None:
         for values in self._latest.rounds():
-            names = {name: operand(token) for name, token in values.items()}
-            self.output.send(self._checked(self.expression({**names, "time": self.now})))
+            self.output.send(self._value(values))
+
+    def _value(self, values: dict[str, Any]) -> Any:
+        formula, values["time"] = self.expression, self.now
+        value = formula.of_floats(*map(values.get, formula.names))
+        if value is None:
+            value = formula({name: operand(token) for name, token in values.items()})
+        return self._checked(value)
 
     def _checked(self, value: Any) -> Any:
-        is_kind = {
-            "number": isinstance(value, (int, float)) and not isinstance(value, bool),
-            "truth value": isinstance(value, bool),
-            "text": isinstance(value, str),
-            "any value": True,
-        }
-        if is_kind[self._kind]:
+        if _IS_KIND[self._kind](value):
             return value
         raise EpicycleError(f"{self.expression} gives {value!r}, which is not a {self._kind}: say so with 'gives'")
 

@@ -7,6 +7,8 @@ SimPy's events:
 - full pipeline: the same with the period of the clock equal to the delays, so that all actors are busy at each tick;
 - queue: Poisson -> server -> sink, from the same random numbers on all sides.
 
+Packaged models of queues, with all that they record and measure, are run by both cores in turns.
+
 Ours checks nothing less than in any run: firing order, event log and its digest are there.  No SimPy program has them.
 Ours runs twice: as it is, and with native forms off, which is how actors in plain Python run, those of users, too.
 """
@@ -15,6 +17,8 @@ from __future__ import annotations
 
 import argparse
 import os
+import subprocess
+import sys
 import tempfile
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
@@ -62,6 +66,8 @@ run: {{stop: {stop} s, seed: 1}}
 """
 
 PLAIN = "ours, without native forms"
+# Models, and what is set in them; the last is a condition of the study waiting_time.
+QUEUES = {"mm1": "", "mg1": "", "mm1 under the highest load of waiting_time": "load=0.9"}
 GOALS = {"compiled": ((20.0, 20.0, 10.0), (8.0, 8.0, 2.5)), "python": ((1.6, 1.6, 0.9),) * 2}
 REASON = "docs/performance.md says what a hop and a job consist of"
 
@@ -239,8 +245,41 @@ def queue_of_callbacks(simulation: Stores) -> None:
     simulation.after(between.exponential(1.0), come)
 
 
+def seconds_of(name: str, setting: str) -> float:
+    """The CPU time of a run of a packaged model; the first one warms up."""
+    made = load_model(name, set=[setting] if setting else [])
+    return [cpu_seconds(Simulation(made).run) for _ in range(3)][-1]
+
+
+def by_core(core: str, name: str, setting: str) -> Callable[[], float]:
+    """The same in a process that has one of the cores."""
+    words = [sys.executable, "-m", "benchmarks.events", "--model", name, "--set", setting]
+
+    def run() -> float:
+        environment = {**os.environ, "EPICYCLE_CORE": core, "EPICYCLE_FORMS": "on"}
+        return float(subprocess.run(words, env=environment, capture_output=True, text=True, check=True).stdout)
+
+    return run
+
+
+def queues(rounds: int) -> Iterator[Row]:
+    """Packaged models of queues, by both cores."""
+    for work, setting in QUEUES.items() if CORE == "compiled" else ():
+        ours, peer = "compiled core", "Python core of the same sources"
+        cores = {name: by_core(core, work.split()[0], setting) for name, core in ((ours, "compiled"), (peer, "python"))}
+        how = f"{rounds} runs by each core, in processes that take turns; CPU time of the run alone, metrics included"
+        results = take_turns(cores, rounds)
+        yield compare(f"{work}: a run as packaged", results, peer, ours, how=how, unit=(1e-3, "ms"))
+
+
 def rows(rounds: int = 5) -> Iterator[Row]:
     """The table's lines."""
+    yield from comparisons(rounds)
+    yield from queues(rounds)
+
+
+def comparisons(rounds: int) -> Iterator[Row]:
+    """Against SimPy."""
     length = 2 * PAIRS
     ticks = HOPS // length
     work = [
@@ -277,4 +316,7 @@ def rows(rounds: int = 5) -> Iterator[Row]:
 if __name__ == "__main__":
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--rounds", type=int, default=5)
-    print(table(rows(options.parse_args().rounds)))
+    options.add_argument("--model", help="only say how long a run of a packaged model takes (s)")
+    options.add_argument("--set", default="", help="what is set in it")
+    given = options.parse_args()
+    print(seconds_of(given.model, given.set) if given.model else table(rows(given.rounds)))

@@ -16,6 +16,7 @@ cdef class ParameterPort(InputPort):
     cpdef receive(self, token, channel)
     cpdef take(self)
     cpdef give(self, taken)
+    cpdef settle(self, value)
     cpdef current(self)
 
 

@@ -58,13 +58,18 @@ class ParameterPort(InputPort[T]):
         self._received = taken[0][-1]
         self.has_received = True
 
+    def settle(self, value: T | None) -> None:
+        """Let this be the value, which has been made of what was received."""
+        self._current = value
+        self._received = _NOTHING
+
     def current(self) -> T:
         """The value at present: the latest token that came, or else the value given in the model."""
         if self._received is not _NOTHING:
             # Converted when it is read, so that a bad token is the receiver's error and not the sender's.
             token, self._received = self._received, _NOTHING
             try:
-                self._current = self._parameter.convert(token)
+                self.settle(self._parameter.convert(token))
             except ParameterError as error:
                 raise ParameterError(f"{self.path}: {error}") from None
         result: T = self._current

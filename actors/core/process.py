@@ -84,9 +84,11 @@ class Process(Actor):
 
     def fire(self) -> None:
         for name, port in self.inputs.items():
-            self._queued[name].extend(port.tokens)
+            if port.present:
+                self._queued[name].extend(port.tokens)
         due = [entry for entry in self._waits if entry[0].due]
-        self._waits = [entry for entry in self._waits if not entry[0].due]
+        if due:
+            self._waits = [entry for entry in self._waits if not entry[0].due]
         for _, event in due:
             _settle(event, None)
         # A resumed process may ask for the next token at once, so look again until no read can be served.
@@ -98,6 +100,8 @@ class Process(Actor):
 
     def _next_read(self) -> tuple[str, Event] | None:
         """Take the first read that a queued token can be given to."""
+        if not self._reads:
+            return None
         self._reads = [entry for entry in self._reads if entry[1]() is not None]
         for index, (name, reference) in enumerate(self._reads):
             event = reference()

@@ -21,6 +21,8 @@ LEAST_OF_MSER = 10  # batches
 class TokenBatches:
     """Sums over batches of equally many tokens."""
 
+    __slots__ = ("_count", "_size", "_sum", "_sums")
+
     def __init__(self) -> None:
         self._size = 1
         self._sums: list[float] = []
@@ -49,6 +51,8 @@ class TimeBatches:
     ``most`` slices are kept; if more are needed, each two become one.
     """
 
+    __slots__ = ("_covered", "_most", "_start", "_sums", "_width")
+
     def __init__(self, start: int, width: int = 1, most: int = MOST) -> None:
         self._start, self._width, self._most = start, width, most
         self._sums: list[float] = []
@@ -57,12 +61,14 @@ class TimeBatches:
     def add(self, value: float, begin: int, end: int) -> None:
         """Take in a value that stands from ``begin`` to ``end``, neither before the start."""
         last = self._slice(end - 1)  # which may make them wider
-        first = (begin - self._start) // self._width
-        for index in range(first, last + 1):
-            edge = self._start + index * self._width
-            length = float(min(end, edge + self._width) - max(begin, edge))
-            self._sums[index] += value * length
-            self._covered[index] += length
+        sums, covered, width = self._sums, self._covered, self._width
+        for index in range((begin - self._start) // width, last + 1):
+            edge = self._start + index * width
+            length = float(min(end, edge + width) - max(begin, edge))
+            before: float = sums[index]
+            sums[index] = before + value * length
+            before = covered[index]
+            covered[index] = before + length
 
     def _slice(self, time: int) -> int:
         """The number of the slice in which a time lies; there is one."""
@@ -92,9 +98,14 @@ class TimeBatches:
         return self._sums[first:full], self._covered[first:full]
 
 
-def _pairs(sums: Sequence[float]) -> list[float]:
+def _pairs(sums: list[float]) -> list[float]:
     """Each two of them together; the last one alone, perhaps."""
-    return [sums[index] + sums[index + 1] if index + 1 < len(sums) else sums[index] for index in range(0, len(sums), 2)]
+    found = []
+    for index in range(0, len(sums) - 1, 2):
+        first: float = sums[index]
+        second: float = sums[index + 1]
+        found.append(first + second)
+    return found + sums[len(sums) & ~1 :]
 
 
 def batch_interval(sums: Sequence[float], weights: Sequence[float], value: float, level: float) -> Interval | None:

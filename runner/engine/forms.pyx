@@ -9,105 +9,19 @@ sends go straight into the log, nothing changes its parameters, and the run's ow
 import os
 
 from cpython.float cimport PyFloat_FromDouble
-from libc.math cimport frexp, rint
-from libc.stdint cimport uint64_t
 
-from epicycle.actors cimport InputPort, Line, Wake
-from epicycle.runner.engine.agenda cimport Form, Instant, Turn
+from epicycle.actors cimport InputPort, Line, ParameterPort, Wake
+from epicycle.runner.engine.agenda cimport Turn
 from epicycle.runner.engine.director cimport Director
+from epicycle.runner.engine.native cimport (
+    Drawing, Native, count_of, drawing_of, to_nanoseconds, to_seconds, tokens_of,
+)
 from epicycle.runner.engine.way cimport Sender
 
-from epicycle.actors import Clock, Exponential, PoissonClock, Recorder, Scale, Server, TimeDelay
-from epicycle.actors import to_nanoseconds as exactly_to_nanoseconds
-from epicycle.actors import to_seconds as exactly_to_seconds
-from epicycle.actors.core.elementary import log as far_log
-from epicycle.actors.core.elementary import tables
-
-cdef double LATEST = 2.0 ** 62
-cdef long long EXACT = 2 ** 53
-cdef double INVERSES[1024]
-cdef double LOG_HIGH[1024]
-cdef double LOG_LOW[1024]
-cdef double LN_2_HIGH = tables.LN_2_HIGH
-cdef double LN_2_LOW = tables.LN_2_LOW
-cdef int entry
-for entry in range(len(tables.INVERSES)):
-    INVERSES[entry] = tables.INVERSES[entry]
-    LOG_HIGH[entry] = tables.LOG_HIGH[entry]
-    LOG_LOW[entry] = tables.LOG_LOW[entry]
-
-
-cdef long long to_nanoseconds(double seconds) except? -1:
-    cdef double nanoseconds = seconds * 1e9
-    if not -LATEST <= nanoseconds <= LATEST:
-        exactly_to_nanoseconds(seconds)  # which says what is wrong
-    return <long long>rint(nanoseconds)
-
-
-cdef double to_seconds(long long nanoseconds) except? -1.0:
-    return nanoseconds / 1e9 if -EXACT < nanoseconds < EXACT else exactly_to_seconds(nanoseconds)
-
-
-cdef double logarithm(double x) except? -1.0:
-    """As ``elementary.log``, operation by operation."""
-    cdef int e, i
-    cdef double m, point, inverse, r, bent, start, first, rest
-    if not 0.0 < x < 1e300:
-        return far_log(x)
-    m = frexp(x, &e)
-    i = <int>(m * 512.0 + 0.5)
-    point = i * 0.001953125
-    inverse = INVERSES[i]
-    r = (m - point) * inverse
-    bent = r * r * (0.5 - r * (0.3333333333333333 - r * (0.25 - r * (0.2 - r * 0.16666666666666666))))
-    start = e * LN_2_HIGH + LOG_HIGH[i]
-    if start == 0.0:
-        return r - bent
-    first = (r + 393216.0) - 393216.0
-    rest = ((m - point) - first * point) * inverse
-    return (start + first) + (rest + ((e * LN_2_LOW + LOG_LOW[i]) - bent))
-
-
-cdef double exponential(stream, double scale) except? -1.0:
-    """As ``laws.exponential`` draws it."""
-    cdef list ahead = stream._ahead
-    cdef uint64_t word = ahead.pop() if ahead else stream.word()
-    return scale * -logarithm(1.0 - (<double>(word >> 12) + 0.5) * (1.0 / 4503599627370496.0))
-
-
-cdef class Native(Form):
-    """What the forms share: where an actor stands in the run, and who takes what it sends."""
-
-    cdef public object actor
-    cdef public Director director
-    cdef public Turn turn
-
-    cdef bint take(self) except -1:
-        """Get hold of what the actor holds; whether it can have a form."""
-        return True
-
-    cdef Sender sender(self, name):
-        emitter = self.actor.outputs[name].emitter
-        return emitter if type(emitter) is Sender else None
-
-    cdef InputPort input_port(self, name):
-        return self.actor.inputs[name]
-
-    cdef long long now(self):
-        return self.director.present.time
-
-    cdef Wake wake_at(self, long long time):
-        return self.director.wake_turn(self.turn, time)
-
-    cdef int keep(self, Line line, long long time, value) except -1:
-        """Let a value wait for its time; who fires it cannot call off, and so needs no wake-up that says so."""
-        cdef Instant instant = self.director.want_at(self.turn, time)
-        line.put(instant.time, instant.microstep, None, value)
-        return 0
-
-    cdef bint is_due(self, Line line):
-        cdef Instant now = self.director.present
-        return line.is_before(now.time, now.microstep)
+from epicycle.actors import (
+    Clock, Constant, Exponential, Gamma, Merge, PoissonClock, Queue, Random, Recorder, Server, TimeDelay,
+)
+from epicycle.runner.engine import computing
 
 
 cdef class DelayForm(Native):
@@ -128,31 +42,9 @@ cdef class DelayForm(Native):
         cdef list tokens
         while self.is_due(self.line):
             self.output.go(self.line.pop())
-        tokens = self.input.shown
+        tokens = tokens_of(self.input)
         for place in range(len(tokens)):
             self.keep(self.line, self.now() + self.delay, tokens[place])
-
-
-cdef class ScaleForm(Native):
-    __slots__ = ("actor", "director", "input", "number", "offset_number", "output", "turn")
-    cdef public InputPort input
-    cdef public Sender output
-    cdef public double number, offset_number
-
-    cdef bint take(self) except -1:
-        self.input, self.output = self.input_port("input"), self.sender("output")
-        self.number, self.offset_number = self.actor.factor, self.actor.offset
-        return self.output is not None
-
-    cpdef fire(self):
-        cdef list tokens = self.input.shown
-        cdef Py_ssize_t place
-        for place in range(len(tokens)):
-            if type(tokens[place]) is not float:  # whole numbers have arithmetic of their own
-                self.actor.fire()
-                return
-        for place in range(len(tokens)):
-            self.output.go(PyFloat_FromDouble(self.number * <double>tokens[place] + self.offset_number))
 
 
 cdef class Ticking(Native):
@@ -209,33 +101,33 @@ cdef class ClockForm(Ticking):
 
 
 cdef class PoissonForm(Ticking):
-    __slots__ = ("actor", "director", "mean", "output", "stop", "stream", "turn", "values")
-    cdef public double mean
-    cdef public object stream
+    __slots__ = ("actor", "director", "drawing", "output", "stop", "turn", "values")
+    cdef public Drawing drawing
 
     cdef bint take(self) except -1:
-        self.mean = self.actor.mean_interval
-        self.stream = self.actor.random
+        self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
         return Ticking.take(self)
 
     cpdef fire(self):
         cdef long long tick = self.actor._tick
         self.send(tick)
         self.actor._tick = tick + 1
-        self.again_at(self.now() + to_nanoseconds(exponential(self.stream, self.mean)))
+        self.again_at(self.now() + to_nanoseconds(self.drawing.next()))
 
 
 cdef class ServerForm(Native):
     __slots__ = (
-        "actor", "capacity", "director", "input", "line", "mean", "output", "rejected", "servers", "size", "stream",
+        "actor", "capacity", "director", "drawing", "input", "line", "output", "rejected", "servers", "size", "time",
         "turn", "waiting",
     )
+    varying = ("service_time",)
     cdef public InputPort input
     cdef public Sender output, size, rejected
     cdef public Line line
-    cdef public object waiting, stream
+    cdef public Drawing drawing  # None if Python draws, or times come by themselves
+    cdef public object waiting
+    cdef public ParameterPort time  # where they come
     cdef public long long capacity, servers
-    cdef public double mean  # of exponential times; below 0 for others
 
     cdef bint take(self) except -1:
         actor = self.actor
@@ -244,9 +136,12 @@ cdef class ServerForm(Native):
         self.line, self.waiting = actor._served._line, actor._waiting
         self.capacity = 2**62 if actor.capacity is None else min(actor.capacity, 2**62)
         self.servers = 2**62 if actor.servers is None else min(actor.servers, 2**62)
-        self.mean = -1.0
-        if type(actor.distribution) is Exponential:
-            self.mean, self.stream = actor.distribution.mean, actor.random
+        if type(actor.distribution) in (Exponential, Gamma):  # which give nothing below 0
+            self.drawing = drawing_of(actor.distribution, actor.random)
+        elif actor.distribution is None and actor.inputs["service_time"].width:
+            self.time = actor.inputs["service_time"]
+        elif actor.distribution is None:
+            self.drawing = drawing_of(Constant(value=actor.service_time), None)
         return self.output is not None and self.size is not None and self.rejected is not None
 
     cpdef fire(self):
@@ -263,7 +158,7 @@ cdef class ServerForm(Native):
             if self.waiting:
                 token, time = self.waiting.popleft()
                 self.serve(token, time + <double>rest)
-        tokens = self.input.shown
+        tokens = tokens_of(self.input)
         for place in range(len(tokens)):
             token = tokens[place]
             if size >= self.capacity:
@@ -285,7 +180,104 @@ cdef class ServerForm(Native):
         return 0
 
     cdef double draw(self) except? -1.0:
-        return exponential(self.stream, self.mean) if self.mean >= 0.0 else self.actor._draw()
+        if self.drawing is not None:
+            return self.drawing.next()
+        token = None if self.time is None else self.time._received
+        if type(token) is not float or not <double>token >= 0.0:
+            return self.actor._draw()
+        self.time.settle(token)
+        return token
+
+
+cdef class RandomForm(Native):
+    __slots__ = ("actor", "director", "drawing", "output", "stream", "trigger", "turn")
+    cdef public InputPort trigger
+    cdef public Sender output
+    cdef public Drawing drawing
+    cdef public object stream
+
+    cdef bint take(self) except -1:
+        self.trigger, self.output, self.stream = self.input_port("trigger"), self.sender("output"), self.actor.random
+        self.drawing = drawing_of(self.actor.distribution, self.stream)
+        return self.output is not None
+
+    cpdef fire(self):
+        for _ in range(count_of(self.trigger)):
+            if self.drawing is None:
+                self.output.go(self.actor.distribution.draw(self.stream))
+            else:
+                self.output.go(PyFloat_FromDouble(self.drawing.next()))
+
+
+cdef class MergeForm(Native):
+    __slots__ = ("actor", "director", "discards", "input", "output", "turn", "waiting")
+    cdef public InputPort input
+    cdef public Sender output
+    cdef public list waiting
+    cdef public bint discards
+
+    cdef bint take(self) except -1:
+        self.input, self.output = self.input_port("input"), self.sender("output")
+        self.waiting, self.discards = self.actor._waiting, self.actor.discard
+        return self.output is not None
+
+    cpdef fire(self):
+        cdef list tokens = tokens_of(self.input)
+        cdef Py_ssize_t place
+        first = None
+        for place in range(len(tokens)):
+            self.waiting[self.input.channels[place] if self.input.width > 1 else 0].append(tokens[place])
+        for queue in self.waiting:
+            if not queue:
+                continue
+            if first is None:
+                first = queue
+                self.output.go(queue.popleft())
+            if self.discards:
+                queue.clear()
+            elif queue:
+                self.wake_at(self.now())
+                return
+
+
+cdef class QueueForm(Native):
+    __slots__ = (
+        "actor", "capacity", "director", "input", "output", "persists", "rejected", "size", "trigger", "turn", "waiting",
+    )
+    cdef public InputPort input, trigger
+    cdef public Sender output, size, rejected
+    cdef public object waiting
+    cdef public long long capacity
+    cdef public bint persists
+
+    cdef bint take(self) except -1:
+        actor = self.actor
+        self.input, self.trigger, self.output = self.input_port("input"), self.input_port("trigger"), self.sender("output")
+        self.size, self.rejected = self.sender("size"), self.sender("rejected")
+        self.waiting, self.persists = actor._tokens, actor.persistent_trigger
+        self.capacity = 2**62 if actor.capacity is None else min(actor.capacity, 2**62)
+        return self.output is not None and self.size is not None and self.rejected is not None
+
+    cpdef fire(self):
+        cdef list tokens = tokens_of(self.input)
+        cdef Py_ssize_t place
+        cdef long long triggers
+        for place in range(len(tokens)):
+            if <long long>len(self.waiting) >= self.capacity:
+                self.rejected.go(tokens[place])
+            else:
+                self.waiting.append(tokens[place])
+                self.size.go(len(self.waiting))
+        triggers = self.actor._triggers
+        triggers += count_of(self.trigger)
+        self.actor._triggers = triggers
+        while triggers and self.waiting:
+            triggers -= 1
+            self.actor._triggers = triggers
+            self.output.go(self.waiting.popleft())
+            self.size.go(len(self.waiting))
+        if not self.persists:
+            self.actor._triggers = 0
 
 
 cdef class RecorderForm(Native):
@@ -299,7 +291,7 @@ cdef class RecorderForm(Native):
         return True
 
     cpdef fire(self):
-        cdef list tokens = self.input.shown
+        cdef list tokens = tokens_of(self.input)
         self.actor.seen += len(tokens)
         if self.capacity == 0:
             return
@@ -312,6 +304,28 @@ cdef class RecorderForm(Native):
 
 # What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
 SOURCES = (
+    ("accumulation.py", "Counter", "06c4e0e155cd5a54"),
+    ("accumulation.py", "Integrator", "31017c9ef3dda5b7"),
+    ("arithmetic.py", "AddSubtract", "c0e44508fa3ae047"),
+    ("distributions.py", "Constant", "e6f123317132cd9d"),
+    ("distributions.py", "Gamma", "561c0e5a4a78963b"),
+    ("distributions.py", "Normal", "41b7f712051a423b"),
+    ("distributions.py", "Uniform", "623cbec8bb43eb2b"),
+    ("flow.py", "Merge", "213360ad97d7f8e2"),
+    ("functions.py", "Expression", "2dfff6b191d7d6c7"),
+    ("queues.py", "Queue", "8c16cd6b83a476a1"),
+    ("sources.py", "Random", "606d80f45d45a9e4"),
+    ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),
+    ("core/authoring.py", "rounds", "bcf677d00b681776"),
+    ("core/laws.py", "between", "0e5fc0d38a4fab80"),
+    ("core/laws.py", "gamma", "395f2d85bf3dfec1"),
+    ("core/laws.py", "normal", "c6bfa77a937cc231"),
+    ("core/laws.py", "normal_quantile", "f210084d76cce693"),
+    ("core/laws.py", "standard_gamma", "047c145471ee3512"),
+    ("core/laws.py", "standard_normal", "4c8196a1bb6687ad"),
+    ("core/laws.py", "uniform", "36b3b17c5a3d5e40"),
+    ("core/port_parameter.py", "ParameterPort", "db98994b759143f6"),
+    ("core/elementary/sums.py", "total", "dc84358727c0bc10"),
     ("distributions.py", "Exponential", "f14ea8a70640a74a"),
     ("queues.py", "Server", "2445f4d1853973a9"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
@@ -327,10 +341,13 @@ SOURCES = (
     ("core/authoring.py", "Pending", "faf6cabccebf5d58"),
 )
 FORMS = {
+    **computing.FORMS,
     Clock: ClockForm,
+    Merge: MergeForm,
     PoissonClock: PoissonForm,
+    Queue: QueueForm,
+    Random: RandomForm,
     Recorder: RecorderForm,
-    Scale: ScaleForm,
     Server: ServerForm,
     TimeDelay: DelayForm,
 }
@@ -348,7 +365,8 @@ def attach(director, actors, besides):
         if kind is None or path in besides or type(actor).fire is not FIRE[type(actor)] or "fire" in vars(actor):
             continue
         inputs = list(actor.inputs.values())
-        if actor.context is not director or any(type(each) is not InputPort and each.width for each in inputs):
+        varying = {each.name for each in inputs if type(each) is not InputPort and each.width}
+        if actor.context is not director or not varying.issubset(getattr(kind, "varying", ())):
             continue
         form = kind()
         form.actor, form.director = actor, director

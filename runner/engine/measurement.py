@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Any
 
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula, operand
@@ -17,7 +17,10 @@ from ..graph import Metric
 from ..results import Outcome
 from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
-from .statistic import statistic_of
+from .statistic import MOST, Statistic, statistic_of
+
+_HELD = 1024  # whole numbers of which it is known whether a condition holds
+_EXACT = 2**53  # whole numbers up to here are floats
 
 
 @dataclass(frozen=True)
@@ -30,22 +33,29 @@ class _Unfit:
 class Measurement:
     """Takes in what the ports of a metric send."""
 
+    __slots__ = ("_holds", "_is_beyond", "_is_of_floats", "_is_of_numbers", "_kept", "_measure", "_ports", "_taking")
+
     def __init__(self, metric: Metric) -> None:
-        self._measure = metric.measure
+        measure = self._measure = metric.measure
         self._ports = metric.ports
         self._kept: _Kept | None = None
         self._is_beyond = False  # of all numbers
-        self._taking: _Taking = _taking(self._measure, metric.ports, 0)
-        if metric.measure.after == MSER5:
+        # What most tokens count is known without looking further: floats as they are, whole numbers as floats or not.
+        self._is_of_numbers = measure.when is None
+        self._is_of_floats = measure.when is None and measure.take not in _AS_THEY_ARE
+        self._holds: dict[int, Any] | None = None if measure.when is None else {}
+        start = 0
+        if measure.after == MSER5:
             self._kept = _Kept(metric.ports)
         else:
-            assert isinstance(metric.measure.after, float)
-            self._taking = _taking(self._measure, metric.ports, to_nanoseconds(metric.measure.after))
+            assert isinstance(measure.after, float)
+            start = to_nanoseconds(measure.after)
+        self._taking: _Taking = _taking(measure, metric.ports, start)
 
     def add(self, port: str, time: int, token: Any) -> None:
         """Take in a token at a time (ns)."""
-        value = _measured(self._measure, token)
-        if isinstance(value, _Unfit):
+        value = self._value(token)
+        if type(value) is _Unfit:
             value = _Unfit(f"{port} sent {value.reason} at {to_seconds(time):.9g} s")
         try:
             if self._kept is None:
@@ -54,6 +64,24 @@ class Measurement:
                 self._kept.add(port, time, value)
         except OverflowError:
             self._is_beyond = True
+
+    def _value(self, token: Any) -> Any:
+        if type(token) is float:
+            number: float = token
+            if self._is_of_numbers and -MOST <= number <= MOST:
+                return token
+        elif type(token) is not int:
+            pass
+        elif self._is_of_floats and -_EXACT <= token <= _EXACT:
+            return float(token)
+        elif self._holds is not None:
+            value = self._holds.get(token)
+            if value is None:
+                value = _measured(self._measure, token)
+                if len(self._holds) < _HELD:
+                    self._holds[token] = value
+            return value
+        return _measured(self._measure, token)
 
     def outcome(self, end: int) -> Outcome:
         """What it has come to at a time (ns) up to which nothing more will come."""
@@ -84,6 +112,7 @@ class Measurement:
 
 
 _AS_SENT = ("first", "last", "min", "max")  # of which infinity is a value as any other
+_AS_THEY_ARE = (*_AS_SENT, "sum", "count", "rate")  # whole numbers stay whole
 
 
 def _measured(measure: Measure, token: Any) -> Any:
@@ -91,7 +120,7 @@ def _measured(measure: Measure, token: Any) -> Any:
     if measure.take in ("first", "last", "count", "rate"):
         return token
     if measure.when is not None:
-        return (_known if isinstance(token, (int, str)) else _holds)(measure.when, token)
+        return (_known if isinstance(token, str) else _holds)(measure.when, token)
     if isinstance(token, str):  # some of which float() reads
         return _Unfit(f"{short(token)}, which is no number,")
     try:
@@ -100,7 +129,7 @@ def _measured(measure: Measure, token: Any) -> Any:
         return _Unfit(f"{short(token)}, which is no number,")
     if math.isnan(number) or (math.isinf(number) and measure.take not in _AS_SENT):
         return _Unfit(f"{number}")
-    return token if measure.take in (*_AS_SENT, "sum") else number
+    return token if measure.take in _AS_THEY_ARE else number
 
 
 def _holds(when: Formula, token: Any) -> float | _Unfit:
@@ -117,22 +146,41 @@ _known = lru_cache(maxsize=1024, typed=True)(_holds)  # states come again and ag
 # -- tokens, each of which counts as much ---------------------------------------------------------------------------
 
 
-class _Tokens:
-    """Takes tokens from a time on."""
+class _Taking:
+    """What takes in values from a time on, ``start``."""
+
+    __slots__ = ("_count", "_measure", "_statistic", "_unfit", "start")
 
     def __init__(self, measure: Measure, start: int) -> None:
         self.start = start
-        self.count = 0
         self._measure = measure
-        self._statistic = statistic_of(measure)
-        self._batches = TokenBatches() if measure.interval is not None else None
+        self._count = 0  # tokens
+        self._statistic: Statistic = statistic_of(measure)
         self._unfit = ""
+
+    def add(self, port: str, time: int, value: Any) -> None:
+        """Take in what a port sent."""
+        raise NotImplementedError
+
+    def outcome(self, end: int) -> Outcome:
+        """What it has come to at a time."""
+        raise NotImplementedError
+
+
+class _Tokens(_Taking):
+    """Takes tokens from a time on."""
+
+    __slots__ = ("_batches",)
+
+    def __init__(self, measure: Measure, start: int) -> None:
+        super().__init__(measure, start)
+        self._batches = TokenBatches() if measure.interval is not None else None
 
     def add(self, port: str, time: int, value: Any) -> None:
         if time < self.start:
             return
-        self.count += 1
-        if isinstance(value, _Unfit):
+        self._count += 1
+        if type(value) is _Unfit:
             self._unfit = self._unfit or value.reason
             return
         self._statistic.add(value, 1)
@@ -145,29 +193,26 @@ class _Tokens:
             return Outcome(missing=missing)
         after = to_seconds(self.start)
         if found is None:
-            few = "no token came" if self.count == 0 else "one token has no spread"
+            few = "no token came" if self._count == 0 else "one token has no spread"
             return Outcome(missing=few + (f" after {after:.6g} s" if after else ""))
         if self._batches is None:
             return Outcome(found, after=after)
-        return _with_interval(found, self._batches.batches(), self._measure, self.count, after)
+        return _with_interval(found, self._batches.batches(), self._measure, self._count, after)
 
 
 # -- spells of time: each value counts for as long as it stands -----------------------------------------------------
 
 
-class _Spells:
+class _Spells(_Taking):
     """Takes what stands at ports, from a time on."""
 
+    __slots__ = ("_batches", "_open")
+
     def __init__(self, measure: Measure, ports: Iterable[str], start: int, batches: TimeBatches | None = None) -> None:
-        self.start = start
-        self._measure = measure
-        self._statistic = statistic_of(measure)
+        super().__init__(measure, start)
         self._batches = batches
         if batches is None and measure.interval is not None:
             self._batches = TimeBatches(start)
-        self._unfit = ""
-        self._count = 0
-        self._weight = 0
         self._open: dict[str, tuple[int, Any]] = {}
         if measure.initial is not None:
             value = _measured(measure, measure.initial)
@@ -179,14 +224,16 @@ class _Spells:
         self._open[port] = (time, value)
 
     def _close(self, port: str, time: int) -> None:
-        since, value = self._open.get(port, (time, None))
-        begin = max(since, self.start)
+        stood = self._open.get(port)
+        if stood is None:
+            return
+        begin, value = stood
+        begin = max(begin, self.start)
         if time <= begin:
             return
-        if isinstance(value, _Unfit):
+        if type(value) is _Unfit:
             self._unfit = self._unfit or value.reason
             return
-        self._weight += time - begin
         self._statistic.add(value, time - begin)
         if self._batches is not None:
             self._batches.add(value, begin, time)
@@ -209,13 +256,13 @@ class _Spells:
         return _with_interval(found, self._batches.batches(end), self._measure, self._count, after)
 
 
-class _Arrivals:
+class _Arrivals(_Taking):
     """Counts tokens in time, from a time on."""
 
+    __slots__ = ("_batches",)
+
     def __init__(self, measure: Measure, start: int, batches: TimeBatches | None = None) -> None:
-        self.start = start
-        self._measure = measure
-        self._count = 0
+        super().__init__(measure, start)
         self._batches = batches or TimeBatches(start)
 
     def add(self, port: str, time: int, value: Any) -> None:
@@ -237,9 +284,6 @@ class _Arrivals:
         self.close(end)
         sums, covered = self._batches.batches(end)
         return _with_interval(found, (sums, [each / 1e9 for each in covered]), self._measure, self._count, after)
-
-
-_Taking: TypeAlias = _Tokens | _Spells | _Arrivals
 
 
 def _taking(measure: Measure, ports: Iterable[str], start: int) -> _Taking:
@@ -269,6 +313,8 @@ def _with_interval(
 class _Kept:
     """Keeps what came, until it is known where the warm-up ended."""
 
+    __slots__ = ("_names", "_numbers", "_ports", "_times", "_unfit", "_values")
+
     def __init__(self, ports: list[str]) -> None:
         self._names = ports
         self._numbers = {port: number for number, port in enumerate(ports)}
@@ -278,7 +324,7 @@ class _Kept:
         self._unfit = ""
 
     def add(self, port: str, time: int, value: Any) -> None:
-        if isinstance(value, _Unfit):
+        if type(value) is _Unfit:
             self._unfit = self._unfit or value.reason
             return
         self._ports.append(self._numbers[port])
@@ -300,13 +346,12 @@ class _Kept:
             if width == 0:
                 return "MSER-5 needs time between tokens"
             slices = TimeBatches(origin, width, pieces + 1)
-            trial = self._replayed(
+            trial: _Arrivals | _Spells = (
                 _Arrivals(measure, origin, slices)
                 if measure.take == "rate"
-                else _Spells(measure, ports, origin, slices),
-                until=origin + pieces * width,
+                else _Spells(measure, ports, origin, slices)
             )
-            assert not isinstance(trial, _Tokens)
+            self._replayed(trial, until=origin + pieces * width)
             trial.close(origin + pieces * width)
             sums, covered = slices.batches(origin + pieces * width)
             means = [each / weight for each, weight in zip(sums, covered, strict=True) if weight]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from epicycle.actors import Actor, to_seconds
+from epicycle.actors import Actor, Way, to_seconds
 
 from ..build import Model
 from ..collection import without_collection
@@ -21,6 +21,7 @@ from .copies import Copies
 from .director import Director
 from .errors import ActorError
 from .forms import attach
+from .listeners import Measuring, Recording
 from .measurement import Measurement
 from .pace import Pace
 from .trace import Tracer, TracingDirector, TracingLog
@@ -78,23 +79,18 @@ class Run:
 
     # -- what is watched ------------------------------------------------------------------------------------------
 
-    def _listeners(self) -> dict[str, list[Deliver]]:
+    def _listeners(self) -> dict[str, list[Deliver | Way]]:
         """Recorders, metrics and the stop rule, by the path of the port that they listen to."""
-        found: dict[str, list[Deliver]] = {}
+        found: dict[str, list[Deliver | Way]] = {}
         for name, signal in self.signals.items():
-            found.setdefault(name, []).append(partial(self._record, signal))
+            found.setdefault(name, []).append(Recording(signal.samples, self.director))
         for metric in self.model.metrics:
             for path in metric.ports:
-                found.setdefault(path, []).append(partial(self._measure, self._measurements[metric.name], path))
+                measuring = Measuring(self._measurements[metric.name], path, self.director)
+                found.setdefault(path, []).append(measuring)
         for path in self.model.stop_ports:
             found.setdefault(path, []).append(partial(self._ask_to_stop, path))
         return found
-
-    def _record(self, signal: Signal, token: Any) -> None:
-        signal.add(self.director.tag, token)
-
-    def _measure(self, measurement: Measurement, path: str, token: Any) -> None:
-        measurement.add(path, self.director.tag.time, token)
 
     def _ask_to_stop(self, path: str, token: Any) -> None:
         try:

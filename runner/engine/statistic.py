@@ -7,7 +7,7 @@ bits on every machine.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+import sys
 from array import array
 from fractions import Fraction
 from itertools import chain
@@ -15,18 +15,21 @@ from typing import Any
 
 from ..catalogue import Measure
 
+MOST = sys.float_info.max
 _KEPT = 512  # numbers until they are summed up
 
 
 class Total:
     """A sum that is exact until it is asked for."""
 
+    __slots__ = ("_terms",)
+
     def __init__(self) -> None:
         self._terms: list[float] = []
 
     def add(self, value: float) -> None:
         """One more number; raises ``OverflowError`` as soon as it is clear that the sum is beyond all floats."""
-        if math.isinf(value):
+        if not -MOST <= value <= MOST:
             raise OverflowError
         self._terms.append(value)
         if len(self._terms) > _KEPT:
@@ -45,21 +48,25 @@ class Total:
         return math.fsum(self._terms)
 
 
-class Statistic(ABC):
+class Statistic:
     """Something that is known of the numbers so far."""
 
-    @abstractmethod
+    __slots__ = ()
+
     def add(self, value: Any, weight: int) -> None:
         """One more number."""
+        raise NotImplementedError
 
     @property
-    @abstractmethod
     def value(self) -> Any:
         """What is known; None if there is no such thing yet.  Raises ``OverflowError``."""
+        raise NotImplementedError
 
 
 class First(Statistic):
     """The first, or the last."""
+
+    __slots__ = ("_is_empty", "_last", "_value")
 
     def __init__(self, *, last: bool = False) -> None:
         self._last = last
@@ -78,6 +85,8 @@ class First(Statistic):
 class Least(Statistic):
     """The least, or the greatest."""
 
+    __slots__ = ("_greatest", "_value")
+
     def __init__(self, *, greatest: bool = False) -> None:
         self._greatest = greatest
         self._value: Any = None
@@ -94,6 +103,8 @@ class Least(Statistic):
 class Count(Statistic):
     """How many there are."""
 
+    __slots__ = ("_count",)
+
     def __init__(self) -> None:
         self._count = 0
 
@@ -107,6 +118,8 @@ class Count(Statistic):
 
 class Sum(Statistic):
     """Their sum, a whole number if all of them are."""
+
+    __slots__ = ("_rest", "_whole")
 
     def __init__(self) -> None:
         self._whole = 0
@@ -128,12 +141,15 @@ class Sum(Statistic):
 class Mean(Statistic):
     """Their weighted mean."""
 
+    __slots__ = ("_total", "_weight")
+
     def __init__(self) -> None:
         self._total = Total()
         self._weight = 0
 
-    def add(self, value: float, weight: int) -> None:
-        self._total.add(value * weight)
+    def add(self, value: Any, weight: int) -> None:
+        number: float = value
+        self._total.add(number * weight)
         self._weight += weight
 
     @property
@@ -143,6 +159,8 @@ class Mean(Statistic):
 
 class Spread(Statistic):
     """Their standard deviation: of a sample, or with weights that are all there is.  Source: D. H. D. West (1979)."""
+
+    __slots__ = ("_is_sample", "_mean", "_squares", "_weight")
 
     def __init__(self, *, sample: bool) -> None:
         self._is_sample = sample
@@ -165,6 +183,8 @@ class Spread(Statistic):
 class Quantile(Statistic):
     """The number below which a share of them lies, interpolated between two: type 7 of Hyndman and Fan."""
 
+    __slots__ = ("_p", "_values")
+
     def __init__(self, p: float) -> None:
         self._p = p
         self._values = array("d")
@@ -186,6 +206,8 @@ class Quantile(Statistic):
 class TimeQuantile(Statistic):
     """The least number such that at least a share of all weight is on it and those below."""
 
+    __slots__ = ("_p", "_weights")
+
     def __init__(self, p: float) -> None:
         self._p = Fraction(p)
         self._weights: dict[float, int] = {}
@@ -206,22 +228,18 @@ class TimeQuantile(Statistic):
 
 def statistic_of(measure: Measure) -> Statistic:
     """What a metric is taken with."""
-    match measure.take:
-        case "first" | "last" as take:
-            return First(last=take == "last")
-        case "min" | "max" as take:
-            return Least(greatest=take == "max")
-        case "count" | "rate":
-            return Count()
-        case "sum":
-            return Sum()
-        case "std" | "time_std" as take:
-            return Spread(sample=take == "std")
-        case "quantile":
-            assert measure.p is not None
-            return Quantile(measure.p)
-        case "time_quantile":
-            assert measure.p is not None
-            return TimeQuantile(measure.p)
-        case _:
-            return Mean()
+    take, p = measure.take, measure.p
+    if take in ("first", "last"):
+        return First(last=take == "last")
+    if take in ("min", "max"):
+        return Least(greatest=take == "max")
+    if take in ("count", "rate"):
+        return Count()
+    if take == "sum":
+        return Sum()
+    if take in ("std", "time_std"):
+        return Spread(sample=take == "std")
+    if take in ("quantile", "time_quantile"):
+        assert p is not None
+        return Quantile(p) if take == "quantile" else TimeQuantile(p)
+    return Mean()

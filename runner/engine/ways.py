@@ -59,7 +59,7 @@ class Ways:
         aspects: list[WovenAspect],
         director: Director,
         log: EventLog,
-        listeners: dict[str, list[Deliver]],
+        listeners: dict[str, list[Deliver | Way]],
         signals: dict[str, Signal],
     ) -> None:
         self.graph = graph
@@ -192,7 +192,8 @@ class Ways:
 
     def _heard(self, path: str) -> list[Way]:
         """Who listens to what leaves a port."""
-        return [Call(listener) for listener in self._listeners.get(path, [])]
+        listeners = self._listeners.get(path, [])
+        return [listener if isinstance(listener, Way) else Call(listener) for listener in listeners]
 
     def _emitter(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emitter:
         """What ``port.send`` does."""

@@ -6,7 +6,8 @@ from .log import EventLog, LogError, Names, Record, Writer
 from .log_file import LogFile, check_log_path, write_log
 from .outcome import Interval, Outcome
 from .results import Results
-from .signal import Past, Signal, SignalError
+from .samples import Past, Samples
+from .signal import Signal, SignalError
 
 __all__ = [
     "EventLog",
@@ -18,6 +19,7 @@ __all__ = [
     "Past",
     "Record",
     "Results",
+    "Samples",
     "Signal",
     "SignalError",
     "TokenError",

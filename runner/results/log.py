@@ -14,7 +14,7 @@ from ..shown import short
 from ..tables import pandas_module
 from .encoding import canonical, plain
 from .packing import TAKES_NUMBERS, Sheet, stamp
-from .signal import Past
+from .samples import Past
 from .waiting import LARGE, WaitingTokens
 
 if TYPE_CHECKING:

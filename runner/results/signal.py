@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from array import array
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +14,16 @@ from epicycle.actors import EpicycleError, Tag, counted, did_you_mean, to_second
 from ..shown import short
 from ..tables import Table, as_html, as_text, pandas_module
 from .encoding import field_names, leaves
+from .samples import Samples
 
 if TYPE_CHECKING:
     import pandas
 
-T = TypeVar("T")
 _SHOWN = 8  # tokens at the beginning and at the end
 
 
 class SignalError(EpicycleError):
     """A signal, or a field of its tokens, that is not there."""
-
-
-class Past(list[T]):
-    """What has happened in a run, and does not change any more: a copy of the run has a list of the same things."""
 
 
 class Signal:
@@ -40,62 +35,40 @@ class Signal:
 
     def __init__(self, name: str, tags: Iterable[Tag] = (), tokens: Iterable[Any] = ()) -> None:
         self.name = name
-        # Tags, and tokens that are all floats or all ints, are kept as the numbers that they are: about 20 bytes for
-        # both together, where a tag and a float as objects take 130.  Ctrl-C may come between any two of these lines:
-        # a token is there when its microstep is, which is added last.
-        self._times = array("q")
-        self._microsteps = array("i")
-        self._tokens: Any = array("d")
-        self._kind: type | None = float  # of all tokens; None: there are others, and ``_tokens`` is a list
+        self.samples = Samples()
         for tag, token in zip(tags, tokens, strict=True):
             self.add(tag, token)
 
     def add(self, tag: Tag, token: Any) -> None:
         """Append a token."""
-        time, microstep = tag
-        if type(token) is not self._kind and self._kind is not None:
-            self._make_room(token)
-        try:
-            self._tokens.append(token)
-        except OverflowError:  # an int of more than 64 bits
-            self._tokens = Past([*self._tokens, token])
-            self._kind = None
-        self._times.append(time)
-        self._microsteps.append(microstep)
-
-    def _make_room(self, token: Any) -> None:
-        """See to it that a token of another type than before can be kept."""
-        if type(token) is int and not self._tokens:
-            self._tokens, self._kind = array("q"), int
-        else:
-            self._tokens, self._kind = Past(self._tokens), None
+        self.samples.add(*tag, token)
 
     @property
     def tags(self) -> list[Tag]:
         """When each token was sent."""
-        return list(map(Tag, self._times, self._microsteps))
+        return list(map(Tag, self.samples.times, self.samples.microsteps))
 
     @property
     def tokens(self) -> list[Any]:
         """What was sent."""
-        return list(self._tokens[: len(self)])
+        return list(self.samples.tokens[: len(self)])
 
     def __iter__(self) -> Iterator[tuple[Tag, Any]]:
         """Each token with its tag, of which there may be more than fit into memory all at once."""
-        return zip(map(Tag, self._times, self._microsteps), self._tokens, strict=False)
+        return zip(map(Tag, self.samples.times, self.samples.microsteps), self.samples.tokens, strict=False)
 
     def __len__(self) -> int:
-        return len(self._microsteps)
+        return len(self.samples.microsteps)
 
     @property
     def times(self) -> NDArray[np.float64]:
         """The times in seconds."""
-        return np.fromiter(map(to_seconds, self._times), dtype=float, count=len(self))
+        return np.fromiter(map(to_seconds, self.samples.times), dtype=float, count=len(self))
 
     @property
     def microsteps(self) -> NDArray[np.int64]:
         """The microsteps."""
-        return np.array(self._microsteps, dtype=np.int64)
+        return np.array(self.samples.microsteps, dtype=np.int64)
 
     @property
     def values(self) -> NDArray[Any]:
@@ -144,8 +117,8 @@ class Signal:
     def __repr__(self) -> str:
         if not len(self):
             return f"<Signal {self.name}: no tokens>"
-        kind = type(self._tokens[0]).__name__
-        first, last = to_seconds(self._times[0]), to_seconds(self._times[-1])
+        kind = type(self.samples.tokens[0]).__name__
+        first, last = to_seconds(self.samples.times[0]), to_seconds(self.samples.times[-1])
         tokens = counted(len(self), "token")
         return f"<Signal {self.name}: {tokens} ({kind}) from {first:g} s to {last:g} s>"
 

@@ -14,9 +14,11 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 from simpy.events import Event
 
-from epicycle.actors import CORE, Actor, InputPort, OutputPort, Process, Recorder
+from epicycle.actors import CORE, Actor, InputPort, OutputPort, Parameter, Process, Recorder
+from epicycle.actors.expression import Formula
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.engine import ActorError, LoopError, errors
 from epicycle.runner.text import ModelError
@@ -72,12 +74,55 @@ class Patient(Process):
             self.output.send(token)
 
 
-TYPES = [Moody, Patient, Ticker, Join]
+class Odd(Actor):
+    """Sends what arithmetic finds hard, several at a time now and then."""
+
+    output: OutputPort[Any] = OutputPort(float)
+    kind = Parameter(str, "floats")
+
+    def initialize(self) -> None:
+        self.wake_in(0)
+
+    def fire(self) -> None:
+        for _ in range(self.random.choice([1, 1, 1, 2])):
+            self.output.send(ODD[self.kind][int(self.random.integers(len(ODD[self.kind])))])
+        self.wake_in(0.25)
+
+
+ODD: dict[str, list[Any]] = {
+    "floats": [1.5, -0.0, 0.0, 2.0, -3.25, 0.1],
+    "beyond": [1.5, -0.0, 1e308, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")],
+    "mixed": [1.5, -0.0, 2, 0, -7, 2**53 + 1, True, False, np.float64(0.5)],
+}
+TYPES = [Moody, Patient, Ticker, Join, Odd]
+EXPRESSIONS = (
+    "a + b", "a - b", "time - a", "a + 2 * b", "a / b", "-a * b - time", "a > b", "a > 0 and not b > 1", "a or b",
+    "a if a > b else -b", "max(a, 0.5) ** 2 // (b + 1)", "sqrt(a * a + b * b) % 2", "a < b <= 1", "1 / (a * b)", "-a",
+)  # fmt: skip
+OF_ANY: list[dict[str, Any]] = [
+    {"take": "count"},
+    {"take": "rate", "interval": 0.9},
+    {"take": "share", "when": "value > 1", "initial": 0, "interval": 0.9},
+]
+OF_NUMBERS: list[dict[str, Any]] = [
+    {"take": "last"},
+    {"take": "max"},
+    {"take": "sum"},
+    {"take": "mean", "interval": 0.9},
+    {"take": "mean", "after": "mser5"},
+    {"take": "std", "after": 1},
+    {"take": "quantile", "p": 0.3},
+    {"take": "time_mean", "initial": 0, "interval": 0.9},
+    {"take": "time_mean", "after": 0.5},
+    {"take": "time_std"},
+    {"take": "time_quantile", "p": 0.5},
+]
+SENDS_NUMBERS = ("Scale", "AddSubtract", "MultiplyDivide", "Counter", "Integrator", "Accumulator", "Expression")
 TIMES = ("0 s", "100 ms", "250 ms", "0.5 s", "1 s")
 
 
 def _source(numbers: Numbers) -> dict[str, Any]:
-    kind = numbers.choice(["Clock", "Clock", "PoissonClock", "Ticker", "Const", "SingleEvent", "Moody"])
+    kind = numbers.choice(["Clock", "Clock", "PoissonClock", "Ticker", "Const", "SingleEvent", "Moody", "Odd", "Odd"])
     if kind == "Clock":
         period = numbers.choice([0.25, 0.3, 1.0])
         given: dict[str, Any] = {"period": period}
@@ -92,14 +137,27 @@ def _source(numbers: Numbers) -> dict[str, Any]:
         return {"type": kind, "mean_interval": numbers.choice([0.2, 0.7]), "fire_at_start": numbers.random() < 0.5}
     if kind == "Ticker":
         return {"type": kind, "period": 0.5, "limit": numbers.randint(1, 12)}
+    if kind == "Odd":
+        return {"type": kind, "kind": numbers.choice([*ODD, "floats"])}
     return {"type": kind} if kind == "Moody" else {"type": kind, "value": numbers.choice([1, 2.0, -0.0])}
 
 
 def _between(numbers: Numbers) -> tuple[dict[str, Any], list[str]]:
     """An actor with inputs and the names of these."""
     distribution = numbers.choice(
-        [{"type": "Exponential", "mean": 0.3}, {"type": "Uniform", "high": 0.5}, {"type": "Constant", "value": 0.25}]
+        [
+            {"type": "Exponential", "mean": 0.3},
+            {"type": "Gamma", "mean": 0.3, "shape": numbers.choice([0.3, 1, 2.5, 40])},
+            {"type": "Uniform", "high": 0.5},
+            {"type": "Normal", "mean": 1, "standard_deviation": 0.3},
+            {"type": "Constant", "value": 0.25},
+            {"type": "LogNormal", "median": 0.2},
+        ]
     )
+    formula: dict[str, Any] = {"expression": numbers.choice(EXPRESSIONS), "hold": numbers.random() < 0.7}
+    if numbers.random() < 0.3:
+        formula["gives"] = numbers.choice(["any value", "number"])
+    names = [name for name in Formula(formula["expression"]).names if name != "time"]
     kinds: list[tuple[dict[str, Any], list[str]]] = [
         ({"type": "TimeDelay", "delay": numbers.choice(TIMES)}, ["input"]),
         ({"type": "TimeDelay"}, ["input", "delay"]),
@@ -109,16 +167,22 @@ def _between(numbers: Numbers) -> tuple[dict[str, Any], list[str]]:
         ({"type": "MultiplyDivide"}, ["multiply", "divide"]),
         ({"type": "Server", "distribution": distribution, "servers": numbers.choice([1, 2, None])}, ["input"]),
         ({"type": "Server", "service_time": numbers.choice(TIMES), "capacity": numbers.choice([None, 2])}, ["input"]),
-        ({"type": "Queue", "persistent_trigger": numbers.random() < 0.5}, ["input", "trigger"]),
-        ({"type": "Merge", "discard": numbers.random() < 0.3}, ["input", "input"]),
-        ({"type": "Counter"}, ["increment", "decrement", "increment"]),
+        ({"type": "Server", "servers": numbers.choice([1, 2])}, ["input", "service_time"]),
+        (
+            {
+                "type": "Queue",
+                "persistent_trigger": numbers.random() < 0.5,
+                "capacity": numbers.choice([None, 1, 3]),
+            },
+            ["input", "trigger"],
+        ),
+        ({"type": "Merge", "discard": numbers.random() < 0.3}, ["input", "input", "input"]),
+        ({"type": "Counter"}, ["increment", "decrement", "increment", "reset"]),
         ({"type": "Integrator", "method": numbers.choice(["hold", "trapezoid"])}, ["input", "trigger"]),
         ({"type": "Accumulator"}, ["input", "reset"]),
         ({"type": "Random", "distribution": distribution}, ["trigger"]),
-        (
-            {"type": "Expression", "expression": numbers.choice(["a + 2 * b", "a / b", "a > b", "-a * b - time"])},
-            ["a", "b"],
-        ),
+        ({"type": "Expression", **formula}, names),
+        ({"type": "Expression", **formula}, names),  # as often as two others
         ({"type": "Router"}, ["input"]),
         ({"type": "Sampler"}, ["input", "trigger"]),
         ({"type": "MostRecent"}, ["input", "trigger"]),
@@ -184,7 +248,14 @@ def network(numbers: Numbers) -> dict[str, Any]:
         model = {"composites": {"Part": part}, "actors": {"part": {"type": "Part"}}}
         ends = [f"part.{port}" for port in ends]
     model["run"] = {"stop": numbers.choice([3, 6.05]), "seed": numbers.randint(0, 5), "record": ends[:2]}
-    model["metrics"] = {"mean": {"of": ends[0], "take": numbers.choice(["count", "rate"])}}
+    metrics: dict[str, Any] = {}
+    for place in range(3):
+        end = numbers.choice(ends)
+        there = actors[end.removeprefix("part.").partition(".")[0]]
+        is_number = end.endswith("size") or (there["type"] in SENDS_NUMBERS and there.get("gives") != "any value")
+        is_number = is_number and there.get("expression") not in ("a > b", "a < b <= 1", "a > 0 and not b > 1")
+        metrics[f"m{place}"] = {"of": end, **numbers.choice([*OF_ANY, *(3 * OF_NUMBERS if is_number else ())])}
+    model["metrics"] = metrics
     return model
 
 
