@@ -33,12 +33,10 @@ CORE_MODULES = (
     "epicycle.actors.robotics.messages",
     "epicycle.actors.robotics.world",
     "epicycle.actors.robotics.monitors",
-    "epicycle.actors.robotics.planning",
     "epicycle.actors.robotics.estimator",
     "epicycle.actors.robotics.controller",
     "epicycle.aspects.core.join_point",
     "epicycle.aspects.core.kinds",
-    "epicycle.aspects.communication",
     "epicycle.runner.results.packing",
     "epicycle.runner.results.waiting",
     "epicycle.runner.results.log",
@@ -48,8 +46,6 @@ CORE_MODULES = (
     "epicycle.runner.engine.way",
     "epicycle.runner.engine.ways",
     "epicycle.runner.engine.aspect_context",
-    "epicycle.runner.engine.measurement",
-    "epicycle.runner.results.signal",
 )
 MANIFEST = "actors/compiled.json"
 CHOICES = ("python", "compiled")

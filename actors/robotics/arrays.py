@@ -55,9 +55,9 @@ def joined(numbers: Sequence[float], array: Array) -> Array:
 
 
 def stacked(rows: Iterable[Array], columns: int) -> Array:
-    """A table of rows of so many columns or fewer, with zeros where they end."""
+    """A table of rows, with zeros where they end; it has so many columns, or as many as the longest row."""
     kept = list(rows)
-    table = np.zeros((len(kept), columns))
+    table = np.zeros((len(kept), max(columns, *map(len, kept)) if kept else columns))
     for place, row in enumerate(kept):
         table[place, : len(row)] = row
     return table

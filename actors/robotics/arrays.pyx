@@ -100,10 +100,12 @@ cpdef stacked(rows, Py_ssize_t columns):
     cdef list kept = list(rows)
     cdef numpy.npy_intp[2] shape
     cdef double* data
+    for row in kept:  # which are ours, made by ``array_of`` or ``joined``
+        columns = max(columns, size_of(row))
     shape[0], shape[1] = len(kept), columns
     table = numpy.PyArray_ZEROS(2, shape, numpy.NPY_DOUBLE, 0)
     data = numbers_of(table)
-    for row in kept:  # which are ours, made by ``joined``
-        memcpy(data, numbers_of(row), 8 * min(size_of(row), columns))
+    for row in kept:
+        memcpy(data, numbers_of(row), 8 * size_of(row))
         data += columns
     return table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -41,7 +42,7 @@ class _Peers:
     def __init__(self, places: Array) -> None:
         # Their names are no paths.
         self._nobody = {f"[{number}]": (x, y) for number, (x, y) in enumerate(places.tolist())}
-        self._rows = {name: np.array([x, y, 0.0, 0.0, 0.0, 0.0]) for name, (x, y) in self._nobody.items()}
+        self._rows = {name: array_of((*self._nobody[name], 0.0, 0.0, 0.0, 0.0)) for name in sorted(self._nobody)}
 
     def hear(self, plan: Plan) -> None:
         """Remember a plan, unless a later one of that robot is known."""
@@ -54,11 +55,12 @@ class _Peers:
             nearest = min(away, key=away.__getitem__)
             del self._nobody[nearest], self._rows[nearest]
         self._rows[plan.robot] = joined((x, y, vx, vy, plan.time, float(len(plan.controls))), plan.controls)
+        if known is None:
+            self._rows = dict(sorted(self._rows.items(), key=itemgetter(0)))
 
     def table(self) -> Array:
         """The rows, sorted by name."""
-        rows = self._rows
-        return stacked([rows[name] for name in sorted(rows)], max(map(len, rows.values()), default=_CONTROLS))
+        return stacked(self._rows.values(), _CONTROLS)
 
 
 class RobustController(TargetModel, Actor):

@@ -140,15 +140,17 @@ class _Estimator(TargetModel, Actor):
     def _place_of(self, time: int) -> int:
         """The place of the step of that time, which may be a new one."""
         steps = self._steps
-        place = bisect_left(steps, time, key=_time)
+        place = len(steps)
+        if steps and time <= steps[-1].time:  # mostly that one, or a new one
+            place = place - 1 if time == steps[-1].time else bisect_left(steps, time, key=_time)
         if place == len(steps) or steps[place].time != time:
             steps.insert(place, _Step(time, []))
         return place
 
     def _forget(self, earliest: int) -> None:
         """Forget the steps before a time, of which nothing will come any more."""
-        count = bisect_left(self._steps, earliest, key=_time)
-        if count:
+        if self._steps[0].time < earliest:  # there is one of now at least
+            count = bisect_left(self._steps, earliest, key=_time)
             last = self._steps[count - 1]
             self._before, self._before_at = last.after, last.time
             del self._steps[:count]
