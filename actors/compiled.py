@@ -44,7 +44,6 @@ CORE_MODULES = (
     "epicycle.runner.engine.forms",
     "epicycle.runner.engine.director",
     "epicycle.runner.engine.way",
-    "epicycle.runner.engine.ways",
     "epicycle.runner.engine.aspect_context",
 )
 MANIFEST = "actors/compiled.json"
