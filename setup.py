@@ -25,7 +25,8 @@ TREE = ROOT / "build" / "core"
 core = runpy.run_path(str(ROOT / "actors" / "compiled.py"), run_name="setup")
 OF_TYPES = "classmethod(__import__('types').GenericAlias)"  # what makes InputPort[float] a name of a type
 # The same bits everywhere: no fused multiplication and addition, no reordering.
-FLAGS = [] if sys.platform == "win32" else ["-O2", "-ffp-contract=off", "-fno-fast-math", "-Wno-unused-function"]
+FLAGS = ["-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
+FLAGS += [] if sys.platform == "win32" else ["-O2", "-ffp-contract=off", "-fno-fast-math", "-Wno-unused-function"]
 
 
 def check_forms() -> None:
@@ -99,6 +100,7 @@ def copied() -> list[Path]:
             target.with_suffix(".py").unlink(missing_ok=True)
         else:
             found[-1].write_text(for_cython(found[-1]), encoding="utf-8")
+            shutil.copystat(source.with_suffix(".py"), found[-1])  # what has not changed is not compiled again
     return found
 
 
@@ -111,12 +113,13 @@ class BuildCore(build_ext):
         self.parallel = self.parallel or os.cpu_count()
         try:
             from Cython.Build import cythonize
+            from numpy import get_include
 
             options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False, "binding": False}
             pairs = zip(core["CORE_MODULES"], copied(), strict=True)
-            made = [Extension(name, [str(path)], extra_compile_args=FLAGS) for name, path in pairs]
+            made = [Extension(name, [str(path)], include_dirs=[get_include()]) for name, path in pairs]
             made = cythonize(made, include_path=[str(TREE)], compiler_directives=options, quiet=True)
-        except Exception as error:  # no Cython, or one that is too old
+        except Exception as error:  # no Cython or NumPy, or one that is too old
             print(f"the core is not compiled, Python serves: {error}", file=sys.stderr)
             self.extensions = []
             return

@@ -30,8 +30,19 @@ CORE_MODULES = (
     "epicycle.actors.core.actor",
     "epicycle.actors.core.authoring",
     "epicycle.actors.core.process",
+    "epicycle.actors.core.random",
+    "epicycle.actors.core.laws",
+    "epicycle.actors.robotics.arrays",
+    "epicycle.actors.robotics.messages",
+    "epicycle.actors.robotics.world",
+    "epicycle.actors.robotics.monitors",
+    "epicycle.actors.robotics.estimator",
+    "epicycle.actors.robotics.controller",
+    "epicycle.aspects.core.join_point",
+    "epicycle.aspects.core.kinds",
     "epicycle.runner.results.packing",
     "epicycle.runner.results.samples",
+    "epicycle.runner.results.waiting",
     "epicycle.runner.results.log",
     "epicycle.runner.engine.agenda",
     "epicycle.runner.engine.native",
@@ -43,6 +54,7 @@ CORE_MODULES = (
     "epicycle.runner.engine.statistic",
     "epicycle.runner.engine.measurement",
     "epicycle.runner.engine.listeners",
+    "epicycle.runner.engine.aspect_context",
 )
 MANIFEST = "actors/compiled.json"
 CHOICES = ("python", "compiled")

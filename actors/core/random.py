@@ -45,7 +45,7 @@ class RandomStream:
     def __init__(self, bits: np.random.PCG64) -> None:
         self._bits = bits
         self._ahead: list[int] = []  # words that have been taken already, the next one last
-        self._block = 4
+        self._block = 16
 
     def __repr__(self) -> str:
         return f"<Stream {self.state}>"

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core import EpicycleError
-from .messages import Array
+from .arrays import Array
 from .numerics import definitions
 from .numerics.barrier import TOLERANCE, Solution
 from .numerics.horizon import REACH_GOAL, HorizonProblem

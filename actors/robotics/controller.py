@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from ..core.elementary import hypot
+from .arrays import Array, array_of, finite, joined, pair, read_only, stacked
 from .estimator import TargetModel
-from .messages import Array, BodyState, Estimate, Plan, all_finite, enclosing, read_only
+from .messages import BodyState, Estimate, Plan, enclosing
 from .planning import Barrier, Objective, ReachGoal, Solver
 
 if TYPE_CHECKING:
@@ -40,29 +42,25 @@ class _Peers:
     def __init__(self, places: Array) -> None:
         # Their names are no paths.
         self._nobody = {f"[{number}]": (x, y) for number, (x, y) in enumerate(places.tolist())}
-        self._rows = {name: np.array([x, y, 0.0, 0.0, 0.0, 0.0]) for name, (x, y) in self._nobody.items()}
+        self._rows = {name: array_of((*self._nobody[name], 0.0, 0.0, 0.0, 0.0)) for name in sorted(self._nobody)}
 
     def hear(self, plan: Plan) -> None:
         """Remember a plan, unless a later one of that robot is known."""
         known = self._rows.get(plan.robot)
         if known is not None and plan.time < known[_MADE_AT]:
             return
-        (x, y), (vx, vy) = plan.state.position.tolist(), plan.state.velocity.tolist()
+        (x, y), (vx, vy) = pair(plan.state.position), pair(plan.state.velocity)
         if known is None and self._nobody:
             away = {name: hypot(x - there[0], y - there[1]) for name, there in self._nobody.items()}
             nearest = min(away, key=away.__getitem__)
             del self._nobody[nearest], self._rows[nearest]
-        row = self._rows[plan.robot] = np.empty(_CONTROLS + plan.controls.size)
-        row[:_CONTROLS] = x, y, vx, vy, plan.time, len(plan.controls)
-        row[_CONTROLS:] = plan.controls.ravel()
+        self._rows[plan.robot] = joined((x, y, vx, vy, plan.time, float(len(plan.controls))), plan.controls)
+        if known is None:
+            self._rows = dict(sorted(self._rows.items(), key=itemgetter(0)))
 
     def table(self) -> Array:
         """The rows, sorted by name."""
-        table = np.zeros((len(self._rows), max(map(len, self._rows.values()), default=_CONTROLS)))
-        for row, name in enumerate(sorted(self._rows)):
-            known = self._rows[name]
-            table[row, : len(known)] = known
-        return table
+        return stacked(self._rows.values(), _CONTROLS)
 
 
 class RobustController(TargetModel, Actor):
@@ -164,7 +162,7 @@ class RobustController(TargetModel, Actor):
         solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
         # Input may be so large that its squares are not finite.
-        if not violation < math.inf and not all_finite(controls.ravel().tolist()):
+        if not violation < math.inf and not finite(controls):
             controls, violation = starts[1], math.inf  # braking
         self._send(own, problem, controls)
         self._infeasible += bool(violation > 0.0)  # which may be one of NumPy's
@@ -183,9 +181,8 @@ class RobustController(TargetModel, Actor):
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
-        announced = np.empty((self.horizon + 1, 2))
-        announced[0], announced[1:] = self._applied, controls[: self.horizon]
-        self.plan.send(Plan(self._name, own.time, own, announced))
+        announced = joined(pair(self._applied), controls[: self.horizon])
+        self.plan.send(Plan(self._name, own.time, own, announced.reshape(self.horizon + 1, 2)))
         self._applied = read_only(controls[0])
         self.control.send(self._applied)
 
@@ -194,11 +191,11 @@ class RobustController(TargetModel, Actor):
     def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
         """The problem, and where its solver may start (2, N, 2): the standing plan from the next period on; braking."""
         # Floats: arithmetic on arrays of two takes ten times as long.
-        (x, y), (vx, vy), (ux, uy) = own.position.tolist(), own.velocity.tolist(), self._applied.tolist()
+        (x, y), (vx, vy), (ux, uy) = pair(own.position), pair(own.velocity), pair(self._applied)
         now, period = own.time, self.period
-        position = np.array([x + period * vx, y + period * vy])
+        position = array_of((x + period * vx, y + period * vy))
         vx, vy = vx + period * ux, vy + period * uy
-        velocity, speed = np.array([vx, vy]), hypot(vx, vy)
+        velocity, speed = array_of((vx, vy)), hypot(vx, vy)
         standing = self._standing
         tube_centre, tube_radius, starts = self._standing_plan(
             *standing[1:], now - standing.made_at, self._radius, velocity, speed, self.max_acceleration, period

@@ -11,7 +11,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..core import Actor, Configurable, InputPort, OutputPort, Parameter, array_parameter, to_nanoseconds, to_seconds
-from .messages import RANGE, RELATIVE_POSITION, Array, Estimate, Measurement
+from .arrays import Array, array_of, pair, stacked
+from .messages import RANGE, RELATIVE_POSITION, Estimate, Measurement
 
 EXPECTED, PREDICTED = "expected", "predicted"
 State: TypeAlias = tuple[Array, Array]  # of a filter: mean and covariance, to which nobody writes
@@ -85,7 +86,7 @@ class _Estimator(TargetModel, Actor):
         from .numerics.warm_up import compile_kernels
 
         compile_kernels()
-        self._kinds = {RANGE: ukf.RANGE, RELATIVE_POSITION: ukf.RELATIVE_POSITION}
+        self._kinds = {RANGE: float(ukf.RANGE), RELATIVE_POSITION: float(ukf.RELATIVE_POSITION)}
         self._process_noise = self.process_noise
         self._waiting: list[Measurement] = []  # for the next trigger
         self._too_late = 0
@@ -114,39 +115,42 @@ class _Estimator(TargetModel, Actor):
     def _catch_up(self, measurements: list[Measurement], now: int) -> tuple[State, set[str]]:
         """Put measurements where they belong, and bring the filter to the present; also the robots that were heard."""
         steps = self._steps
-        changed = self._step_at(now)
+        first = self._place_of(now)  # of the steps that change
         new: list[tuple[_Step, Measurement]] = []
         for each in measurements:
-            step = self._step_at(min(to_nanoseconds(each.time), now))
+            place = self._place_of(min(to_nanoseconds(each.time), now))
+            step = steps[place]
             if not any(known.robot == each.robot and _order(known) == _order(each) for known in step.measurements):
                 step.measurements.append(each)
                 new.append((step, each))
-                changed = min(changed, step, key=_time)
-        first = steps.index(changed)
+                first = min(first, place)
         state, before = (steps[first - 1].after, steps[first - 1].time) if first else (self._before, self._before_at)
         fused = set()
         for step in steps[first:]:
             elapsed = 0.0 if before is None else to_seconds(step.time - before)
             # Sorted, so that the order of arrival decides nothing, not even the last bit.
-            step.measurements.sort(key=_order)
+            robots = {each.robot for each in step.measurements}
+            step.measurements.sort(key=_robot if len(robots) == len(step.measurements) else _order)
             state, is_fused = self._step(state, elapsed, step.measurements)
             if is_fused:
                 fused |= {each.robot for where, each in new if where is step}
             step.after, before = state, step.time
         return state, fused
 
-    def _step_at(self, time: int) -> _Step:
-        """The step of that time, which may be a new one."""
+    def _place_of(self, time: int) -> int:
+        """The place of the step of that time, which may be a new one."""
         steps = self._steps
-        place = bisect_left(steps, time, key=_time)
+        place = len(steps)
+        if steps and time <= steps[-1].time:  # mostly that one, or a new one
+            place = place - 1 if time == steps[-1].time else bisect_left(steps, time, key=_time)
         if place == len(steps) or steps[place].time != time:
             steps.insert(place, _Step(time, []))
-        return steps[place]
+        return place
 
     def _forget(self, earliest: int) -> None:
         """Forget the steps before a time, of which nothing will come any more."""
-        count = bisect_left(self._steps, earliest, key=_time)
-        if count:
+        if self._steps[0].time < earliest:  # there is one of now at least
+            count = bisect_left(self._steps, earliest, key=_time)
             last = self._steps[count - 1]
             self._before, self._before_at = last.after, last.time
             del self._steps[:count]
@@ -165,15 +169,15 @@ class _Estimator(TargetModel, Actor):
 
     def _rows(self, measurements: list[Measurement]) -> Array:
         """The measurements (m, 7) as the kernels take them."""
-        kinds = self._kinds
-        rows = [
-            (kinds[each.kind], *each.observer.tolist(), *[*each.value.tolist(), 0.0][:2], each.along, each.across)
-            for each in measurements
-        ]
-        return np.array(rows, np.float64).reshape(-1, 7)
+        rows = []
+        for each in measurements:
+            x, y = pair(each.observer)
+            values = pair(each.value) if len(each.value) == 2 else (each.value.item(), 0.0)
+            rows.append(array_of((self._kinds[each.kind], x, y, *values, each.along, each.across)))
+        return stacked(rows, 7)
 
 
-_time = attrgetter("time")
+_time, _robot = attrgetter("time"), attrgetter("robot")
 
 
 def _order(measurement: Measurement) -> Any:

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..core import EpicycleError, Parameter
 from ..core.elementary import hypot
+from .arrays import Array
 from .estimator import EXPECTED, State, _Estimator
-from .messages import RANGE, Array, Measurement
+from .messages import RANGE, Measurement
 
 # FilterPy's EnsembleKalmanFilter is left out: it draws from numpy's global random state, so no run could be
 # repeated.

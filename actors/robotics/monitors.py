@@ -7,6 +7,7 @@ from itertools import combinations
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from ..core.elementary import distance
+from .arrays import Pair, pair
 from .messages import BodyState
 
 
@@ -23,16 +24,16 @@ class GoalMonitor(Actor):
     tolerance = Parameter(float, 0.5, unit="m", min=0, doc="how near counts as arrived")
 
     def initialize(self) -> None:
-        self._last: list[float] | None = None
+        self._last: Pair | None = None
         self._length = 0.0
         self._has_arrived = False
 
     def fire(self) -> None:
-        position: list[float] = self.state.value.position.tolist()
+        position = pair(self.state.value.position)
         if self._last is not None:
             self._length += distance(position, self._last)
         self._last = position
-        left = distance(position, self.goal.tolist())
+        left = distance(position, pair(self.goal))
         self.path_length.send(self._length)
         self.distance.send(left)
         if left <= self.tolerance and not self._has_arrived:
@@ -60,9 +61,9 @@ class _DistanceBetween(Actor):
         now = max((state.time for state in self._states.values()), default=0.0)
         places = []
         for state in self._states.values():
-            (x, y), elapsed = state.position.tolist(), now - state.time
+            (x, y), elapsed = pair(state.position), now - state.time
             if elapsed > 0.0:
-                vx, vy = state.velocity.tolist()
+                vx, vy = pair(state.velocity)
                 x, y = x + elapsed * vx, y + elapsed * vy
             places.append((x, y))
         if len(places) >= 2:

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 from ..core import Configurable, Parameter, array_parameter
-from .messages import Array
+from .arrays import Array
 
 if TYPE_CHECKING:
     from .numerics.barrier import Solution

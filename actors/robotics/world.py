@@ -6,14 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, counted
 from ..core.elementary import cos, hypot, sin
-from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, all_finite, enclosing
-
-# Of floats: arithmetic on arrays of two takes ten times as long.
-Pair = tuple[float, float]
+from .arrays import Pair, all_finite, pair
+from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, enclosing
 
 
 class Vehicle(Actor):
@@ -35,8 +32,8 @@ class Vehicle(Actor):
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=0, doc="a harder control is shortened to this")
 
     def initialize(self) -> None:
-        self._position = _pair(self.start)
-        self._velocity = shortened(_pair(self.start_velocity), self.max_speed)
+        self._position = pair(self.start)
+        self._velocity = shortened(pair(self.start_velocity), self.max_speed)
         self._held: Pair = 0.0, 0.0
         self._next = self._held
         self._moved_at: int | None = None
@@ -49,7 +46,7 @@ class Vehicle(Actor):
             self._held = self._next
             self._moved_at = now
             self.state.send(BodyState(self._position, self._velocity, self.now))
-        if self.acceleration.present and all_finite(wanted := _pair(self.acceleration.value)):
+        if self.acceleration.present and all_finite(wanted := pair(self.acceleration.value)):
             self._next = shortened(wanted, self.max_acceleration)
             if self._moved_at == now:
                 self._held = self._next
@@ -65,11 +62,6 @@ def shortened(vector: Pair, longest: float) -> Pair:
     x, y = vector
     length = hypot(x, y)
     return (x * (longest / length), y * (longest / length)) if length > longest else vector
-
-
-def _pair(values: ArrayLike) -> Pair:
-    x, y = np.asarray(values, dtype=float).tolist()
-    return x, y
 
 
 class CircularMotion(Actor):
@@ -97,7 +89,7 @@ class CircularMotion(Actor):
         # The chord of the arc travelled: right for any turn rate, 0 included.
         chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
         direction, heading = self.heading + turned / 2.0, self.heading + turned
-        x, y = self.start.tolist()
+        x, y = pair(self.start)
         position = x + chord * cos(direction), y + chord * sin(direction)
         velocity = self.speed * cos(heading), self.speed * sin(heading)
         self.state.send(BodyState(position, velocity, now))
@@ -138,24 +130,24 @@ class Sensor(Actor):
         self._name = self.robot_name or enclosing(self.path)
 
     def fire(self) -> None:
-        error_along, error_across = self._draw(2).tolist()
+        error_along, error_across = self._draw(), self._draw()
         if not (self.robot.present and self.target.present):
             return
         robot = self.robot.value
         position = robot.position
         believed = self.location.value.position if self.location.present else position
         # Floats: arithmetic on arrays of two takes ten times as long.
-        (tx, ty), (x, y) = self.target.value.position.tolist(), position.tolist()
+        (tx, ty), (x, y) = pair(self.target.value.position), pair(position)
         dx, dy = tx - x, ty - y
         distance = hypot(dx, dy)
         if self.max_range is not None and distance > self.max_range:
             return
         along, across = self.along * error_along, self.across * error_across
         if self.kind == RANGE:
-            value = [distance + along]
+            value: tuple[float, ...] = (distance + along,)
         else:
             nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
-            value = [dx + along * nx - across * ny, dy + along * ny + across * nx]
+            value = dx + along * nx - across * ny, dy + along * ny + across * nx
         self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, robot.time))
 
 

@@ -95,8 +95,9 @@ class RandomLoss(LossAspect):
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
         lost = self.draw(point)
-        first = point.memory.setdefault("first tag", point.tag) if self.spare_first else None
-        return lost and point.tag != first
+        if self.spare_first and (lost or "first tag" not in point.memory):
+            return point.tag != point.memory.setdefault("first tag", point.tag) and lost
+        return lost
 
 
 def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:

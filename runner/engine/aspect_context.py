@@ -62,7 +62,7 @@ class EngineContext:
 
     def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
         """Write an act of an aspect into the log."""
-        self._log.add(self._director.tag, event, owner, port, None, aspect, token)
+        self._log.writer(event, owner, port, None, aspect).write(self._director.now(), token)
 
     def record(self, signal: str, token: Any) -> None:
         """Append a token to a signal of the results."""

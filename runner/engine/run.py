@@ -12,7 +12,7 @@ from typing import Any
 from epicycle.actors import Actor, Way, to_seconds
 
 from ..build import Model
-from ..collection import without_collection
+from ..collection import seldom_collecting, without_collection
 from ..graph import WovenAspect
 from ..interrupt import between_steps
 from ..results import EventLog, Record, Results, Signal
@@ -118,7 +118,7 @@ class Run:
         try:
             if not self.is_begun:
                 self._begin()
-            with nullcontext() if most == 1 else between_steps(self.director.interrupt):
+            with nullcontext() if most == 1 else between_steps(self.director.interrupt), seldom_collecting():
                 self.stopped = self.director.run(stop, list(self.actors.values()), progress, pace, most)
         except BaseException as error:
             self.end()

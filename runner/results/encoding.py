@@ -87,6 +87,11 @@ def canonical(token: Any) -> bytes:
     return encoders[type(token)](token)
 
 
+def is_record(cls: type) -> bool:
+    """Whether the tokens of a type are encoded field by field."""
+    return dataclasses.is_dataclass(cls) and not issubclass(cls, (type, float, np.ndarray))
+
+
 def _encoder(cls: type) -> Encode:
     """What makes bytes of the tokens of one type."""
     if issubclass(cls, float):
@@ -95,7 +100,7 @@ def _encoder(cls: type) -> Encode:
         return _array
     if issubclass(cls, np.ndarray):
         return lambda token: _array(np.asarray(token))
-    if dataclasses.is_dataclass(cls) and not issubclass(cls, type):
+    if is_record(cls):
         return _fields_encoder(cls)
     if cls is type(None):
         return lambda _: b"n"

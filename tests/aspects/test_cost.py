@@ -28,4 +28,4 @@ def test_an_aspect_that_is_off_costs_nothing() -> None:
 @pytest.mark.parametrize("place", ["nowhere", "elsewhere", "around"])
 def test_an_aspect_elsewhere_costs_the_same_however_long_the_run(place: str) -> None:
     assert 0 < further(place, "25 ms") == further(place, "75 ms") <= 100
-    assert further("here", "75 ms") > 2.5 * further("here", "25 ms") > 500 / 3
+    assert further("here", "75 ms") - further("here", "25 ms") >= 50  # one for each token, however much is compiled

@@ -22,7 +22,7 @@ from typing import Any, BinaryIO, Protocol
 
 from epicycle.actors import EpicycleError
 
-from ...collection import seldom_collecting
+from ...collection import keep_for_good, seldom_collecting
 
 MAX_STILLBORN = 5  # processes in a row that end before they can do anything
 _LOOK = 0.5  # s between two looks whether a run is still wanted
@@ -214,11 +214,15 @@ def serve() -> None:
             begin, arguments = given.get()
             bench: Bench = begin(*arguments)
             tell(READY)
+            is_settled = False
             while True:
                 request = given.get()
                 bench.prepare(request)
                 tell(BEGUN)
                 tell(DONE, bench.make(request))
+                if not is_settled:  # what a first run has loaded, none of the next needs to be looked through for
+                    keep_for_good()
+                    is_settled = True
     except BrokenPipeError:
         os._exit(1)
     except EpicycleError as error:

@@ -1,0 +1,9 @@
+# Types for C; what everything is for is said in arrays.py.
+
+cpdef read_only(value)
+cpdef array_of(numbers)
+cpdef tuple pair(values)
+cpdef bint all_finite(numbers) except -1
+cpdef bint finite(array) except -1
+cpdef joined(numbers, array)
+cpdef stacked(rows, Py_ssize_t columns)
