@@ -32,6 +32,7 @@ BETTER = 1e-3  # relative, or absolute below 1: objectives nearer than this are 
 KEPT = 1e-4  # m; peers keep constraints to their own tolerances
 AUTHORS = 155.0 / 10.0  # s of CPU for a second of model time, on two cores like those that all this was made for
 OURS = "ours"
+MS = 1e-3, "ms"
 LOCAL = (
     "the problem is not convex, and each solver ends in the optimum that it comes to first, on this side of the "
     "obstacle or on the other"
@@ -101,18 +102,19 @@ def horizon_problems(count: int) -> Iterator[Row]:
             cases[name][case] += 1
         built.add(shape_of(problem))
     results = {name: [median(each) for each in rounds] for name, rounds in times.items()}
-    work = "horizon problem, one solve"
-    for name, goal in zip(PEERS, (150.0, 30.0, None), strict=True):
-        yield compare(work, results, name, OURS, how=how, goal=goal, unit=(1e-3, "ms"))
-    scaled = 30.0 * median(results[OURS]) / median(results["CasADi IPOPT"])
-    limit = "0.15 ms where IPOPT takes 30"
-    alone = median(seconds(lambda p=problem, s=starts: barrier.solve(p, s))[0] for problem, starts, _ in problems)
-    scaled_alone = 30.0 * alone / median(results["CasADi IPOPT"])
     reason = (
-        "ours are timed right after the peers, with nothing of them in the processor's caches; one after the other "
-        f"they take {1000 * alone:.2g} ms each, {scaled_alone:.2g} ms where IPOPT takes 30"
+        "a solve of ours is timed right after the peers', with nothing of it in the processor's caches, which takes "
+        "longer than the solve; one solve of ours after the other is told below"
     )
-    yield Row(work, "CasADi IPOPT", f"{scaled:.3g} ms where IPOPT takes 30", limit, scaled <= 0.15, how, reason)
+    for name, goal in zip(PEERS, (400.0, 100.0, None), strict=True):
+        yield compare("horizon problem, one solve", results, name, OURS, how=how, goal=goal, unit=MS, reason=reason)
+    results[OURS] = [
+        median(seconds(lambda p=problem, s=starts: barrier.solve(p, s))[0] for problem, starts, _ in problems)
+        for _ in range(ROUNDS)
+    ]
+    how = "the same, but all of ours one after the other, after the peers"
+    for name in PEERS:
+        yield compare("horizon problem, ours in a row", results, name, OURS, how=how, unit=MS)
     for name, found in cases.items():
         text = (
             f"ours equal in {found['equal']}, better in {found['better']}, worse in {found['worse']}; "
@@ -144,7 +146,7 @@ def stops() -> Iterator[Row]:
         f"{PROBLEMS} problems recorded from 20 runs of collision_avoidance, each solved to 1e-5 and as far as the "
         f"scenario asks for, in {most:.1f} and {least:.1f} Newton steps; CPU time"
     )
-    yield compare("horizon problem, one solve", results, names[0], names[1], how=how, unit=(1e-3, "ms"))
+    yield compare("horizon problem, one solve", results, names[0], names[1], how=how, unit=MS)
 
 
 def filters() -> Iterator[Row]:
@@ -158,18 +160,18 @@ def filters() -> Iterator[Row]:
     transition = ukf.constant_velocity(0.1)
     observers = random.uniform(-20.0, 30.0, size=(steps, count, 2))
     values = np.array([12.0, 0.0]) - observers + random.normal(size=observers.shape)
-    # Their deviations are in the ellipse.
-    kinds, unused = np.full((steps, count, 1), ukf.RELATIVE_POSITION), np.zeros((steps, count, 2))
-    measurements = np.concatenate([kinds, observers, values, unused], axis=2)
-    ellipse = np.array([[1.0, 0.3, 2.0]] * count)
-    stacked = np.kron(np.eye(count), [[1.0, 0.3], [0.3, 2.0]])
+    # As likely in all directions: FilterPy is given the covariance that ours works out from there.
+    kinds, deviations = np.full((steps, count, 1), ukf.RELATIVE_POSITION), np.full((steps, count, 2), 1.5)
+    measurements = np.concatenate([kinds, observers, values, deviations], axis=2)
+    stacked = 1.5 * 1.5 * np.eye(2 * count)
     ended: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
     def ours() -> None:
         mean, covariance = prior
         for step in range(steps):
-            mean, covariance = ukf.predict(mean, covariance, transition, noise)
-            mean, covariance = ukf.update(mean, covariance, 0.0, measurements[step], ellipse)
+            mean, covariance, _ = ukf.predict_and_fuse(
+                mean, covariance, transition, noise, 0.0, measurements[step], False
+            )
         ended[OURS] = mean, covariance
 
     def theirs() -> None:
@@ -188,7 +190,7 @@ def filters() -> Iterator[Row]:
     for mine, other in zip(ended[OURS], ended["FilterPy"], strict=True):
         np.testing.assert_allclose(mine, other, atol=1e-8)
     how = "200 steps in each of 7 rounds, three relative positions a step; both end in the same state to 1e-8; CPU time"
-    yield compare("filter, predict + update", results, "FilterPy", OURS, how=how, goal=30.0, unit=(1e-6, "us"))
+    yield compare("filter, predict + update", results, "FilterPy", OURS, how=how, goal=60.0, unit=(1e-6, "us"))
 
 
 def scenario() -> Iterator[Row]:
@@ -207,8 +209,8 @@ def scenario() -> Iterator[Row]:
         work,
         "the authors' Ptolemy II model",
         f"{ratio:.0f}x ({1000 * median(found):.1f} ms of CPU for a second of model time against {AUTHORS:.1f} s)",
-        ">= 1000x",
-        ratio >= 1000.0,
+        ">= 2000x",
+        ratio >= 2000.0,
         "10 runs to the arrival, seeds 0 to 9, with log digest and metrics, CPU time; the authors' figure is 155 s of "
         "CPU for 10 s of model time, measured once on a machine with 2 cores",
         of_the_pace(work, 1000 * median(found), "ms", paces),
@@ -241,7 +243,7 @@ def compiling() -> Iterator[Row]:
     paces.append(pace())
     how = "an empty cache, then a filled one, each in a new process, twice; CPU time"
     for work, limit, found in (
-        ("compiling all kernels", 20.0, median(took[::2])),
+        ("compiling all kernels", 15.0, median(took[::2])),
         ("loading the compiled kernels", None, median(took[1::2])),
     ):
         goal = f"<= {limit:g} s" if limit else ""

@@ -41,7 +41,7 @@ def rows(rounds: int = 9) -> Iterator[Row]:
     """The table's lines."""
     epicycle = [sys.executable, "-m", "epicycle.runner.cli"]
     commands = {
-        "epicycle run of a tiny model": ([*epicycle, "run", "tiny.yaml"], 0.8),
+        "epicycle run of a tiny model": ([*epicycle, "run", "tiny.yaml"], 0.5),
         "epicycle validate of a tiny model": ([*epicycle, "validate", "tiny.yaml"], None),
         "python -c 'import numpy'": ([sys.executable, "-c", "import numpy"], None),
     }

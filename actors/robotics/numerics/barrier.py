@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, borrower, kernel
+from .compiled import Array, borrower, lent
 from .constraints import BOUND, ROUNDING, VALUE
 from .horizon import HorizonProblem
 from .newton import newton_step
@@ -41,6 +41,7 @@ from .task import (
     move,
     new_task,
     objective_of,
+    room_for,
     take,
 )
 
@@ -228,16 +229,17 @@ def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solu
     hardest braking that f2 allows.  Never raises, and the controls are finite and keep f2 whatever is asked; where
     numbers of the problem are not finite, or too large to be squared, the violation may be inf.
     """
+    best, room = np.empty(starts.shape[1:]), room_for(problem, starts.shape[1])
     # Field by field, as numba takes 4 us longer to look at a named tuple.
-    return Solution(*_solve(*problem, *rules, starts))
+    return Solution(best, *_solve(*problem, *rules, starts, best, room))
 
 
-@kernel
-def _solve(*fields: Any) -> tuple[Array, float, float, int]:
-    """The fields of the problem and the rules, then the starts."""
-    problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
+@lent
+def _solve(*fields: Any) -> tuple[float, float, int]:
+    """The fields of the problem and the rules; the starts, where the plan goes, and room to work in."""
+    problem, rules, (starts, best, room) = HorizonProblem(*fields[:-7]), Rules(*fields[-7:-3]), fields[-3:]
     free = min(rules.free, starts.shape[1]) if rules.free > 0 else starts.shape[1]
-    task, best = new_task(problem, starts.shape[1], free, ROUNDING), np.empty(starts.shape[1:])
+    task = new_task(problem, starts.shape[1], free, ROUNDING, room)
     plan = task.plan
     least, iterations = math.inf, 0
     for index in range(starts.shape[0]):
@@ -258,10 +260,12 @@ def _solve(*fields: Any) -> tuple[Array, float, float, int]:
         if least == 0.0:
             break
     if least == math.inf or (least > 0.0 and rules.infeasible == BRAKE):
-        task = new_task(problem, starts.shape[1], free, math.inf)  # what is out of reach is so within f1 and f2 only
+        task = new_task(
+            problem, starts.shape[1], free, math.inf, room
+        )  # what is out of reach is so within f1 and f2 only
         _brake(task, 0.999)
         _read(task.plan, best)
-        return best, max(0.0, look(task)), math.inf, iterations
+        return max(0.0, look(task)), math.inf, iterations
     for s in range(plan.shape[0]):
         plan[s, TAKEN], plan[s, TAKEN + 1] = best[s, 0], best[s, 1]
     if least > 0.0 and rules.infeasible == LEAST_VIOLATION:
@@ -271,4 +275,4 @@ def _solve(*fields: Any) -> tuple[Array, float, float, int]:
         taken, objective = _optimise(task, rules.gap, rules.last_parameter)
     _read(plan, best)
     largest = look(task)
-    return best, largest if largest > TOLERANCE else 0.0, objective, iterations + taken
+    return largest if largest > TOLERANCE else 0.0, objective, iterations + taken

@@ -28,7 +28,7 @@ def _compiled(function: Function, **options: bool) -> Function:
     return cast(Function, compiler(error_model="numpy", fastmath=False, no_cfunc_wrapper=True, **options)(function))
 
 
-def kernel(function: Function) -> Function:
+def kernel(function: Function, counts: bool = True) -> Function:
     """Compile a pure function on arrays; ``error_model="numpy"`` gives inf and NaN instead of exceptions.
 
     Compiled code lies in a folder named after all sources of this package and of the elementary functions.  By itself
@@ -44,9 +44,17 @@ def kernel(function: Function) -> Function:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "epicycle"
     config.CACHE_DIR = str(folder / _SOURCES)
     try:
-        return _compiled(function, cache=True, _nrt=True)
+        return _compiled(function, cache=True, _nrt=counts)
     finally:
         config.CACHE_DIR = before
+
+
+def lent(function: Function) -> Function:
+    """A ``kernel`` that is lent all arrays it works in and returns none, as a ``borrower``.
+
+    On the way in from Python, numba allocates something of its own for each array otherwise.
+    """
+    return kernel(function, counts=False)
 
 
 def inner(function: Function) -> Function:

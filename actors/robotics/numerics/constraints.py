@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from .compiled import Array, borrower, inlined, inner
+from .compiled import Array, borrower, inlined
 from .horizon import HorizonProblem
 from .terms import Term, keep_away, keep_away_uncertain, stay_near
 
@@ -21,18 +19,17 @@ MARGIN = 5  # alpha, if it is an obstacle; 0 otherwise
 XX, XY, YY = 6, 7, 8  # m^2, the obstacle's covariance
 BOUND = 9  # m, what a solver lets the constraint's value be at most
 VALUE = 10  # m, the value where the solver has looked at it last
-_COLUMNS = 11
+CONSTRAINT = 11  # columns in all
 
 
-@inner
-def constraints_of(problem: HorizonProblem, spare: float) -> Array:
-    """All that bind but those that any plan keeps by more than ``spare``, which may be inf.
+@borrower
+def constraints_of(problem: HorizonProblem, spare: float, table: Array) -> int:
+    """Write all that bind but those that any plan keeps by more than ``spare``, which may be inf; returns how many.
 
     Steps 1 and 2 are decided before U_{t+1} acts: none bind there.
     """
     steps, obstacles, peers = problem.tube_radius.shape[0], problem.obstacle_mean.shape[0], problem.peer_mean.shape[0]
     count = 0
-    table = np.zeros(((1 + obstacles + peers) * steps, _COLUMNS))
     for other in range(1 + obstacles + peers):
         for s in range(2, steps):
             margin = xx = xy = yy = 0.0
@@ -56,7 +53,7 @@ def constraints_of(problem: HorizonProblem, spare: float) -> Array:
                 table[count, X], table[count, Y], table[count, MARGIN] = x, y, margin
                 table[count, XX], table[count, XY], table[count, YY] = xx, xy, yy
                 count += 1
-    return table[:count]
+    return count
 
 
 @borrower

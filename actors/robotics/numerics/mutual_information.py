@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from ...core.elementary import exp, hypot, log
-from .compiled import Array, borrower, inner, kernel
+from .compiled import Array, borrower, kernel
 from .terms import Term
 
 
@@ -45,26 +45,25 @@ _DIRECTION = 4  # vector u, the gradient of r
 _BEND = 6  # (xx, xy, yy) of the Hessian of r, (1 - u u^T) / r
 _SUM = 9  # sum over j of w_j exp(-E_ij), later its inverse
 _MEAN = 10  # sum over j of q_ij grad E_ij
-_PAIRS = 12  # others_distance_ij for all j < i, each followed by exp(-E_ij)
+PAIRS = 12  # others_distance_ij for all j < i, each followed by exp(-E_ij)
 
 
-@inner
-def new_points(sigma_positions: Array, weights: Array, others_distance: Array) -> Array:
-    """The sigma points that have a weight, with room for ``informed``."""
-    points = np.empty((weights.shape[0], _PAIRS + 2 * weights.shape[0]))
+@borrower
+def new_points(sigma_positions: Array, weights: Array, others_distance: Array, points: Array) -> int:
+    """Write the sigma points that have a weight, in rows with room for ``informed``; returns how many."""
     count = 0
     for i in range(weights.shape[0]):
         if weights[i] == 0.0:
             continue
         points[count, _PLACE], points[count, _PLACE + 1] = sigma_positions[i, 0], sigma_positions[i, 1]
         points[count, _WEIGHT] = weights[i]
-        column = _PAIRS
+        column = PAIRS
         for j in range(i):
             if weights[j] != 0.0:
                 points[count, column] = others_distance[i, j]
                 column += 2
         count += 1
-    return points[:count]
+    return count
 
 
 @borrower
@@ -91,8 +90,8 @@ def informed(points: Array, x: float, y: float, variance: float) -> Term:
         total = weight
         for j in range(i):
             difference = r - points[j, _RANGE]
-            likeness = exp(-0.5 * precision * difference * difference - points[i, _PAIRS + 2 * j])
-            points[i, _PAIRS + 2 * j + 1] = likeness
+            likeness = exp(-0.5 * precision * difference * difference - points[i, PAIRS + 2 * j])
+            points[i, PAIRS + 2 * j + 1] = likeness
             total += points[j, _WEIGHT] * likeness
             points[j, _SUM] += weight * likeness
         points[i, _SUM] = total
@@ -108,7 +107,7 @@ def informed(points: Array, x: float, y: float, variance: float) -> Term:
             dx, dy = ux - points[j, _DIRECTION], uy - points[j, _DIRECTION + 1]
             slope, other = precision * (r - points[j, _RANGE]), points[j, _WEIGHT]
             ex, ey = slope * dx, slope * dy
-            likeness = points[i, _PAIRS + 2 * j + 1]
+            likeness = points[i, PAIRS + 2 * j + 1]
             here, there = other * likeness * share, weight * likeness * points[j, _SUM]  # q_ij and q_ji
             mx += here * ex
             my += here * ey

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from .compiled import Array, borrower, inlined, inner
+from .compiled import Array, borrower, inlined
 from .terms import Term
 
 Vector = tuple[float, float]
@@ -30,13 +28,7 @@ STEP = 15  # vector, the Newton step in the control: -(constant + by_position * 
 _CONSTANT = 17  # vector
 _BY_POSITION = 19  # matrix
 _BY_VELOCITY = 23  # matrix
-_COLUMNS = 27
-
-
-@inner
-def new_stages(steps: int) -> Array:
-    """The zero function over a horizon."""
-    return np.zeros((steps, _COLUMNS))
+STAGE = 27  # columns in all; zeros are the zero function
 
 
 @borrower

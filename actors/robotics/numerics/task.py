@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.elementary import log
-from .compiled import Array, borrower, inlined, inner
-from .constraints import BOUND, MARGIN, VALUE, WHEN, X, Y, certainly_kept, circle, constraints_of, term
+from .compiled import Array, borrower, inlined
+from .constraints import BOUND, CONSTRAINT, MARGIN, VALUE, WHEN, X, Y, certainly_kept, circle, constraints_of, term
 from .horizon import REACH_GOAL, HorizonProblem
-from .mutual_information import informed, new_points
-from .newton import CONTROL, STEP, VELOCITY, Quadratic, Vector, add, clear, new_stages, put
+from .mutual_information import PAIRS, informed, new_points
+from .newton import CONTROL, STAGE, STEP, VELOCITY, Quadratic, Vector, add, clear, put
 from .terms import Term, smoothed, stay_near
 
 _SHARE = 0.8  # of the way to the nearest limit that a step goes at most
@@ -25,7 +25,7 @@ _TRIED = 4  # the controls that position and velocity follow from
 TAKEN = 6  # the best controls so far
 _SHIFT = 8  # of the position, by a whole Newton step
 _TARGET = 10  # where the obstacle is that f6 is about
-_COLUMNS = 12
+_COLUMNS = 12  # in all
 
 
 class Phase(IntEnum):
@@ -55,12 +55,29 @@ class Task(NamedTuple):
     points: Array  # of ``mutual_information``; none unless the objective is eq. (5) and there is an obstacle
 
 
-@inner
-def new_task(problem: HorizonProblem, steps: int, free: int, spare: float) -> Task:
-    plan, seeks = np.zeros((steps, _COLUMNS)), problem.objective == REACH_GOAL
-    points = plan[:0]
+def room_for(problem: HorizonProblem, steps: int) -> Array:
+    """Room for the tables of a task."""
+    binding = (1 + len(problem.obstacle_mean) + len(problem.peer_mean)) * len(problem.tube_radius)
+    points = len(problem.sigma_weights)
+    return np.empty(steps * (_COLUMNS + STAGE) + binding * CONSTRAINT + points * (PAIRS + 2 * points))
+
+
+@borrower
+def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room: Array) -> Task:
+    """With its tables in ``room``, one after the other; for callers that do not count who holds them either."""
+    binding = (1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0]) * problem.tube_radius.shape[0]
+    weights, seeks = problem.sigma_weights, problem.objective == REACH_GOAL
+    second = steps * _COLUMNS
+    third = second + steps * STAGE
+    fourth = third + binding * CONSTRAINT
+    for i in range(third):
+        room[i] = 0.0
+    plan, stages = room[:second].reshape((steps, _COLUMNS)), room[second:third].reshape((steps, STAGE))
+    constraints = room[third:fourth].reshape((binding, CONSTRAINT))
+    points = room[fourth:].reshape((weights.shape[0], PAIRS + 2 * weights.shape[0]))
+    count = 0
     if not seeks and problem.obstacle_mean.shape[0] > 0:
-        points = new_points(problem.sigma_positions, problem.sigma_weights, problem.others_distance)
+        count = new_points(problem.sigma_positions, weights, problem.others_distance, points)
         for s in range(steps):
             for c in range(2):
                 plan[s, _TARGET + c] = problem.obstacle_mean[0, s, c]
@@ -77,9 +94,9 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float) -> Ta
         reach=problem.measurement_range,
         free=free,
         plan=plan,
-        stages=new_stages(steps),
-        constraints=constraints_of(problem, spare),
-        points=points,
+        stages=stages,
+        constraints=constraints[: constraints_of(problem, spare, constraints)],
+        points=points[:count],
     )
 
 

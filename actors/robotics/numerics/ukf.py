@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, inner, kernel
+from .compiled import Array, borrower, inner, kernel
 
 RELATIVE_POSITION = 0
 RANGE = 1
@@ -59,9 +59,17 @@ def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, A
 
 @inner
 def turned(a: Array, b: Array, onto: Array) -> Array:
-    """onto + a @ b @ a.T summed in index order, so that no BLAS decides the last bits."""
+    """onto + a @ b @ a.T."""
+    result = onto.copy()
+    _add_turned(result, np.zeros(a.shape), a, b)
+    return result
+
+
+@borrower
+def _add_turned(result: Array, half: Array, a: Array, b: Array) -> None:
+    """Add a @ b @ a.T, of which ``half``, zeros, becomes a @ b; summed in index order, so that no BLAS decides the
+    last bits."""
     size, inside = a.shape
-    half, result = np.zeros((size, inside)), onto.copy()
     for i in range(size):
         for k in range(inside):
             if a[i, k] != 0.0:
@@ -71,10 +79,9 @@ def turned(a: Array, b: Array, onto: Array) -> Array:
         for j in range(size):
             for k in range(inside):
                 result[i, j] += half[i, k] * a[j, k]
-    return result
 
 
-@inner
+@borrower
 def _add_products(result: Array, weights: Array, a: Array, b: Array) -> None:
     """Add sum_i weights_i a_i b_i^T."""
     for i in range(weights.shape[0]):
@@ -93,13 +100,12 @@ def mapped(a: Array, x: Array) -> Array:
     return result
 
 
-@inner
-def _symmetric(a: Array) -> Array:
-    """The mean of a and its transpose, in place; in loops, as array expressions take seconds to compile."""
+@borrower
+def _symmetrise(a: Array) -> None:
+    """Take the mean of a and its transpose; in loops, as array expressions take seconds to compile."""
     for i in range(a.shape[0]):
         for j in range(i):
             a[i, j] = a[j, i] = 0.5 * (a[i, j] + a[j, i])
-    return a
 
 
 @kernel
@@ -119,7 +125,8 @@ def predict(mean: Array, covariance: Array, transition: Array, process_noise: Ar
     for i in range(spread.shape[0]):
         for j in range(spread.shape[1]):
             spread[i, j] += process_noise[i, j]
-    return mapped(transition, mean), _symmetric(spread)
+    _symmetrise(spread)
+    return mapped(transition, mean), spread
 
 
 @kernel
@@ -157,14 +164,20 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
     sum_i w_i e_i e_i^T + K R K^T with e_i = (x_i - x) - K (z_i - z), which is C - K S K^T written so that rounding
     cannot make it indefinite (weights are not negative for kappa >= 0).
     """
-    size = mean.shape[0]
-    points, weights = sigma_points(mean, covariance, kappa)
-    count = points.shape[0]
+    updated, spread = mean.copy(), covariance.copy()
+    if measurements.shape[0] > 0:
+        points, weights = sigma_points(mean, covariance, kappa)
+        _fuse(updated, spread, points, weights, measurements, noises)
+    return updated, spread
+
+
+@inner
+def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measurements: Array, noises: Array) -> None:
+    """``update`` in place, with the sigma points, which are used up."""
+    size, count = mean.shape[0], points.shape[0]
     rows = 0
     for m in range(measurements.shape[0]):
         rows += 1 if measurements[m, _KIND] == RANGE else 2
-    if rows == 0:
-        return mean.copy(), covariance.copy()
     noise, images, observed = np.zeros((rows, rows)), np.empty((count, rows)), np.empty(rows)
     row = 0
     for m in range(measurements.shape[0]):
@@ -191,22 +204,32 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
     for i in range(count):
         for j in range(size):
             points[i, j] -= mean[j]
-    innovation_covariance, cross = noise.copy(), np.zeros((size, rows))
+    innovation_covariance, cross, half = noise.copy(), np.zeros((size, rows)), np.zeros((size, rows))
     _add_products(innovation_covariance, weights, images, images)
     _add_products(cross, weights, points, images)
     gain = _gain(innovation_covariance, cross)
-    updated = mean.copy()
     for j in range(size):
+        for k in range(size):
+            covariance[j, k] = 0.0
         for k in range(rows):
-            updated[j] += gain[j, k] * observed[k]
+            mean[j] += gain[j, k] * observed[k]
             for i in range(count):
                 points[i, j] -= gain[j, k] * images[i, k]
-    spread = turned(gain, noise, np.zeros((size, size)))
-    _add_products(spread, weights, points, points)
-    return updated, _symmetric(spread)
+    _add_turned(covariance, half, gain, noise)
+    _add_products(covariance, weights, points, points)
+    _symmetrise(covariance)
 
 
-@inner
+@borrower
+def _copy(mean: Array, covariance: Array, to: Array, spread: Array) -> None:
+    """In loops, as numba compiles half of its strings for what the assignment of an array says of other shapes."""
+    for i in range(mean.shape[0]):
+        to[i] = mean[i]
+        for j in range(mean.shape[0]):
+            spread[i, j] = covariance[i, j]
+
+
+@borrower
 def _finite(mean: Array, covariance: Array) -> bool:
     for i in range(mean.shape[0]):
         if not abs(mean[i]) < math.inf:
@@ -217,7 +240,6 @@ def _finite(mean: Array, covariance: Array) -> bool:
     return True
 
 
-@kernel
 def predict_and_fuse(
     mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
     averaged: bool,
@@ -227,18 +249,33 @@ def predict_and_fuse(
     All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  Where
     the result would not be finite, the prediction stands.
     """
+    then, spread = np.empty(mean.shape), np.empty(covariance.shape)  # cheaper than what a kernel makes and returns
+    is_fused = _predict_and_fuse(
+        mean, covariance, transition, process_noise, kappa, measurements, averaged, then, spread
+    )
+    return then, spread, is_fused
+
+
+@kernel
+def _predict_and_fuse(
+    mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
+    averaged: bool, then: Array, spread: Array,
+) -> bool:  # fmt: skip
+    """Writes the state and its covariance ``then``; returns whether anything was fused."""
     mean, covariance = predict(mean, covariance, transition, process_noise)
+    _copy(mean, covariance, then, spread)
     if measurements.shape[0] == 0:
-        return mean, covariance, False
+        return False
     points, weights = sigma_points(mean, covariance, kappa)
-    if not averaged:
-        points, weights = points[:1], weights[:1]
-        weights[0] = 1.0  # of the mean
-    noises = measurement_noise(points, weights, measurements)
-    fused, spread = update(mean, covariance, kappa, measurements, noises)
-    if _finite(fused, spread):
-        return fused, spread, True
-    return mean, covariance, False
+    if averaged:
+        noises = measurement_noise(points, weights, measurements)
+    else:
+        noises = measurement_noise(points[:1], np.ones(1), measurements)  # of the mean
+    _fuse(then, spread, points, weights, measurements, noises)
+    if not _finite(then, spread):
+        _copy(mean, covariance, then, spread)
+        return False
+    return True
 
 
 @inner

@@ -15,8 +15,8 @@ reachability = importlib.import_module(PREFIX + "reachability")
 ukf = importlib.import_module(PREFIX + "ukf")
 
 # Called by kernels only; numba looks them up as globals.
-informed = importlib.import_module(PREFIX + "mutual_information").informed
-new_points = importlib.import_module(PREFIX + "mutual_information").new_points
+information = importlib.import_module(PREFIX + "mutual_information")
+informed, new_points, PAIRS = information.informed, information.new_points, information.PAIRS
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -37,7 +37,8 @@ def check_derivatives(function: Callable[[float, float], Six], x: float, y: floa
 def negative_information(
     x: float, y: float, points: np.ndarray, weights: np.ndarray, others_distance: np.ndarray, variance: float
 ) -> Six:
-    return informed(new_points(points, weights, others_distance), x, y, variance)
+    table = np.empty((len(weights), PAIRS + 2 * len(weights)))
+    return informed(table[: new_points(points, weights, others_distance, table)], x, y, variance)
 
 
 def spread(random: np.random.Generator, size: int) -> np.ndarray:

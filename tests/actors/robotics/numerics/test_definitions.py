@@ -29,6 +29,7 @@ terms = importlib.import_module(PREFIX + "terms")
 ukf = importlib.import_module(PREFIX + "ukf")
 # Called by kernels only; numba looks them up as globals.
 HorizonProblem, constraints_of, term = horizon.HorizonProblem, constraints.constraints_of, constraints.term
+CONSTRAINT = constraints.CONSTRAINT
 ball, keeps_limits, new_task, smoothed, TAKEN = task._ball, task.keeps_limits, task.new_task, terms.smoothed, task.TAKEN
 
 PAPER = Path(__file__).parents[4] / "docs" / "paper.md"
@@ -64,10 +65,11 @@ def test_limits_of_speed_and_acceleration(random: np.random.Generator) -> None:
     assert definitions.f2(vectors, 8.0) == pytest.approx((vectors**2).sum(axis=1) - 64.0)
 
 
-@numba.njit
-def keeps(controls: np.ndarray, *fields: Any) -> bool:
-    posed = new_task(HorizonProblem(*fields), len(controls), len(controls), np.inf)
-    posed.plan[:, TAKEN : TAKEN + 2] = controls
+@numba.njit(_nrt=False)
+def keeps(controls: np.ndarray, room: np.ndarray, *fields: Any) -> bool:
+    posed = new_task(HorizonProblem(*fields), len(controls), len(controls), np.inf, room)
+    for s in range(len(controls)):
+        posed.plan[s, TAKEN], posed.plan[s, TAKEN + 1] = controls[s, 0], controls[s, 1]
     return keeps_limits(posed)
 
 
@@ -80,7 +82,7 @@ def test_who_keeps_the_limits(random: np.random.Generator) -> None:
         controls = random.normal(scale=3.0, size=(10, 2))
         velocities = definitions.driven(problem, controls)[1][1:]
         worst = max(definitions.f1(velocities, 5.0).max(), definitions.f2(controls, 8.0).max())
-        assert keeps(controls, *problem) == (worst < 0.0)
+        assert keeps(controls, task.room_for(problem, 10), *problem) == (worst < 0.0)
         kept.append(worst < 0.0)
     assert 20 < sum(kept) < 180
 
@@ -159,7 +161,8 @@ def test_f6_without_its_kink(gamma: float, g: float) -> None:
 
 @numba.njit
 def all_values(positions: np.ndarray, rows: int, *fields: Any) -> np.ndarray:
-    table = constraints_of(HorizonProblem(*fields), np.inf)
+    table = np.empty((rows * len(positions), CONSTRAINT))
+    table = table[: constraints_of(HorizonProblem(*fields), np.inf, table)]
     found = np.full((rows, len(positions)), np.nan)
     for i in range(len(table)):
         s = int(table[i, 1])

@@ -11,7 +11,7 @@ from tests.actors.robotics.numerics.numerics_parts import PREFIX, spread
 horizon = importlib.import_module(PREFIX + "horizon")
 newton = importlib.import_module(PREFIX + "newton")
 # Called by kernels only; numba looks them up as globals.
-new_stages, newton_step = newton.new_stages, newton.newton_step
+newton_step, STAGE = newton.newton_step, newton.STAGE
 POSITION, VELOCITY, CONTROL, STEP = newton.POSITION, newton.VELOCITY, newton.CONTROL, newton.STEP
 
 
@@ -19,7 +19,7 @@ POSITION, VELOCITY, CONTROL, STEP = newton.POSITION, newton.VELOCITY, newton.CON
 def riccati(
     position: np.ndarray, velocity: np.ndarray, control: np.ndarray, period: float, free: int
 ) -> tuple[float, np.ndarray]:
-    stages = new_stages(len(control))
+    stages = np.zeros((len(control), STAGE))
     stages[:, POSITION : POSITION + 5] = position
     stages[:, VELOCITY : VELOCITY + 5] = velocity
     stages[:, CONTROL : CONTROL + 5] = control
