@@ -1,3 +1,4 @@
+# cython: binding=True
 """Laws of random numbers: each makes a value of random bits, by + - * /, square roots and ``elementary`` alone.
 
 Where the inverse of a law's distribution function has a closed form, a value is the inverse at one uniform number: it

@@ -1,3 +1,4 @@
+# cython: binding=True
 """Random streams: one per (seed, dotted path, purpose), whatever the order in which they are asked for.
 
 The key of a stream is a hash of its names, so adding, removing or reordering actors and aspects moves no other
