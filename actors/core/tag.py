@@ -10,7 +10,7 @@ from .primitives import nearest
 NANOSECONDS_PER_SECOND = 1_000_000_000
 # Where time ends: about 146 years. Beyond it a time is a mistake, and int64 columns could not hold it.
 LATEST = 2**62
-_FAR = 2.0**62
+_FAR = float(LATEST)
 
 
 class Tag(NamedTuple):
