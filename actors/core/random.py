@@ -30,7 +30,25 @@ _MOST: Final = 64  # words taken from the generator at once, which costs a tenth
 _PLAIN: Final = frozenset({float, int, bool})
 
 
-class RandomStream:
+class Words:
+    """Random bits, 64 at a time."""
+
+    __slots__ = ("_ahead", "_bits", "_block")
+
+    def __init__(self, bits: np.random.PCG64) -> None:
+        self._bits = bits
+        self._ahead: list[int] = []  # words that have been taken already, the next one last
+        self._block = 16
+
+    def word(self) -> int:
+        """The next 64 random bits, as a number that is not negative."""
+        if not self._ahead:
+            self._block = min(2 * self._block, _MOST)
+            self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
+        return self._ahead.pop()
+
+
+class RandomStream(Words):
     """Random numbers of one purpose, with the methods of ``numpy.random.Generator`` and bits that never change.
 
     Parameters may be arrays, and ``size`` asks for an array; its values are drawn one by one in C order, so that
@@ -41,19 +59,17 @@ class RandomStream:
     ``permutation`` know the first axis only; rare laws are missing.  Raises ``ValueError`` for parameters out of range.
     """
 
-    __slots__ = ("_ahead", "_bits", "_block")
+    __slots__ = ()
 
-    def __init__(self, bits: np.random.PCG64) -> None:
-        self._bits = bits
-        self._ahead: list[int] = []  # words that have been taken already, the next one last
-        self._block = 16
+    def __reduce__(self) -> tuple[Callable[..., RandomStream], tuple[Any, ...]]:
+        return _as_it_stood, (self._bits, self._ahead, self._block)
 
     def __repr__(self) -> str:
         return f"<Stream {self.state}>"
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and hasattr(np.random.Generator, name):
-            known = [each for each in vars(RandomStream) if not each.startswith("_")]
+            known = ["word", *(each for each in vars(RandomStream) if not each.startswith("_"))]
             raise AttributeError(
                 f"a random stream has no {name!r}{did_you_mean(name, known)}, as what NumPy makes of it depends on its "
                 f"version and the machine; there are {', '.join(sorted(known))}"
@@ -69,13 +85,6 @@ class RandomStream:
         return int(inner["state"]), int(inner["inc"])
 
     # -- bits ------------------------------------------------------------------------------------------------------
-
-    def word(self) -> int:
-        """The next 64 random bits, as a number that is not negative."""
-        if not self._ahead:
-            self._block = min(2 * self._block, _MOST)
-            self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
-        return self._ahead.pop()
 
     def below(self, bound: int) -> int:
         """An integer of 0, 1, ..., ``bound`` - 1, all alike.
@@ -249,6 +258,12 @@ def _method(law: Callable[..., Any]) -> Callable[..., Any]:
 
 for _law in laws.OF_ONE_VALUE:
     setattr(RandomStream, _law.__name__, _method(_law))
+
+
+def _as_it_stood(bits: np.random.PCG64, ahead: list[int], block: int) -> RandomStream:
+    stream = RandomStream(bits)
+    stream._ahead, stream._block = ahead, block
+    return stream
 
 
 def _shape(size: Size) -> tuple[int, ...]:

@@ -2,6 +2,7 @@
 
 from libc.stdint cimport uint64_t
 
+from epicycle.actors.core.random cimport Words
 from epicycle.actors cimport InputPort, Line, Wake
 from epicycle.runner.engine.agenda cimport Form, Instant, Turn
 from epicycle.runner.engine.director cimport Director

@@ -58,8 +58,8 @@ cdef double logarithm(double x) except? -1.0:
 
 
 cdef uint64_t word(stream) except? 0:
-    cdef list ahead = stream._ahead
-    return ahead.pop() if ahead else stream.word()
+    cdef Words words = stream
+    return words._ahead.pop() if words._ahead else words.word()
 
 
 cdef double between(stream) except? -1.0:
