@@ -23,13 +23,17 @@ cdef class Delayed(Way):
     cpdef go(self, token)
 
 
+cdef class Guarded(Way):
+    cdef public object act, doing, holds, pass_by, point, tell
+    cpdef go(self, token)
+
+
 cdef class Sender(Emitter):
-    cdef public str path
+    cdef public object port, channels
     cdef public Director director
     cdef public Writer writer
     cdef public Way onward
-    cdef public object channels
-    cdef public Py_ssize_t width
+    cdef public list wires
     cdef public dict single
     cpdef go(self, token)
     cpdef send(self, token, channel=*)

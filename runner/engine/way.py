@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from epicycle.actors import Emitter, PortError, Way, counted
 
+from .errors import ActorError, LoopError
+
 if TYPE_CHECKING:
+    from epicycle.actors import OutputPort
+    from epicycle.aspects import JoinPoint
+
     from ..results import Writer
     from .director import Director
 
@@ -40,6 +45,44 @@ class Fork(Way):
             way.go(token)
 
 
+class Guarded(Way):
+    """Hands each token, or job, to an aspect at a join point; an error in it is told with what it was doing."""
+
+    __slots__ = ("act", "doing", "holds", "pass_by", "point", "tell")
+
+    def __init__(
+        self,
+        act: Callable[[Any, Any], None],
+        doing: str,
+        point: JoinPoint,
+        holds: Callable[[], bool] | None,
+        pass_by: Callable[[Any, Any], None],
+        tell: Callable[[str, Exception], ActorError],
+    ) -> None:
+        self.act = act
+        self.doing = doing
+        self.point = point
+        self.holds = holds  # none if the aspect is always active
+        self.pass_by = pass_by
+        self.tell = tell
+
+    def go(self, token: Any) -> None:
+        doing = self.doing
+        try:
+            if self.holds is not None:
+                doing = "is_due()"
+                if not self.holds():
+                    doing = "pass_by()"
+                    self.pass_by(token, self.point)
+                    return
+                doing = self.doing
+            self.act(token, self.point)
+        except (ActorError, LoopError):  # of what comes behind it
+            raise
+        except Exception as error:
+            raise self.tell(doing, error) from error
+
+
 class Waits(Protocol):
     """A director, or one with a time of its own."""
 
@@ -61,30 +104,37 @@ class Delayed(Way):
         self.director.later(self.delay, self.onward, token)
 
 
+class Channels(Protocol):
+    """What makes ways along single wires."""
+
+    def along(self, port: OutputPort[Any], wires: list[Any], channel: int) -> Sender:
+        """What sends over one of the wires of a port."""
+
+
 class Sender(Emitter):
     """What ``send`` does at an output port: a token is logged, and goes on by all channels or by one.
 
-    ``channels`` makes the way along one channel, with what logs its sends; ``width`` is their number.
+    ``channels`` makes the way along one of its wires, with what logs its sends.
     """
 
-    __slots__ = ("channels", "director", "onward", "path", "single", "width", "writer")
+    __slots__ = ("channels", "director", "onward", "port", "single", "wires", "writer")
 
     def __init__(
         self,
-        path: str,
+        port: OutputPort[Any],
         director: Director,
         writer: Writer,
         onward: Way,
-        channels: Callable[[int], Sender],
-        width: int,
+        channels: Channels,
+        wires: list[Any],
     ) -> None:
-        self.path = path
+        self.port = port
         self.director = director
         self.writer = writer
         self.onward = onward
         self.channels = channels
-        self.width = width
-        self.single: dict[int, Sender] = {}  # made when the first token takes them: few ever do
+        self.wires = wires
+        self.single: dict[int, Sender] | None = None  # made when the first token takes them: few ever do
 
     def go(self, token: Any) -> None:
         present = self.director.present
@@ -100,12 +150,15 @@ class Sender(Emitter):
 
     def to(self, channel: int) -> Sender:
         """What sends to one channel."""
+        if self.single is None:
+            self.single = {}
         sender = self.single.get(channel)
         if sender is None:
-            if not 0 <= channel < self.width:
-                known = f"it has {counted(self.width, 'channel')}, counted from 0"
-                raise PortError(f"{self.path} has no channel {channel}: {known}")
-            sender = self.single[channel] = self.channels(channel)
+            width = len(self.wires)
+            if not 0 <= channel < width:
+                known = f"it has {counted(width, 'channel')}, counted from 0"
+                raise PortError(f"{self.port.path} has no channel {channel}: {known}")
+            sender = self.single[channel] = self.channels.along(self.port, self.wires, channel)
         return sender
 
 

@@ -38,7 +38,7 @@ from .execution import Execution
 from .local_time import LocalDirector, Passage
 from .parameters import VaryingParameter
 from .requests import Requests
-from .way import Call, Delayed, Deliver, Screened, Sender, all_of
+from .way import Call, Delayed, Deliver, Guarded, Screened, Sender, all_of
 
 T = TypeVar("T")
 P = TypeVar("P", bound=JoinPoint)
@@ -198,21 +198,21 @@ class Ways:
     def _emitter(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emitter:
         """What ``port.send`` does."""
         port.width = len(wires)
-
-        def sender(channel: int | None, ways: list[Way]) -> Sender:
-            writer = self.log.writer("send", port.actor.path, port.name, channel, "")
-            return Sender(
-                port.path, self.director, writer, all_of([*self._heard(port.path), *ways]), single, port.width
-            )
-
-        def single(channel: int) -> Sender:
-            return sender(channel, [self._way(wires[channel])])
-
-        everywhere = sender(None, self._branches(port.path, ()))
+        everywhere = self._sender(port, wires, None, self._branches(port.path, ()))
         # An aspect at an output stands before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
             return everywhere
-        return Screened(everywhere, lambda onward: self._woven(port.path, port.path, onward))
+        return Screened(everywhere, partial(self._woven, port.path, port.path))
+
+    def _sender(
+        self, port: OutputPort[Any], wires: list[tuple[Hop, ...]], channel: int | None, ways: list[Way]
+    ) -> Sender:
+        writer = self.log.writer("send", port.actor.path, port.name, channel, "")
+        return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self, wires)
+
+    def along(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]], channel: int) -> Sender:
+        """What sends over one of the wires of a port."""
+        return self._sender(port, wires, channel, [self._way(wires[channel])])
 
     def _branches(self, path: str, hops: tuple[Hop, ...]) -> list[Way]:
         """The ways onward from a port, one for each connection that leaves it."""
@@ -269,7 +269,7 @@ class Ways:
         aspect = woven.aspect
         assert isinstance(aspect, PortAspect)
         point = self._point(JoinPoint, woven, aspect, path, onward.go, place or path, source)
-        return Call(self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()"))
+        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()")
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
         """``onward`` with the aspects that stand at an actor before it, the first declared outermost."""
@@ -278,34 +278,21 @@ class Ways:
             assert isinstance(aspect, ExecutionAspect)
             point = self._point(ActorPoint, woven, aspect, path, onward, path)
             self._join(point, woven, aspect)
-            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()")
+            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()").go
         return onward
 
     def _guarded(
         self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
-    ) -> Callable[[T], None]:
+    ) -> Guarded:
         """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
-        path = point.port
+        holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
+        return Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
 
-        is_always_active = aspect.is_always_active
+    def _is_active(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
+        return aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)
 
-        def through(passing: T) -> None:
-            doing = name
-            try:
-                if not is_always_active:
-                    doing = "is_due()"
-                    if not (aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)):
-                        doing = "pass_by()"
-                        aspect.pass_by(passing, point)
-                        return
-                    doing = name
-                act(passing, point)
-            except (ActorError, LoopError):  # of what comes behind it
-                raise
-            except Exception as error:
-                raise self._error(woven, f"{doing} at {path}", error) from error
-
-        return through
+    def _told(self, woven: WovenAspect, path: str, doing: str, error: Exception) -> ActorError:
+        return self._error(woven, f"{doing} at {path}", error)
 
     def _answer(self, woven: WovenAspect, request: Any) -> None:
         """Let a token go on that has come through an aspect's composite."""
