@@ -69,6 +69,7 @@ PLAIN = "ours, without native forms"
 # Models, and what is set in them; the last is a condition of the study waiting_time.
 QUEUES = {"mm1": "", "mg1": "", "mm1 under the highest load of waiting_time": "load=0.9"}
 GOALS = {"compiled": ((20.0, 20.0, 10.0), (8.0, 8.0, 2.5)), "python": ((1.6, 1.6, 0.9),) * 2}
+OF_USERS = (5.0, 5.0, 2.0)  # without native forms the library's actors are plain Python, as theirs
 REASON = "docs/performance.md says what a hop and a job consist of"
 
 Events = Generator[simpy.Event, Any, None]
@@ -287,7 +288,7 @@ def comparisons(rounds: int) -> Iterator[Row]:
         ("pipeline of 20 actors, all busy", FULL, HOPS),
         ("Poisson -> server -> sink", 0.0, JOBS),
     ]
-    for (name, period, size), goal, goal_of_plain in zip(work, *GOALS[CORE], strict=True):
+    for (name, period, size), goal, goal_of_plain, of_users in zip(work, *GOALS[CORE], OF_USERS, strict=True):
         if period:
             stop = period * ticks
             build, build_bare = pipeline_of_stores(period), pipeline_of_callbacks(period)
@@ -311,6 +312,9 @@ def comparisons(rounds: int) -> Iterator[Row]:
         yield compare(title, results, "SimPy, bare callbacks", "ours", how=how, unit=unit)
         title = f"{name}, without native forms"
         yield compare(title, results, "SimPy, Stores", PLAIN, how=how, reason=REASON, goal=goal_of_plain, unit=unit)
+        if CORE == "compiled":
+            title = f"{name}, actors of users in plain Python (the same)"
+            yield compare(title, results, "SimPy, Stores", PLAIN, how=how, reason=REASON, goal=of_users, unit=unit)
 
 
 if __name__ == "__main__":

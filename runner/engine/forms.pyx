@@ -362,7 +362,7 @@ def attach(director, actors, besides):
     count = 0
     for path, actor in actors.items():
         kind = FORMS.get(type(actor))
-        if kind is None or path in besides or type(actor).fire is not FIRE[type(actor)] or "fire" in vars(actor):
+        if kind is None or path in besides or getattr(actor.fire, "__func__", None) is not FIRE[type(actor)]:
             continue
         inputs = list(actor.inputs.values())
         varying = {each.name for each in inputs if type(each) is not InputPort and each.width}

@@ -116,10 +116,11 @@ class Run:
         self._stop = stop
         started = time.perf_counter()
         try:
-            if not self.is_begun:
-                self._begin()
-            with nullcontext() if most == 1 else between_steps(self.director.interrupt), seldom_collecting():
-                self.stopped = self.director.run(stop, list(self.actors.values()), progress, pace, most)
+            with seldom_collecting():
+                if not self.is_begun:
+                    self._begin()
+                with nullcontext() if most == 1 else between_steps(self.director.interrupt):
+                    self.stopped = self.director.run(stop, list(self.actors.values()), progress, pace, most)
         except BaseException as error:
             self.end()
             if isinstance(error, ActorError):
