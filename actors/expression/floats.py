@@ -43,14 +43,22 @@ def of_floats(source: str, names: tuple[str, ...]) -> Callable[..., Any] | None:
     except _UnfitError:
         return None
     exact = "".join(f"type({name}) is " for name in writer.names.values())
-    known = {"__builtins__": {}, "type": type, "float": float, "beyond": _beyond, "power": BINARY[ast.Pow]}
-    known |= {name: FUNCTIONS[name] for name in _OF_FLOATS}
     code = f"lambda {', '.join(writer.names.values())}: {text}" + (f" if {exact}float else None" if exact else "")
-    return eval(compile(code, "<expression>", "eval"), known)  # type: ignore[no-any-return]
+    try:
+        return eval(compile(code, "<expression>", "eval"), KNOWN)  # type: ignore[no-any-return]
+    except (MemoryError, RecursionError, SyntaxError):  # more in each other than Python's compiler takes
+        return None
 
 
 def _beyond() -> None:
     raise OverflowError
+
+
+# All that a function can name.
+KNOWN: Final[dict[str, Any]] = {
+    "__builtins__": {}, "type": type, "float": float, "beyond": _beyond, "power": BINARY[ast.Pow],
+    **{name: FUNCTIONS[name] for name in _OF_FLOATS},
+}  # fmt: skip
 
 
 class _Writer:
