@@ -112,14 +112,17 @@ class BuildCore(build_ext):
         check_forms()
         self.parallel = self.parallel or os.cpu_count()
         try:
+            from Cython import __version__ as cython
             from Cython.Build import cythonize
             from numpy import get_include
 
+            if [int(each) for each in cython.split(".")[:2]] >= [3, 3]:
+                raise RuntimeError(f"Cython {cython} adds 0 and -0.0 wrongly, take one below 3.3")
             options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False, "binding": False}
             pairs = zip(core["CORE_MODULES"], copied(), strict=True)
             made = [Extension(name, [str(path)], include_dirs=[get_include()]) for name, path in pairs]
             made = cythonize(made, include_path=[str(TREE)], compiler_directives=options, quiet=True)
-        except Exception as error:  # no Cython or NumPy, or one that is too old
+        except Exception as error:  # no Cython or NumPy, or one that does not do
             print(f"the core is not compiled, Python serves: {error}", file=sys.stderr)
             self.extensions = []
             return
