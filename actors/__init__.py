@@ -24,6 +24,7 @@ from .distributions import (
 from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
 from .functions import Expression, Function, LookupTable
 from .logic import Comparator, LogicGate
+from .modes import ModalActor, StateMachine, on_entry, on_exit, transition
 from .queues import Queue, Server
 from .replay import Replay, ReplayError
 from .resources import Machine, Station
@@ -40,18 +41,18 @@ __all__ = [
     "Context", "Counter", "CurrentMicrostep", "CurrentTime", "Difference", "Display", "DistanceMonitor", "Distribution",
     "Emitter", "EpicycleError", "Estimate", "Exponential", "Expression", "FilterError", "FilterPyEstimator", "Function",
     "Gamma", "GoalMonitor", "Histogram", "Inform", "InputPort", "Integrator", "Latest", "Line", "LogNormal",
-    "LogicGate", "LookupTable", "Machine", "MappingParameter", "MathFunction", "Measurement", "Merge", "Moment",
-    "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort",
+    "LogicGate", "LookupTable", "Machine", "MappingParameter", "MathFunction", "Measurement", "Merge", "ModalActor",
+    "Moment", "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort",
     "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter", "Process",
     "Quantity", "Queue", "Ramp", "Random", "RandomInteger", "Ranks", "ReachGoal", "Recorder", "Repeat", "Replay",
     "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor",
-    "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "Station", "Stop", "Stream", "Switch",
-    "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times", "Triangular", "Uniform", "UnitError",
-    "UnscentedEstimator", "Vehicle", "Wake", "Way", "When", "abridged", "accepts", "array_parameter", "bounds_text",
-    "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean",
-    "digits", "elementary", "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake",
-    "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
-    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
-    "visible_lines",
+    "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "StateMachine", "Station", "Stop", "Stream",
+    "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times", "Triangular", "Uniform",
+    "UnitError", "UnscentedEstimator", "Vehicle", "Wake", "Way", "When", "abridged", "accepts", "array_parameter",
+    "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
+    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag",
+    "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths",
+    "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened",
+    "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter",
+    "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip

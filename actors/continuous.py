@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from .core import (
-    NANOSECONDS_PER_SECOND,
     Actor,
     EpicycleError,
     InputPort,
@@ -20,12 +18,8 @@ from .core import (
     did_you_mean,
 )
 from .expression import Formula, FormulaParameter, operand
-from .expression.enclosure import bounds_of
-from .integration import STEPPERS, Bounds, State
-from .solution import Guard, Solution, sign_of
-
-_MAX_STEPS = 10_000
-_AHEAD = 64  # parts of a step that are searched for crossings at once
+from .integration import STEPPERS
+from .trajectory import Trajectory, number_of
 
 
 class ODE(Actor):
@@ -96,7 +90,6 @@ class ODE(Actor):
 
     def check(self) -> None:
         self._states = tuple(self.initial)
-        self._guards: list[Guard] = []
         if not self._states:
             raise ParameterError("initial: there is no state")
         _same_names("derivatives", self.derivatives, "state", self._states, all_of_them=True)
@@ -131,104 +124,60 @@ class ODE(Actor):
         self._latest = dict.fromkeys(self.crossings, -math.inf)
         self._jumps: dict[int, int] = {}
         self._wake: Wake | None = None
-        ways = [self.directions.get(name, "both") for name in self.crossings]
-        self._guards = [
-            Guard(self._crossing(name), partial(self._bounds, formula), way != "falling", way != "rising")
-            for (name, formula), way in zip(self.crossings.items(), ways, strict=True)
-        ]
-        self._begin(self.tag.time, 0.0, [self.initial[name] for name in self._states])
-        for guard, side in zip(self._guards, self._signs(0.0, self._solution.at(0.0)), strict=True):
-            guard.side = side
-        if self._guards:
-            self.wake_in(0)
-
-    def _begin(self, time: int, fraction: float, state: State) -> None:
-        """Start a solution at ``time`` ns plus a fraction of a nanosecond in s: no rounding adds up over crossings."""
-        self._time, self._fraction = time, fraction
-        self._solution = Solution(
-            self._rates,
-            self._bounds_of_rates,
-            state,
-            self._guards,
+        self._trajectory = Trajectory(
+            {name: self.derivatives[name] for name in self._states},
+            self._held,
             method=self.method,
             tolerance=(self.relative_tolerance, self.absolute_tolerance),
             max_step=self.max_step,
         )
-
-    def _at(self, at: float) -> float:
-        """The time in the model at a time of the present solution."""
-        return self._time / NANOSECONDS_PER_SECOND + (self._fraction + at)
-
-    def _names(self, at: float, state: State) -> dict[str, Any]:
-        """What expressions know at a time of the present solution."""
-        names = {**self._held, **dict(zip(self._states, state, strict=True))}
-        names["time"] = self._at(at)
-        return names
-
-    def _rates(self, at: float, state: State) -> State:
-        names = self._names(at, state)
-        return [_number(self.derivatives[name], names, "derivative of", name) for name in self._states]
-
-    def _crossing(self, name: str) -> Callable[[float, State], float]:
-        formula = self.crossings[name]
-        return lambda at, state: _number(formula, self._names(at, state), "crossing", name)
-
-    def _bounds(self, formula: Formula, left: float, right: float, states: Sequence[Bounds]) -> Bounds:
-        return bounds_of(formula, self._known_bounds(left, right, states))
-
-    def _bounds_of_rates(self, left: float, right: float, states: Sequence[Bounds]) -> list[Bounds]:
-        known = self._known_bounds(left, right, states)
-        return [bounds_of(self.derivatives[name], known) for name in self._states]
-
-    def _known_bounds(self, left: float, right: float, states: Sequence[Bounds]) -> dict[str, Bounds]:
-        """What the names in expressions lie between, from one time of the present solution to another."""
-        numbers = {name: (value, value) for name, value in self._held.items() if isinstance(value, (int, float))}
-        return {**numbers, **dict(zip(self._states, states, strict=True)), "time": (self._at(left), self._at(right))}
+        for name, formula in self.crossings.items():
+            way = self.directions.get(name, "both")
+            self._trajectory.watch(formula, f"crossing {name}", rising=way != "falling", falling=way != "rising")
+        start = [self.initial[name] for name in self._states]
+        self._trajectory.begin(self.tag.time, 0.0, start)
+        for guard, side in zip(self._trajectory.guards, self._trajectory.signs(0.0, start), strict=True):
+            guard.side = side
+        if self.crossings:
+            self.wake_in(0)
 
     def fire(self) -> None:
-        now = self._elapsed()
-        if self._guards:
-            self._solution.search(now)
+        trajectory, solution = self._trajectory, self._trajectory.solution
+        now = trajectory.elapsed(self.tag.time)
+        if self.crossings:
+            solution.search(now)
         at, crossed, self._jumps = now, self._jumps, {}
-        crossing = self._solution.crossing
-        if crossing is not None and self._moment(crossing.time) <= self.tag.time:
+        crossing = solution.crossing
+        if crossing is not None and trajectory.moment(crossing.time) <= self.tag.time:
             at, crossed = crossing.time, {**crossed, **crossing.sides}
         if crossed:
             self._cross(at, crossed)
         if crossed or self.trigger.present:
-            for name, value in zip(self._states, self._solution.at(0.0 if crossed else now), strict=True):
+            for name, value in zip(self._states, trajectory.solution.at(0.0 if crossed else now), strict=True):
                 self.outputs[name].send(value)
         self._take_inputs()
         self._plan()
 
-    def _elapsed(self) -> float:
-        """Seconds since the solution's start, which may lie ahead by a fraction of a nanosecond."""
-        return max(0.0, (self.tag.time - self._time) / NANOSECONDS_PER_SECOND - self._fraction)
-
-    def _moment(self, at: float) -> int:
-        """The nanosecond that is nearest to a time of the present solution."""
-        return self._time + round((self._fraction + at) * NANOSECONDS_PER_SECOND)
-
     def _cross(self, at: float, crossed: Mapping[int, int]) -> None:
         """Send the crossings, reset what they reset, and begin a new solution."""
-        state = self._solution.at(at)
-        self._solution.rewind(at)
-        before, names = self._signs(at, state), self._names(at, state)
+        trajectory = self._trajectory
+        state = trajectory.solution.at(at)
+        trajectory.solution.rewind(at)
+        before, names = trajectory.signs(at, state), trajectory.values(at, state)
         after = dict(zip(self._states, state, strict=True))
         for number, name in enumerate(self.crossings):
             if number in crossed:
                 self._count(name, names["time"])
                 for target, formula in self.resets.get(name, {}).items():
-                    after[target] = _number(formula, names, f"reset of {target} at", name)
+                    after[target] = number_of(formula, names, f"reset of {target} at {name}")
         start = [after[name] for name in self._states]
-        moment = self._moment(at)
-        self._begin(moment, self._fraction + at - (moment - self._time) / NANOSECONDS_PER_SECOND, start)
-        signs = self._signs(0.0, start)
+        trajectory.begin_at(at, start)
+        signs = trajectory.signs(0.0, start)
         for number, side in crossed.items():
             if start != state:
                 # After a reset at zero, the solution will show which side comes of it.
                 side = -side if signs[number] == -side else 0
-            self._guards[number].side = side
+            trajectory.guards[number].side = side
         self._notice_jumps(before, signs, crossed)
 
     def _count(self, name: str, time: float) -> None:
@@ -250,20 +199,18 @@ class ODE(Actor):
                 changed[name] = value
         if not changed:
             return
-        now = self._elapsed()
-        state = self._solution.at(now)
-        self._solution.rewind(now)
-        before = self._signs(now, state)
+        trajectory = self._trajectory
+        now = trajectory.elapsed(self.tag.time)
+        state = trajectory.solution.at(now)
+        trajectory.solution.rewind(now)
+        before = trajectory.signs(now, state)
         self._held.update(changed)
-        self._begin(self.tag.time, 0.0, state)
-        self._notice_jumps(before, self._signs(0.0, state), self._jumps)
-
-    def _signs(self, at: float, state: State) -> list[int]:
-        return [sign_of(guard.value(at, state)) for guard in self._guards]
+        trajectory.begin(self.tag.time, 0.0, state)
+        self._notice_jumps(before, trajectory.signs(0.0, state), self._jumps)
 
     def _notice_jumps(self, before: list[int], after: list[int], known: Mapping[int, int]) -> None:
         """See which guards are on their other side all at once."""
-        for number, guard in enumerate(self._guards):
+        for number, guard in enumerate(self._trajectory.guards):
             if number not in known and before[number] * after[number] < 0:
                 if guard.counts(after[number]):
                     self._jumps[number] = after[number]
@@ -279,31 +226,8 @@ class ODE(Actor):
         self._wake = None
         if self._jumps:
             self._wake = self.wake_in(0)
-            return
-        if not self._guards:
-            return
-        solution, parts = self._solution, 0
-        while solution.crossing is None and self._moment(solution.searched) <= self.tag.time:
-            solution.look()
-            parts += 1
-            if parts > _MAX_STEPS:
-                raise EpicycleError(f"the solver takes more than {_MAX_STEPS:,} steps within a nanosecond")
-        while solution.crossing is None and solution.searched < solution.end and parts < _AHEAD:
-            solution.look()
-            parts += 1
-        moment = self._moment(solution.searched if solution.crossing is None else solution.crossing.time)
-        self._wake = self.context.wake(self, moment)
-
-
-def _number(formula: Formula, names: Mapping[str, Any], what: str, name: str) -> float:
-    """The value of a formula, which must be a number; ``what`` it is of, for messages."""
-    try:
-        result = formula(names)
-    except EpicycleError as error:
-        raise EpicycleError(f"{what} {name}: {error}") from None
-    if isinstance(result, bool) or not isinstance(result, (int, float)):
-        raise EpicycleError(f"{what} {name}: {formula} gives {result!r}, which is not a number")
-    return float(result)
+        elif self.crossings:
+            self._wake = self.context.wake(self, self._trajectory.next_look(self.tag.time))
 
 
 def _same_names(label: str, given: Mapping[str, object], kind: str, known: Any, *, all_of_them: bool = False) -> None:

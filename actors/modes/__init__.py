@@ -1,0 +1,6 @@
+"""State machines: modes and the transitions between them, written as text or in Python."""
+
+from .machine import StateMachine
+from .modal import ModalActor, on_entry, on_exit, transition
+
+__all__ = ["ModalActor", "StateMachine", "on_entry", "on_exit", "transition"]

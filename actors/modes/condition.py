@@ -1,0 +1,124 @@
+"""What expressions of a machine are: guards in which time goes on, or variables flow, become events."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any, Final
+
+from ..expression import Formula
+from ..expression.syntax import free_names, parse
+
+TIMES: Final = ("time", "mode_time")
+_ON_SIDE: Final[dict[type[ast.cmpop], Callable[[int], bool]]] = {
+    ast.Lt: lambda side: side < 0,
+    ast.LtE: lambda side: side <= 0,
+    ast.Gt: lambda side: side > 0,
+    ast.GtE: lambda side: side >= 0,
+    ast.Eq: lambda side: side == 0,
+    ast.NotEq: lambda side: side != 0,
+}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A comparison in a guard: what is zero where it changes, and whether it holds on a side of that."""
+
+    source: str
+    name: str  # what stands for it in the guard
+    difference: Formula
+    sign: type[ast.cmpop]
+    until: tuple[str, Formula, int] | None = None  # a time, when it is to be, and the side from then on
+
+    @property
+    def is_equality(self) -> bool:
+        return self.sign in (ast.Eq, ast.NotEq)
+
+    def holds(self, side: int) -> bool:
+        return _ON_SIDE[self.sign](side)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A guard in which names stand for the comparisons whose changes are events."""
+
+    formula: Formula
+    comparisons: tuple[Comparison, ...]
+
+
+def condition_of(guard: Formula, moving: Collection[str], numbers: Collection[str], taken: int) -> Condition:
+    """A guard with its comparisons over ``moving`` values, and otherwise over ``numbers``, taken out.
+
+    ``taken`` is how many comparisons other guards of the mode have, for names of its own.
+    """
+    source, found, pieces = guard.source, list[Comparison](), list[tuple[int, int, str]]()
+    for node in _compared(parse(source)):
+        names = free_names(node, frozenset())
+        if names.isdisjoint(moving) or not names <= {*moving, *numbers}:
+            continue
+        parts = [node.left, *node.comparators]
+        written = [source[part.col_offset : part.end_col_offset] for part in parts]
+        stand_ins = []
+        for place, sign in enumerate(node.ops):
+            if type(sign) not in _ON_SIDE:
+                break
+            name = f"_comparison_{taken + len(found) + place}"
+            difference = Formula(f"({written[place]}) - ({written[place + 1]})")
+            text = source[parts[place].col_offset : parts[place + 1].end_col_offset]
+            until = _until(parts[place], parts[place + 1], written[place : place + 2], moving)
+            stand_ins.append(Comparison(text, name, difference, type(sign), until))
+        else:
+            found += stand_ins
+            text = " and ".join(each.name for each in stand_ins)
+            pieces.append((node.col_offset, node.end_col_offset or 0, f"({text})"))
+    for start, end, text in sorted(pieces, reverse=True):
+        source = source[:start] + text + source[end:]
+    return Condition(Formula(source), tuple(found))
+
+
+def _until(
+    left: ast.expr, right: ast.expr, written: list[str], moving: Collection[str]
+) -> tuple[str, Formula, int] | None:
+    """Of a comparison between a time and what does not move: when it changes, and to which side."""
+    for here, there, text, side in ((left, right, written[1], 1), (right, left, written[0], -1)):
+        if isinstance(here, ast.Name) and here.id in TIMES and free_names(there, frozenset()).isdisjoint(moving):
+            return here.id, Formula(text), side
+    return None
+
+
+def _compared(node: ast.expr) -> list[ast.Compare]:
+    """The comparisons of which a condition is made by and, or and not."""
+    if isinstance(node, ast.Compare):
+        return [node]
+    if isinstance(node, ast.BoolOp):
+        return [each for value in node.values for each in _compared(value)]
+    return _compared(node.operand) if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not) else []
+
+
+_GIVES: Final[dict[str, Any]] = {"str": str, "bool": bool, "range": Any, "sorted": Any, "min": Any, "max": Any}
+
+
+def type_of(formula: Formula, type_of_name: Callable[[str], Any]) -> Any:
+    """What an expression gives, as far as its form tells."""
+    tree = parse(formula.source)
+    if formula.is_condition:
+        return bool
+    match tree:
+        case ast.Name(id=name):
+            return type_of_name(name)
+        case ast.Constant(value=str()):
+            return str
+        case ast.Constant(value=int() | float()) | ast.UnaryOp():
+            return float
+        case (
+            ast.BinOp(left=ast.Constant(value=str()) | ast.List())
+            | ast.BinOp(right=ast.Constant(value=str()) | ast.List())
+        ):
+            return Any
+        case ast.BinOp():
+            names = {type_of_name(name) for name in formula.names}
+            return float if names <= {float, Any, int} else Any
+        case ast.Call(func=ast.Name(id=name)):
+            return _GIVES.get(name, float)
+    return Any

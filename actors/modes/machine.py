@@ -1,0 +1,425 @@
+"""StateMachine: modes, transitions, variables that flow, and guards that are events."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Mapping
+from typing import Any, ClassVar, Final
+
+from ..core import (
+    ABSENT,
+    NEVER,
+    EpicycleError,
+    InputPort,
+    MappingParameter,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    Wake,
+    did_you_mean,
+    to_nanoseconds,
+    to_seconds,
+)
+from ..expression import ExpressionError, Formula, evaluate, operand
+from ..integration import STEPPERS
+from ..solution import sign_of
+from ..trajectory import Trajectory, number_of
+from .condition import TIMES, Comparison, Condition, condition_of, type_of
+from .modal import Chart, ModalActor, Rule
+from .text import Action, ModesParameter, TransitionsParameter
+
+_PRESENT: Final = "_is_present"
+_LONGEST: Final = 9e9  # s, of the times that there are
+_STILL: Final = "_still"  # a state that does not move, where guards wait for a time alone
+
+
+class StateMachine(ModalActor):
+    """A state machine, with a transition a line and variables that may flow.
+
+    A thermostat with a room:
+
+        thermostat:
+          type: StateMachine
+          variables: {temperature: 20}
+          modes:
+            heating: {flow: {temperature: 0.2 - 0.01 * temperature + 0.1}}
+            idle: {flow: {temperature: 0.1 - 0.01 * temperature}}
+          transitions:
+            - heating -> idle when temperature >= 22 do heater = false
+            - idle -> heating when temperature <= 18 do heater = true
+
+    A transition is ``a, b -> c``, then ``else``, ``immediate``, ``nondeterministic`` or ``priority 2``, then ``on``
+    inputs of which one must have a token, ``after`` a time since the entry, ``when`` a guard, ``do`` actions; or a
+    mapping with these keys.  Expressions are in the language of ``${...}``.  Names in them are variables, ``time`` (s),
+    ``mode_time`` (s since the mode was entered), or else input ports.  A guard that asks for an input without a token
+    does not hold; ``x_is_present`` says whether ``x`` has one, and inputs in ``held`` keep their latest.  An action
+    sets a variable, or sends from an output port of that name.  Tokens that come together at one input are for one
+    reaction each, at the next microsteps.
+
+    In a mode with ``flow``, variables follow differential equations, as in an ``ODE``.  A comparison over them, or over
+    times, in a guard is an event at the nanosecond at which it changes; one whose transition has moved a variable off
+    its border holds again only after it has not held.  ``trigger`` asks for all variables: each has an output port.
+
+    Ptolemy: ``FSMActor``, ``ModalModel``.
+    """
+
+    is_source: ClassVar[bool] = True
+
+    trigger = InputPort(required=False, doc="asks for the variables")
+
+    modes = ModesParameter(object, doc="their names, or what is said of each: flow, entry, exit, final, doc")
+    transitions = TransitionsParameter(object, (), doc="one a line, or {from, to, on, after, when, do, ...}")
+    initial = Parameter(str, None, doc="the mode in which it begins; the first if left out")
+    variables = MappingParameter(Parameter(object), {}, doc="values that it keeps, at the start")
+    held = MappingParameter(
+        Parameter(object, None), {}, doc="inputs that keep their latest token, with a value before the first, or null"
+    )
+
+    method = Parameter(str, "DOP853", choices=tuple(STEPPERS), doc="the solver of flows; see ODE")
+    relative_tolerance = Parameter(float, 1e-10, unit="1", min=1e-13, max=0.1, doc="error per step, see ODE")
+    absolute_tolerance = Parameter(float, 1e-12, above=0, doc="error per step, added to the relative one")
+    max_step = Parameter(float, None, unit="s", above=0, max=1e6, doc="longest step; see ODE")
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        actions = [*(each for one in self.transitions for each in one.do), *self._at_borders()]
+        read = [formula for _, formula in actions]
+        for one in self.transitions:
+            read += [each for each in (one.when, one.after) if each is not None]
+        read += [formula for mode in self.modes.values() for formula in mode.flow.values()]
+        ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
+        for name in self.variables:
+            if name in TIMES:
+                raise ParameterError(f"variables: {name!r} has a meaning of its own")
+            ports[name] = OutputPort(self._type(name), doc="a variable, when it is asked for")
+        named = [
+            *(name for formula in read for name in formula.names),
+            *(name for one in self.transitions for name in one.on),
+        ]
+        for name in named:
+            name = name.removesuffix(_PRESENT)
+            if name not in (*TIMES, "trigger", *ports):
+                ports[name] = InputPort(required=False, doc="a name in guards or actions")
+        for name, _ in actions:
+            if name in TIMES or isinstance(ports.get(name), InputPort):
+                what = "an input, for it is read" if name in ports else "a time"
+                raise ParameterError(
+                    f"{name} = ...: {name!r} is {what}; declare it as a variable to set it, or rename it"
+                )
+            if name not in ports:
+                kinds = {type_of(formula, self._type) for each, formula in actions if each == name}
+                ports[name] = OutputPort(kinds.pop() if len(kinds) == 1 else Any, doc="sent by actions")
+        return ports
+
+    def _type(self, name: str) -> Any:
+        """What a name stands for, as far as that is known."""
+        if name in TIMES:
+            return float
+        kind = type(self.variables.get(name))
+        return float if kind in (int, float) else kind if kind in (bool, str) else Any
+
+    def _at_borders(self) -> list[Action]:
+        return [each for mode in self.modes.values() for each in (*mode.entry, *mode.exit)]
+
+    def check(self) -> None:
+        rules = [
+            Rule(
+                each.from_, each.to, each.on, each.when, each.after, each.do or None,
+                each.priority, each.else_, each.immediate, each.nondeterministic,
+            )
+            for each in self.transitions
+        ]  # fmt: skip
+        final = [name for name, mode in self.modes.items() if mode.final]
+        self._chart = Chart(tuple(self.modes), self.initial, final, rules)
+        self._inputs = [name for name in self.inputs if name != "trigger"]
+        for name in self.held:
+            _check_name("held", name, "input", self._inputs)
+        for name, mode in self.modes.items():
+            for variable in mode.flow:
+                _check_name(f"modes: {name}: flow", variable, "variable", self.variables)
+        numbers = {*self.held, *self.variables}
+        self._conditions: dict[str, dict[Rule, Condition]] = {}
+        for name, mode in self.modes.items():
+            moving, taken = {*mode.flow, *TIMES}, 0
+            found = self._conditions[name] = {}
+            for rule in self._chart.leaving[name]:
+                if rule.guard is not None:
+                    found[rule] = condition_of(rule.guard, moving, numbers, taken)
+                    taken += len(found[rule].comparisons)
+
+    # -- the run --------------------------------------------------------------------------------------------------
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._known: dict[str, Any] = dict(self.variables)
+        self._known |= {name: value for name, value in self.held.items() if value is not None}
+        self._queues: dict[str, deque[Any]] = {name: deque() for name in self._inputs}
+        self._tokens: dict[str, Any] = {}  # of the present reaction
+        self._entered = self.context.time
+        self._trajectory: Trajectory | None = None
+        self._comparisons: list[Comparison] = []  # for each guard of the trajectory
+        self._deadlines: dict[Comparison, int] = {}  # of those that wait for a time alone: when (ns)
+        self._judged = self.context.time
+        self._open: dict[Comparison, int] = {}  # those that a transition has put on their border: where they came from
+        self._passed: dict[Formula, int] = {}  # what crosses now, and to which side
+        self._before: dict[str, Any] = {}  # variables as they were there
+        self._truths: dict[str, float] = {}  # of the comparisons
+        self._wake: Wake | None = None
+
+    def fire(self) -> None:
+        if self._wake is not None and not self._wake.due:
+            self._wake.cancel()
+        self._wake = None
+        self._take_tokens()
+        self._go_on()
+        self._hold_tokens()
+        if self._tokens or self._passed or self._has_reached or self.is_called:
+            self.react()
+        self._judged = self.context.time
+        if self.trigger.present:
+            self._tell()
+        self._tokens = {}
+        if any(self._queues.values()):
+            self.wake_in(0)
+        looks = [time for time in self._deadlines.values() if time > self.context.time]
+        if self._trajectory is not None and self._comparisons:
+            looks.append(self._trajectory.next_look(self.context.time))
+        if looks:
+            self._wake = self.context.wake(self, min(looks))
+
+    @property
+    def _has_reached(self) -> bool:
+        """Whether a time that guards wait for has come."""
+        return any(self._judged < time <= self.context.time for time in self._deadlines.values())
+
+    def _take_tokens(self) -> None:
+        """The first token that waits at each input."""
+        for name in self._inputs:
+            queue = self._queues[name]
+            queue.extend(self.inputs[name].tokens)
+            if queue:
+                self._tokens[name] = queue.popleft()
+
+    def _hold_tokens(self) -> None:
+        changed = {name: operand(self._tokens[name]) for name in self.held if name in self._tokens}
+        changed = {
+            name: value for name, value in changed.items() if name not in self._known or self._known[name] != value
+        }
+        self._known |= changed
+        if changed:
+            self._find_deadlines()
+            if self._trajectory is not None:
+                self._set_out(self._trajectory, self.context.time, 0.0)
+
+    def _tell(self) -> None:
+        for name in self.variables:
+            self.outputs[name].send(self._known[name])
+
+    # -- flows, and comparisons that are events -------------------------------------------------------------------
+
+    def _go_on(self) -> None:
+        """Bring variables and comparisons to the present, or to the crossing that is due."""
+        self._passed, trajectory = {}, self._trajectory
+        self._judge_times()
+        if trajectory is None:
+            return
+        solution, at = trajectory.solution, trajectory.elapsed(self.context.time)
+        if self._comparisons:
+            solution.search(at)
+            crossing = solution.crossing
+            if crossing is not None and trajectory.moment(crossing.time) <= self.context.time:
+                self._cross(trajectory, crossing.time, crossing.sides)
+                return
+        self._keep(trajectory, solution.at(at))
+        self._judge(trajectory, at)
+
+    def _cross(self, trajectory: Trajectory, at: float, sides: Mapping[int, int]) -> None:
+        state = trajectory.solution.at(at)
+        trajectory.solution.rewind(at)
+        self._keep(trajectory, state)
+        for number, side in sides.items():
+            guard, comparison = trajectory.guards[number], self._comparisons[number]
+            self._passed[comparison.difference] = side
+            self._open.pop(comparison, None)
+            guard.side = side
+        self._before = dict(self._known)
+        trajectory.begin_at(at, state)
+        self._judge(trajectory, 0.0)
+
+    def _keep(self, trajectory: Trajectory, state: list[float]) -> None:
+        """Know the variables as they are now."""
+        self._known.update(zip(trajectory.names, state, strict=True))
+
+    def _judge(self, trajectory: Trajectory, at: float) -> None:
+        """Know which comparisons hold."""
+        for comparison, guard in zip(self._comparisons, trajectory.guards, strict=True):
+            side = guard.side
+            if side == 0:
+                side = self._open.get(comparison) or sign_of(guard.value(at, trajectory.solution.at(at)))
+            elif self._open.pop(comparison, side) != side:
+                raise EpicycleError(
+                    f"in mode {self._current!r}, {comparison.source!r} is on its border again at once after a "
+                    "transition that took it off: it may go on so without end (Zeno); leave the mode before"
+                )
+            if comparison.difference in self._passed and comparison.is_equality:
+                side = 0  # which is where it crosses
+            self._truths[comparison.name] = float(comparison.holds(side))
+
+    def _find_deadlines(self) -> None:
+        """When the comparisons change that wait for a time."""
+        for each in self._conditions[self._current].values():
+            for comparison in each.comparisons:
+                if comparison.until is not None:
+                    clock, until, _ = comparison.until
+                    seconds = number_of(until, self._values(until), f"{comparison.source!r}")
+                    at = NEVER if seconds > _LONGEST else to_nanoseconds(seconds)
+                    self._deadlines[comparison] = at + (self._entered if clock == "mode_time" else 0)
+        self._judge_times()
+
+    def _judge_times(self) -> None:
+        now = self.context.time
+        for comparison, time in self._deadlines.items():
+            assert comparison.until is not None
+            side = comparison.until[2] if now >= time else -comparison.until[2]
+            self._truths[comparison.name] = float(
+                comparison.holds(0 if now == time and comparison.is_equality else side)
+            )
+
+    def _set_out(self, trajectory: Trajectory, time: int, fraction: float) -> None:
+        """Begin a solution from what the variables are now, and find the sides of its comparisons."""
+        start = [float(self._known[name]) for name in trajectory.names]
+        trajectory.begin(time, fraction, start)
+        is_moved = any(self._known[name] != self._before.get(name) for name in trajectory.names)
+        for comparison, guard in zip(self._comparisons, trajectory.guards, strict=True):
+            passed = self._passed.get(comparison.difference, 0)
+            guard.side = sign_of(guard.value(0.0, start))
+            if passed and not is_moved:
+                guard.side = passed  # by rounding it may be a hair before its border
+            elif passed and guard.side != -passed:
+                guard.side, self._open[comparison] = 0, -passed  # the solution will show
+        self._judge(trajectory, 0.0)
+
+    def enters(self, mode: str) -> None:
+        self._act(self.modes[mode].entry)
+        origin = self.context.time, 0.0
+        if self._trajectory is not None and self._passed:
+            origin = self._trajectory.time, self._trajectory.fraction
+        self._entered, self._trajectory = self.context.time, None
+        self._open, self._truths, self._deadlines = {}, {}, {}
+        comparisons = [each for one in self._conditions[mode].values() for each in one.comparisons]
+        self._comparisons = [each for each in comparisons if each.until is None]
+        self._find_deadlines()
+        flow = self.modes[mode].flow
+        if mode in self._chart.final or not (flow or self._comparisons):
+            return
+        if not flow:
+            flow = {_STILL: Formula("0")}
+            self._known[_STILL] = 0.0
+        self._trajectory = Trajectory(
+            flow,
+            self._known,
+            {"mode_time": self._entered},
+            method=self.method,
+            tolerance=(self.relative_tolerance, self.absolute_tolerance),
+            max_step=self.max_step,
+        )
+        for each in self._comparisons:
+            self._trajectory.watch(each.difference, f"mode {mode}")
+        self._set_out(self._trajectory, *origin)
+
+    # -- guards and actions ---------------------------------------------------------------------------------------
+
+    def is_present(self, port: str) -> bool:
+        return port in self._tokens
+
+    def leaves(self, mode: str) -> None:
+        self._act(self.modes[mode].exit)
+
+    def act(self, rule: Rule) -> None:
+        self._act(rule.act)
+
+    def _act(self, actions: tuple[Action, ...]) -> None:
+        for name, formula in actions:
+            if formula.source in self._tokens and name not in self.variables:
+                value = self._tokens[formula.source]  # as it came
+            else:
+                value = formula(self._values(formula))
+            if name in self.variables:
+                self._known[name] = value
+            else:
+                self.outputs[name].send(value)
+
+    def delay_of(self, rule: Rule) -> float:
+        return number_of(rule.delay, self._values(rule.delay), f"{rule} after")
+
+    def holds(self, rule: Rule) -> bool:
+        if rule.guard is None:
+            return True
+        try:
+            return self._is_true(self._conditions[self._current][rule].formula)
+        except EpicycleError:
+            return self._is_true(rule.guard)  # which tells what is wrong in the words of the model
+
+    def holds_alone(self, rule: Rule) -> bool:
+        tokens, self._tokens = self._tokens, {}
+        try:
+            return super().holds_alone(rule)
+        finally:
+            self._tokens = tokens
+
+    def _is_true(self, guard: Formula) -> bool:
+        values = self._values(guard)
+        if len(values) == len(guard.names):
+            found = guard(values)
+        else:
+            try:
+                found = evaluate(guard.source, _Silent(values, set(guard.names) - values.keys()))
+            except _SilentError:
+                return False
+            except ExpressionError as error:
+                raise EpicycleError(f"{guard.source!r}: {error}") from None
+        if not isinstance(found, (bool, int, float)):
+            raise EpicycleError(f"the guard {guard} gives {found!r}, which is neither true nor false")
+        return bool(found)
+
+    def _values(self, formula: Formula) -> dict[str, Any]:
+        """What the names of an expression stand for now; those of inputs without a token are left out."""
+        found = {name: self._value(name) for name in formula.names}
+        return {name: value for name, value in found.items() if value is not ABSENT}
+
+    def _value(self, name: str) -> Any:
+        if name in self._tokens:
+            return operand(self._tokens[name])
+        if name in self._known:
+            return self._known[name]
+        if name in self._truths:
+            return self._truths[name]
+        if name == "time":
+            return self.now
+        if name == "mode_time":
+            return to_seconds(self.context.time - self._entered)
+        if name.endswith(_PRESENT):
+            return name.removesuffix(_PRESENT) in self._tokens
+        return ABSENT
+
+
+class _SilentError(Exception):
+    """A guard asks for an input that has no token."""
+
+
+class _Silent(dict[str, Any]):
+    """Values, where asking for one of the ``silent`` names says so."""
+
+    def __init__(self, values: Mapping[str, Any], silent: Collection[str]) -> None:
+        super().__init__(values)
+        self._silent = silent
+
+    def __contains__(self, name: object) -> bool:
+        if name in self._silent:
+            raise _SilentError
+        return super().__contains__(name)
+
+
+def _check_name(where: str, name: str, kind: str, known: Collection[str]) -> None:
+    if name not in known:
+        near = did_you_mean(name, known)
+        raise ParameterError(f"{where}: there is no {kind} {name!r}{near}; {kind}s: {', '.join(known) or 'none'}")

@@ -1,0 +1,330 @@
+"""Modal actors: what modes and transitions mean, whoever writes them.
+
+The meaning
+-----------
+A machine is in one mode.  It reacts once per tag at which it fires:
+
+1. Of the transitions that leave the mode, those are *enabled* whose delay is over, one of whose trigger ports has a
+   token, and whose guard holds.  An ``otherwise`` transition is enabled if no other one is.
+2. Of the enabled ones, those of the lowest ``priority`` count.  If they are several, each must be nondeterministic, and
+   one is drawn; else the run ends with an error.
+3. The transition is taken: the exit actions of the mode, its own actions, the entry actions of its target.
+4. From the target, ``immediate`` transitions alone may be taken in the same reaction, as long as one is enabled.
+
+When it has come to a mode of which a transition is enabled without any token, it reacts again one microstep later.  A
+delay counts from the entry, also when a mode is entered again from itself.  In a final mode nothing happens any more.
+
+Source: E. A. Lee and S. Tripakis, "Modal Models in Ptolemy" (2010); Ptolemy: ``FSMActor``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, TypeVar
+
+from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Wake, did_you_mean
+
+MOST_IMMEDIATE: Final = 1_000
+ALL: Final = "*"
+
+Method = Callable[[Any], None]
+M = TypeVar("M", bound=Method)
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """One transition.  ``guard``, ``delay`` and ``act`` are whatever the modal actor makes use of; None for none."""
+
+    sources: tuple[str, ...]
+    target: str
+    on: tuple[str, ...] = ()
+    guard: Any = None
+    delay: Any = None
+    act: Any = None
+    priority: int = 0
+    otherwise: bool = False
+    immediate: bool = False
+    nondeterministic: bool = False
+
+    def __str__(self) -> str:
+        return f"{', '.join(self.sources)} -> {self.target}"
+
+
+class Chart:
+    """The modes of a machine and the transitions that leave each; raises ``ParameterError`` if they do not fit."""
+
+    def __init__(
+        self, modes: Sequence[str], initial: str | None, final: Collection[str], rules: Sequence[Rule]
+    ) -> None:
+        if not modes:
+            raise ParameterError("modes: there is none")
+        self.modes = tuple(modes)
+        self.initial = self._known("initial", modes[0] if initial is None else initial)
+        self.final = frozenset(self._known("final", mode) for mode in final)
+        self.leaving: dict[str, tuple[Rule, ...]] = dict.fromkeys(modes, ())
+        for rule in rules:
+            self._known(str(rule), rule.target)
+            for mode in self._sources(rule):
+                self.leaving[mode] += (rule,)
+        self.immediate = {mode: tuple(rule for rule in rules if rule.immediate) for mode, rules in self.leaving.items()}
+        self._check_reach()
+        for mode, leaving in self.leaving.items():
+            self._check_clear(mode, leaving)
+
+    def _known(self, where: str, mode: str) -> str:
+        if mode not in self.modes:
+            near = did_you_mean(mode, self.modes)
+            raise ParameterError(f"{where}: there is no mode {mode!r}{near}; modes: {', '.join(self.modes)}")
+        return mode
+
+    def _sources(self, rule: Rule) -> list[str]:
+        if rule.sources == (ALL,):
+            return [mode for mode in self.modes if mode != rule.target and mode not in self.final]
+        for mode in rule.sources:
+            if self._known(str(rule), mode) in self.final:
+                raise ParameterError(f"{rule}: {mode!r} is final, so nothing leaves it")
+        return list(rule.sources)
+
+    def _check_reach(self) -> None:
+        reached, waiting = {self.initial}, [self.initial]
+        while waiting:
+            for rule in self.leaving[waiting.pop()]:
+                if rule.target not in reached:
+                    reached.add(rule.target)
+                    waiting.append(rule.target)
+        if lost := [mode for mode in self.modes if mode not in reached]:
+            raise ParameterError(f"modes: {lost[0]!r} is never entered: no way leads there from {self.initial!r}")
+
+    @staticmethod
+    def _check_clear(mode: str, leaving: Sequence[Rule]) -> None:
+        """Refuse transitions that are certain to be enabled together, and of which none is to be preferred."""
+        seen: dict[object, Rule] = {}
+        for rule in leaving:
+            same = rule.priority, rule.otherwise, rule.on, rule.guard, rule.delay, rule.immediate
+            first = seen.setdefault(same, rule)
+            if first is not rule and not (first.nondeterministic and rule.nondeterministic):
+                raise ParameterError(
+                    f"in {mode!r}, both {first} and {rule} are enabled whenever one is: give one a priority "
+                    "(the lower one goes first), or make both nondeterministic"
+                )
+
+
+class ModalActor(Actor):
+    """Base of actors with modes, whose transitions are methods:
+
+    >>> class Door(ModalActor):
+    ...     button = InputPort()
+    ...     lamp = OutputPort(str)
+    ...     modes = ("closed", "open")
+    ...
+    ...     @transition("closed", "open", on="button")
+    ...     def opens(self) -> None:
+    ...         self.lamp.send("green")
+    ...
+    ...     @transition("open", "closed", after=5.0)
+    ...     def closes(self) -> None:
+    ...         self.lamp.send("red")
+
+    ``modes`` are their names, the first the initial one unless ``initial`` says another; ``final`` are those in which
+    it is done.  What a reaction is stands at the top of this file.
+    """
+
+    copies_share = ("_chart",)
+
+    modes: Any = ()
+    initial: Any = None
+    final: Any = ()
+
+    mode = OutputPort(str, doc="the mode, whenever one is entered")
+
+    def check(self) -> None:
+        methods = _methods(type(self)).items()
+        found = [replace(rule, act=name) for name, each in methods for rule in getattr(each, "_transitions", ())]
+        self._chart = Chart(self.modes, self.initial, self.final, found)
+        for rule in found:
+            for name in rule.on:
+                if name not in self.inputs:
+                    valid = ", ".join(self.inputs) or "none"
+                    near = did_you_mean(name, self.inputs)
+                    raise ParameterError(f"{rule}: there is no input {name!r}{near}; inputs: {valid}")
+
+    # -- what a transition comes to -------------------------------------------------------------------------------
+
+    def is_present(self, port: str) -> bool:
+        """Whether an input has a token in this reaction."""
+        return self.inputs[port].present
+
+    def holds(self, rule: Rule) -> bool:
+        """Whether the guard of a transition holds."""
+        return rule.guard is None or bool(rule.guard(self))
+
+    def delay_of(self, rule: Rule) -> float:
+        """How long (s) after the entry a transition may be taken."""
+        delay = rule.delay(self) if callable(rule.delay) else rule.delay
+        return float(delay)
+
+    def act(self, rule: Rule) -> None:
+        """The actions of a transition."""
+        getattr(self, rule.act)()
+
+    def enters(self, mode: str) -> None:
+        """The entry actions of a mode."""
+        self._call("_entry_of", mode)
+
+    def leaves(self, mode: str) -> None:
+        """The exit actions of a mode."""
+        self._call("_exit_of", mode)
+
+    def _call(self, mark: str, mode: str) -> None:
+        for name, method in _methods(type(self)).items():
+            if mode in getattr(method, mark, ()):
+                getattr(self, name)()
+
+    # -- the run --------------------------------------------------------------------------------------------------
+
+    @property
+    def current(self) -> str:
+        """The mode that it is in."""
+        return self._current
+
+    def initialize(self) -> None:
+        self._current = self._chart.initial
+        self._is_begun = False
+        self._timers: dict[Rule, Wake | None] = {}  # of delays; None when one is over
+        self._again: Wake | None = self.wake_in(0)  # a firing that is for a reaction
+
+    @property
+    def is_called(self) -> bool:
+        """Whether a delay is over, or a reaction has asked for another."""
+        wakes = (self._again, *self._timers.values())
+        return any(wake is not None and wake.due for wake in wakes)
+
+    def fire(self) -> None:
+        self.react()
+
+    def react(self) -> bool:
+        """One reaction; whether a mode was entered."""
+        chart, is_new = self._chart, not self._is_begun
+        if is_new:
+            self._is_begun = True
+            self._enter(chart.initial)
+        for waiting, wake in self._timers.items():
+            if wake is not None and wake.due:
+                self._timers[waiting] = None
+        taken: list[Rule] = []
+        rule = self._choose(chart.leaving[self._current])
+        while rule is not None:
+            taken.append(rule)
+            if len(taken) > MOST_IMMEDIATE:
+                way = " -> ".join(dict.fromkeys(each.target for each in taken))
+                raise EpicycleError(f"{MOST_IMMEDIATE:,} immediate transitions in one reaction: {way} -> ...")
+            self._take(rule)
+            rule = self._choose(chart.immediate[self._current])
+        is_new = is_new or bool(taken)
+        if is_new and any(self.holds_alone(each) for each in chart.leaving[self._current]):
+            self._again = self.wake_in(0)
+        return is_new
+
+    def holds_alone(self, rule: Rule) -> bool:
+        """Whether a transition would be enabled at the next microstep, if no token came."""
+        return not (rule.otherwise or rule.on) and self._is_open(rule) and self.holds(rule)
+
+    def _is_open(self, rule: Rule) -> bool:
+        """Whether the delay of a transition is over."""
+        return rule.delay is None or self._timers.get(rule, rule) is None
+
+    def _is_enabled(self, rule: Rule) -> bool:
+        return self._is_open(rule) and (not rule.on or any(map(self.is_present, rule.on))) and self.holds(rule)
+
+    def _choose(self, rules: Sequence[Rule]) -> Rule | None:
+        enabled = [rule for rule in rules if not rule.otherwise and self._is_enabled(rule)]
+        enabled = enabled or [rule for rule in rules if rule.otherwise and self._is_enabled(rule)]
+        if not enabled:
+            return None
+        first = min(rule.priority for rule in enabled)
+        enabled = [rule for rule in enabled if rule.priority == first]
+        if len(enabled) == 1:
+            return enabled[0]
+        if not all(rule.nondeterministic for rule in enabled):
+            raise EpicycleError(
+                f"in mode {self._current!r}, {' and '.join(map(str, enabled))} are enabled at once: give one a "
+                "priority (the lower one goes first), or make all nondeterministic"
+            )
+        return enabled[self.random.below(len(enabled))]
+
+    def _take(self, rule: Rule) -> None:
+        self.leaves(self._current)
+        if rule.act is not None:
+            self.act(rule)
+        self._enter(rule.target)
+
+    def _enter(self, mode: str) -> None:
+        for wake in self._timers.values():
+            if wake is not None:
+                wake.cancel()
+        self._current = mode
+        self.mode.send(mode)
+        self.enters(mode)
+        self._timers = {
+            rule: self.wake_in(self.delay_of(rule)) for rule in self._chart.leaving[mode] if rule.delay is not None
+        }
+
+
+# -- transitions as methods ---------------------------------------------------------------------------------------
+
+
+def transition(
+    source: str | Sequence[str],
+    target: str,
+    *,
+    on: str | Sequence[str] = (),
+    when: Callable[[Any], object] | None = None,
+    after: float | str | Callable[[Any], float] | None = None,
+    priority: int = 0,
+    otherwise: bool = False,
+    immediate: bool = False,
+    nondeterministic: bool = False,
+) -> Callable[[M], M]:
+    """A method of a ``ModalActor`` that is what a transition does.
+
+    ``source`` is a mode, several, or ``"*"`` for all but the target; ``on`` are inputs of which one must have a token;
+    ``when`` is given the actor and says whether the transition can be taken; ``after`` is the time since the entry: s,
+    a text with a unit, or a function of the actor.  A method may be several transitions.
+    """
+    delay = Parameter(float, unit="s", min=0).convert(after) if isinstance(after, (str, int, float)) else after
+    rule = Rule(_texts(source), target, _texts(on), when, delay, None, priority, otherwise, immediate, nondeterministic)
+
+    def mark(method: M) -> M:
+        vars(method).setdefault("_transitions", []).insert(0, rule)  # decorators apply from below
+        return method
+
+    return mark
+
+
+def on_entry(*modes: str) -> Callable[[M], M]:
+    """A method of a ``ModalActor`` that is called whenever one of these modes is entered."""
+    return _marked("_entry_of", modes)
+
+
+def on_exit(*modes: str) -> Callable[[M], M]:
+    """A method of a ``ModalActor`` that is called whenever one of these modes is left."""
+    return _marked("_exit_of", modes)
+
+
+def _marked(mark: str, modes: tuple[str, ...]) -> Callable[[M], M]:
+    def add(method: M) -> M:
+        setattr(method, mark, modes)
+        return method
+
+    return add
+
+
+def _methods(cls: type) -> dict[str, Any]:
+    """What a class has by name, its bases' first."""
+    names = dict.fromkeys(name for base in reversed(cls.__mro__) for name in vars(base))
+    return {name: getattr(cls, name) for name in names if callable(getattr(cls, name, None))}
+
+
+def _texts(given: str | Sequence[str]) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else tuple(given)

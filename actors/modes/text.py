@@ -1,0 +1,181 @@
+"""What modes, transitions and actions are as values: texts of one line, or mappings."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Final
+
+from ..core import Configurable, MappingParameter, Parameter, ParameterError, brief, texts_parameter
+from ..core.units import quantity
+from ..expression import Formula, FormulaParameter
+
+_QUOTED: Final = re.compile(r"'[^']*'|\"[^\"]*\"")
+_ARROW: Final = re.compile(r"\s*(?P<sources>[^>]+?)\s*->\s*(?P<target>[^\s;]+)(?P<rest>(\s.*)?)", re.DOTALL)
+_FLAG: Final = re.compile(r"\s*(?:(?P<flag>else|immediate|nondeterministic)|priority\s+(?P<priority>-?\d+))(?=\s|$)")
+_CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
+_ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
+_FORM: Final = "'a -> b on PORT after TIME when CONDITION do NAME = VALUE; ...'"
+
+Action = tuple[str, Formula]
+
+
+class _DelayParameter(FormulaParameter):
+    """A time, or an expression for one in s."""
+
+    def describe_type(self) -> str:
+        return "time or expression"
+
+    def convert(self, value: object) -> Formula | None:
+        if not isinstance(value, (str, Formula)) or (isinstance(value, str) and quantity(value) is not None):
+            given = Parameter(float, unit="s", min=0.0, optional=self.optional).convert(value)
+            return None if given is None else Formula(repr(given))
+        return super().convert(value)
+
+
+class _ActionsParameter(Parameter[Any]):
+    """``name = expression; name = expression``, or a mapping of names to expressions."""
+
+    def __init__(self, doc: str) -> None:
+        super().__init__(object, (), doc=doc)
+
+    def describe_type(self) -> str:
+        return "actions 'name = expression; ...'"
+
+    def convert(self, value: object) -> tuple[Action, ...]:
+        if isinstance(value, tuple) or value is None:
+            return value or ()
+        given = value.items() if isinstance(value, Mapping) else self._actions(value)
+        found = []
+        for name, formula in given:
+            try:
+                read = FormulaParameter().convert(formula)
+            except ParameterError as error:
+                raise ParameterError(f"{name} = {error}", (name,)) from None
+            assert read is not None
+            found.append((name, read))
+        return tuple(found)
+
+    def _actions(self, text: object) -> Iterator[tuple[str, str]]:
+        if not isinstance(text, str):
+            raise ParameterError(f"{brief(text)} is not a {self.describe_type()}")
+        start = 0
+        for end in [*(found.start() for found in re.finditer(";", _masked(text))), len(text)]:
+            part, start = text[start:end], end + 1
+            if not part.strip():
+                continue
+            match = _ASSIGNMENT.fullmatch(part)
+            if match is None:
+                raise ParameterError(f"{part.strip()!r} is not an action: write 'name = expression'")
+            yield match["name"], match["formula"].strip()
+
+
+class Mode(Configurable):
+    """What is said of a mode."""
+
+    flow = MappingParameter(FormulaParameter(), {}, doc="how fast variables change in it, per s; others stand still")
+    entry = _ActionsParameter("what is done whenever it is entered")
+    exit = _ActionsParameter("what is done whenever it is left")
+    final = Parameter(bool, False, doc="whether the machine is done when it is entered")
+    doc = Parameter(str, "", doc="what it is")
+
+
+class Transition(Configurable):
+    """What is said of a transition."""
+
+    reserved: ClassVar[frozenset[str]] = frozenset()
+
+    from_ = texts_parameter(doc="the modes that it leaves; * for all but its target")
+    to = Parameter(str, doc="the mode that it enters")
+    on = texts_parameter((), doc="inputs of which one must have a token")
+    after = _DelayParameter(None, doc="how long after the entry it may be taken, in s")
+    when = FormulaParameter(None, doc="the guard")
+    do = _ActionsParameter("what is done when it is taken: outputs are sent, variables are set, one after the other")
+    priority = Parameter(int, 0, doc="of several that are enabled, the lower one is taken")
+    else_ = Parameter(bool, False, doc="whether it is enabled only if no other is")
+    immediate = Parameter(bool, False, doc="whether it can be taken in the reaction in which its mode is entered")
+    nondeterministic = Parameter(bool, False, doc="whether one is drawn if several such are enabled")
+
+
+class ModesParameter(Parameter[Any]):
+    """Names of modes, or a mapping of names to what is said of them."""
+
+    def describe_type(self) -> str:
+        return "list of names, or mapping of names to what is said of a mode"
+
+    def convert(self, value: object) -> dict[str, Mode]:
+        if isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value):
+            if len(set(value)) < len(value):
+                raise ParameterError(f"{next(each for each in value if value.count(each) > 1)!r} is declared twice")
+            value = dict.fromkeys(value)
+        if not isinstance(value, Mapping):
+            raise ParameterError(f"{brief(value)} is not a {self.describe_type()}")
+        found = {}
+        for name, said in value.items():
+            if not isinstance(name, str) or not name.isidentifier():
+                raise ParameterError(f"{name!r} is not a name", (str(name),), of_key=True)
+            found[name] = said if isinstance(said, Mode) else _made(Mode, {} if said is None else said, name)
+        return found
+
+
+class TransitionsParameter(Parameter[Any]):
+    """Transitions, each a text of one line or a mapping."""
+
+    def describe_type(self) -> str:
+        return f"list of transitions such as {_FORM}"
+
+    def convert(self, value: object) -> tuple[Transition, ...]:
+        if not isinstance(value, (list, tuple)):
+            raise ParameterError(f"{brief(value)} is not a {self.describe_type()}")
+        found = []
+        for place, each in enumerate(value):
+            said = read_transition(each) if isinstance(each, str) else each
+            what = each if isinstance(each, str) else f"transition {place + 1}"
+            found.append(said if isinstance(said, Transition) else _made(Transition, said, what))
+        return tuple(found)
+
+
+def _made(kind: type[Any], said: object, what: str) -> Any:
+    if not isinstance(said, Mapping):
+        raise ParameterError(f"{what}: {brief(said)} is not a mapping", (what,))
+    try:
+        return kind(**said)
+    except ParameterError as error:
+        raise ParameterError(f"{what}: {error}", (what, *error.keys), of_key=error.of_key) from None
+
+
+def read_transition(text: str) -> dict[str, object]:
+    """What a transition of one line says; raises ``ParameterError`` if it is none."""
+    arrow = _ARROW.fullmatch(text)
+    if arrow is None:
+        raise ParameterError(f"{text!r} is not a transition: write {_FORM}")
+    said: dict[str, object] = {"to": arrow["target"], "from": [each.strip() for each in arrow["sources"].split(",")]}
+    rest = arrow["rest"]
+    while (flag := _FLAG.match(rest)) is not None:
+        key = flag["flag"] or "priority"
+        said[key] = int(flag["priority"]) if key == "priority" else True
+        rest = rest[flag.end() :]
+    masked = _masked(rest)
+    clauses = list(_CLAUSE.finditer(masked))
+    actions = next((number for number, clause in enumerate(clauses) if clause[0] == "do"), len(clauses))
+    clauses = clauses[: actions + 1]
+    if masked[: clauses[0].start() if clauses else None].strip():
+        raise ParameterError(f"{text!r}: {rest.split()[0]!r} is not understood: write {_FORM}")
+    for number, clause in enumerate(clauses):
+        end = clauses[number + 1].start() if number + 1 < len(clauses) else len(rest)
+        value = rest[clause.end() : end].strip()
+        if clause[0] in said:
+            raise ParameterError(f"{text!r}: {clause[0]!r} is said twice")
+        said[clause[0]] = [each.strip() for each in value.split(",")] if clause[0] == "on" else value
+    return said
+
+
+def _masked(text: str) -> str:
+    """The text with all that is quoted or in brackets blanked out."""
+    text = _QUOTED.sub(lambda match: "_" * len(match[0]), text)
+    depth, found = 0, []
+    for character in text:
+        depth -= character in ")]}"
+        found.append("_" if depth > 0 else character)
+        depth += character in "([{"
+    return "".join(found)

@@ -1,0 +1,126 @@
+"""Trajectory: how named states go on in model time, by formulas, from one discontinuity to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any, Final
+
+from .core import NANOSECONDS_PER_SECOND, EpicycleError
+from .expression import Formula
+from .expression.enclosure import bounds_of
+from .integration import Bounds, State
+from .solution import Guard, Solution, sign_of
+
+_MAX_STEPS: Final = 10_000
+_AHEAD: Final = 64  # parts of a step that are searched for crossings at once
+
+
+class Trajectory:
+    """The present solution for some states, whose ``rates`` are formulas over them, over ``held`` values and ``time``.
+
+    ``begin`` starts a solution; whoever does so again, because something has changed, keeps the same guards.
+    ``held`` is shared: what changes in it counts from the next beginning on.  ``also`` are names for the time since a
+    moment (ns).
+    """
+
+    def __init__(
+        self, rates: Mapping[str, Formula], held: dict[str, Any], also: Mapping[str, int] | None = None, **solver: Any
+    ) -> None:
+        self.names = tuple(rates)
+        self.guards: list[Guard] = []
+        self.time, self.fraction = 0, 0.0
+        self.solution: Solution
+        self._formulas = dict(rates)
+        self._held = held
+        self._also = dict(also or {})
+        self._solver = solver
+
+    def watch(self, formula: Formula, what: str, *, rising: bool = True, falling: bool = True) -> Guard:
+        """Look for the zero crossings of a formula, which messages call ``what``."""
+
+        def value(at: float, state: State) -> float:
+            return number_of(formula, self.values(at, state), what)
+
+        guard = Guard(value, partial(self._bounds, formula), rising, falling)
+        self.guards.append(guard)
+        return guard
+
+    def begin(self, time: int, fraction: float, state: State) -> None:
+        """Start a solution at ``time`` ns plus a fraction of a nanosecond in s: no rounding adds up over crossings."""
+        self.time, self.fraction = time, fraction
+        self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver)
+
+    def begin_at(self, at: float, state: State) -> None:
+        """Start anew at a time of the present solution."""
+        moment = self.moment(at)
+        self.begin(moment, self.fraction + at - (moment - self.time) / NANOSECONDS_PER_SECOND, state)
+
+    # -- time -----------------------------------------------------------------------------------------------------
+
+    def elapsed(self, time: int) -> float:
+        """Seconds since the solution's start, which may lie ahead by a fraction of a nanosecond."""
+        return max(0.0, (time - self.time) / NANOSECONDS_PER_SECOND - self.fraction)
+
+    def moment(self, at: float) -> int:
+        """The nanosecond that is nearest to a time of the present solution."""
+        return self.time + round((self.fraction + at) * NANOSECONDS_PER_SECOND)
+
+    def _at(self, at: float, since: int = 0) -> float:
+        """The time in the model at a time of the present solution, counted from a moment."""
+        return (self.time - since) / NANOSECONDS_PER_SECOND + (self.fraction + at)
+
+    def next_look(self, time: int) -> int:
+        """When (ns) to look again: at the next crossing or, while none is in sight, where the search for it ends."""
+        solution, parts = self.solution, 0
+        while solution.crossing is None and self.moment(solution.searched) <= time:
+            solution.look()
+            parts += 1
+            if parts > _MAX_STEPS:
+                raise EpicycleError(f"the solver takes more than {_MAX_STEPS:,} steps within a nanosecond")
+        while solution.crossing is None and solution.searched < solution.end and parts < _AHEAD:
+            solution.look()
+            parts += 1
+        return self.moment(solution.searched if solution.crossing is None else solution.crossing.time)
+
+    # -- values ---------------------------------------------------------------------------------------------------
+
+    def values(self, at: float, state: State) -> dict[str, Any]:
+        """What expressions know at a time of the present solution."""
+        names = {**self._held, **dict(zip(self.names, state, strict=True))}
+        names["time"] = self._at(at)
+        for name, since in self._also.items():
+            names[name] = self._at(at, since)
+        return names
+
+    def signs(self, at: float, state: State) -> list[int]:
+        """On which sides the guards are."""
+        return [sign_of(guard.value(at, state)) for guard in self.guards]
+
+    def _rates(self, at: float, state: State) -> State:
+        names = self.values(at, state)
+        return [number_of(formula, names, f"derivative of {name}") for name, formula in self._formulas.items()]
+
+    def _bounds(self, formula: Formula, left: float, right: float, states: Sequence[Bounds]) -> Bounds:
+        return bounds_of(formula, self._known_bounds(left, right, states))
+
+    def _bounds_of_rates(self, left: float, right: float, states: Sequence[Bounds]) -> list[Bounds]:
+        known = self._known_bounds(left, right, states)
+        return [bounds_of(formula, known) for formula in self._formulas.values()]
+
+    def _known_bounds(self, left: float, right: float, states: Sequence[Bounds]) -> dict[str, Bounds]:
+        """What the names in expressions lie between, from one time of the present solution to another."""
+        known = {name: (value, value) for name, value in self._held.items() if isinstance(value, (int, float))}
+        known |= {name: (self._at(left, since), self._at(right, since)) for name, since in self._also.items()}
+        return {**known, **dict(zip(self.names, states, strict=True)), "time": (self._at(left), self._at(right))}
+
+
+def number_of(formula: Formula, names: Mapping[str, Any], what: str) -> float:
+    """The value of a formula, which must be a number; ``what`` it is of, for messages."""
+    try:
+        result = formula(names)
+    except EpicycleError as error:
+        raise EpicycleError(f"{what}: {error}") from None
+    if isinstance(result, bool) or not isinstance(result, (int, float)):
+        raise EpicycleError(f"{what}: {formula} gives {result!r}, which is not a number")
+    return float(result)
