@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Mapping
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, Protocol
 
 from ..core import (
     ABSENT,
@@ -15,6 +15,7 @@ from ..core import (
     OutputPort,
     Parameter,
     ParameterError,
+    Tag,
     Wake,
     did_you_mean,
     to_nanoseconds,
@@ -31,6 +32,19 @@ from .text import Action, ModesParameter, TransitionsParameter
 _PRESENT: Final = "_is_present"
 _LONGEST: Final = 9e9  # s, of the times that there are
 _STILL: Final = "_still"  # a state that does not move, where guards wait for a time alone
+
+
+class Refinements(Protocol):
+    """The refinements of a machine's modes, as the engine has them."""
+
+    def begin(self, mode: str) -> None:
+        """The run begins, or begins anew, in a mode."""
+
+    def go(self, mode: str, *, history: bool) -> None:
+        """Leave the present mode's, and enter another's: where it was left, or anew."""
+
+    def raise_failure(self) -> None:
+        """No transition takes the error of the present mode's."""
 
 
 class StateMachine(ModalActor):
@@ -64,6 +78,8 @@ class StateMachine(ModalActor):
     """
 
     is_source: ClassVar[bool] = True
+    refinements: Refinements | None = None  # of its modes, if it is the machine of a composite
+    handed: tuple[str, ...] = ()  # variables that are told to refinements whenever a mode is entered
 
     trigger = InputPort(required=False, doc="asks for the variables")
 
@@ -88,7 +104,7 @@ class StateMachine(ModalActor):
         read += [formula for mode in self.modes.values() for formula in mode.flow.values()]
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for name in self.variables:
-            if name in TIMES:
+            if name in self._reserved:
                 raise ParameterError(f"variables: {name!r} has a meaning of its own")
             ports[name] = OutputPort(self._type(name), doc="a variable, when it is asked for")
         named = [
@@ -97,10 +113,10 @@ class StateMachine(ModalActor):
         ]
         for name in named:
             name = name.removesuffix(_PRESENT)
-            if name not in (*TIMES, "trigger", *ports):
-                ports[name] = InputPort(required=False, doc="a name in guards or actions")
+            if name not in (*self._reserved, "trigger", *ports):
+                ports[name] = InputPort(required=False, multi=True, doc="a name in guards or actions")
         for name, _ in actions:
-            if name in TIMES or isinstance(ports.get(name), InputPort):
+            if name in self._reserved or isinstance(ports.get(name), InputPort):
                 what = "an input, for it is read" if name in ports else "a time"
                 raise ParameterError(
                     f"{name} = ...: {name!r} is {what}; declare it as a variable to set it, or rename it"
@@ -117,6 +133,15 @@ class StateMachine(ModalActor):
         kind = type(self.variables.get(name))
         return float if kind in (int, float) else kind if kind in (bool, str) else Any
 
+    @property
+    def catches(self) -> bool:
+        """Whether it has transitions for errors."""
+        return any(one.error for one in self.transitions)
+
+    @property
+    def _reserved(self) -> tuple[str, ...]:
+        return (*TIMES, "error") if self.catches else TIMES
+
     def _at_borders(self) -> list[Action]:
         return [each for mode in self.modes.values() for each in (*mode.entry, *mode.exit)]
 
@@ -125,6 +150,7 @@ class StateMachine(ModalActor):
             Rule(
                 each.from_, each.to, each.on, each.when, each.after, each.do or None,
                 each.priority, each.else_, each.immediate, each.nondeterministic,
+                each.preemptive, each.history, each.error,
             )
             for each in self.transitions
         ]  # fmt: skip
@@ -146,10 +172,16 @@ class StateMachine(ModalActor):
                     found[rule] = condition_of(rule.guard, moving, numbers, taken)
                     taken += len(found[rule].comparisons)
 
+        rules = [rule for leaving in self._chart.leaving.values() for rule in leaving]
+        self.is_preemptive = any(rule.preemptive for rule in rules)
+
     # -- the run --------------------------------------------------------------------------------------------------
 
     def initialize(self) -> None:
         super().initialize()
+        self.is_asked = False  # whether its refinement has fired
+        if self.refinements is not None:
+            self.refinements.begin(self._current)
         self._known: dict[str, Any] = dict(self.variables)
         self._known |= {name: value for name, value in self.held.items() if value is not None}
         self._queues: dict[str, deque[Any]] = {name: deque() for name in self._inputs}
@@ -158,38 +190,63 @@ class StateMachine(ModalActor):
         self._trajectory: Trajectory | None = None
         self._comparisons: list[Comparison] = []  # for each guard of the trajectory
         self._deadlines: dict[Comparison, int] = {}  # of those that wait for a time alone: when (ns)
-        self._judged = self.context.time
+        self._seen = self.context.time  # when it has fired last
+        self._prepared: Tag | None = None
         self._open: dict[Comparison, int] = {}  # those that a transition has put on their border: where they came from
         self._passed: dict[Formula, int] = {}  # what crosses now, and to which side
         self._before: dict[str, Any] = {}  # variables as they were there
         self._truths: dict[str, float] = {}  # of the comparisons
         self._wake: Wake | None = None
 
-    def fire(self) -> None:
-        if self._wake is not None and not self._wake.due:
-            self._wake.cancel()
-        self._wake = None
+    def preempt(self) -> bool:
+        """Look at preemptive transitions, before the refinement of the mode fires; whether one was taken."""
+        self._prepare()
+        if self._is_to_react:
+            self.react(self._chart.phases[:1])
+        return self._reacted == self.tag
+
+    def _prepare(self) -> None:
         self._take_tokens()
-        self._go_on()
+        if self._prepared != self.tag:
+            self._prepared = self.tag
+            self._go_on()
         self._hold_tokens()
-        if self._tokens or self._passed or self._has_reached or self.is_called:
-            self.react()
-        self._judged = self.context.time
+
+    @property
+    def _is_to_react(self) -> bool:
+        """Whether there is a reason to: a token, a comparison that changes, a delay that is over, its refinement."""
+        if self._tokens or self._passed or self.is_asked or self.error is not None or self.is_called:
+            return True
+        return any(self._seen < time <= self.context.time for time in self._deadlines.values())
+
+    def fire(self) -> None:
+        self._prepare()
+        if self._is_to_react:
+            self.react(self._chart.phases)
+            if self.error is not None and self.refinements is not None:
+                self.refinements.raise_failure()
+        if self._is_new:
+            for name in self.handed:
+                self.outputs[name].send(self._known[name])
+        self.finish()
+        self._seen, self.is_asked = self.context.time, False
         if self.trigger.present:
             self._tell()
         self._tokens = {}
         if any(self._queues.values()):
             self.wake_in(0)
-        looks = [time for time in self._deadlines.values() if time > self.context.time]
+        if self._wake is not None and not self.is_due(self._wake):
+            self._wake.cancel()
+        looks = [time for time in self._deadlines.values() if self.context.time < time < NEVER]
         if self._trajectory is not None and self._comparisons:
             looks.append(self._trajectory.next_look(self.context.time))
-        if looks:
-            self._wake = self.context.wake(self, min(looks))
+        self._wake = self.context.wake(self, min(looks)) if looks else None
 
     @property
-    def _has_reached(self) -> bool:
-        """Whether a time that guards wait for has come."""
-        return any(self._judged < time <= self.context.time for time in self._deadlines.values())
+    def next_time(self) -> int | None:
+        """When (ns) it is to fire next of its own accord."""
+        wakes = (self._wake, self._again, *self._timers.values())
+        return min((wake.time for wake in wakes if wake is not None and not self.is_due(wake)), default=None)
 
     def _take_tokens(self) -> None:
         """The first token that waits at each input."""
@@ -331,6 +388,10 @@ class StateMachine(ModalActor):
     def is_present(self, port: str) -> bool:
         return port in self._tokens
 
+    def moves(self, rule: Rule) -> None:
+        if self.refinements is not None:
+            self.refinements.go(rule.target, history=rule.history)
+
     def leaves(self, mode: str) -> None:
         self._act(self.modes[mode].exit)
 
@@ -395,6 +456,8 @@ class StateMachine(ModalActor):
             return self._truths[name]
         if name == "time":
             return self.now
+        if name == "error" and self.catches:
+            return self.error or ""
         if name == "mode_time":
             return to_seconds(self.context.time - self._entered)
         if name.endswith(_PRESENT):

@@ -11,6 +11,9 @@ A machine is in one mode.  It reacts once per tag at which it fires:
 3. The transition is taken: the exit actions of the mode, its own actions, the entry actions of its target.
 4. From the target, ``immediate`` transitions alone may be taken in the same reaction, as long as one is enabled.
 
+``preemptive`` transitions go before all others.  Where modes have refinements, they are looked at before the refinement
+fires, which then does not, and all others after it has fired.  If it fails, ``error`` transitions alone are looked at.
+
 When it has come to a mode of which a transition is enabled without any token, it reacts again one microstep later.  A
 delay counts from the entry, also when a mode is entered again from itself.  In a final mode nothing happens any more.
 
@@ -19,11 +22,11 @@ Source: E. A. Lee and S. Tripakis, "Modal Models in Ptolemy" (2010); Ptolemy: ``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
-from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Wake, did_you_mean
+from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
 
 MOST_IMMEDIATE: Final = 1_000
 ALL: Final = "*"
@@ -46,6 +49,9 @@ class Rule:
     otherwise: bool = False
     immediate: bool = False
     nondeterministic: bool = False
+    preemptive: bool = False
+    history: bool = False
+    error: bool = False
 
     def __str__(self) -> str:
         return f"{', '.join(self.sources)} -> {self.target}"
@@ -67,10 +73,14 @@ class Chart:
             self._known(str(rule), rule.target)
             for mode in self._sources(rule):
                 self.leaving[mode] += (rule,)
-        self.immediate = {mode: tuple(rule for rule in rules if rule.immediate) for mode, rules in self.leaving.items()}
+        self.immediate = self._those(lambda rule: rule.immediate)
+        self.phases = self._those(lambda rule: rule.preemptive), self._those(lambda rule: not rule.preemptive)
         self._check_reach()
         for mode, leaving in self.leaving.items():
             self._check_clear(mode, leaving)
+
+    def _those(self, of_a_kind: Callable[[Rule], bool]) -> dict[str, tuple[Rule, ...]]:
+        return {mode: tuple(filter(of_a_kind, leaving)) for mode, leaving in self.leaving.items()}
 
     def _known(self, where: str, mode: str) -> str:
         if mode not in self.modes:
@@ -101,7 +111,9 @@ class Chart:
         """Refuse transitions that are certain to be enabled together, and of which none is to be preferred."""
         seen: dict[object, Rule] = {}
         for rule in leaving:
-            same = rule.priority, rule.otherwise, rule.on, rule.guard, rule.delay, rule.immediate
+            same = (
+                rule.priority, rule.otherwise, rule.on, rule.guard, rule.delay, rule.preemptive, rule.error
+            )  # fmt: skip
             first = seen.setdefault(same, rule)
             if first is not rule and not (first.nondeterministic and rule.nondeterministic):
                 raise ParameterError(
@@ -168,6 +180,9 @@ class ModalActor(Actor):
         """The actions of a transition."""
         getattr(self, rule.act)()
 
+    def moves(self, rule: Rule) -> None:
+        """What changes with the mode."""
+
     def enters(self, mode: str) -> None:
         """The entry actions of a mode."""
         self._call("_entry_of", mode)
@@ -191,50 +206,70 @@ class ModalActor(Actor):
     def initialize(self) -> None:
         self._current = self._chart.initial
         self._is_begun = False
+        self._is_new = False  # whether it has come to a mode in this firing
+        self._reacted: Tag | None = None  # when it has taken a transition
         self._timers: dict[Rule, Wake | None] = {}  # of delays; None when one is over
         self._again: Wake | None = self.wake_in(0)  # a firing that is for a reaction
+        self.error: str | None = None  # with which the refinement of the mode has failed
+
+    def is_due(self, wake: Wake | None) -> bool:
+        """Whether a wake-up is for this firing, or for an earlier one at this tag."""
+        return wake is not None and (wake.due or wake.tag == self.tag)
 
     @property
     def is_called(self) -> bool:
-        """Whether a delay is over, or a reaction has asked for another."""
-        wakes = (self._again, *self._timers.values())
-        return any(wake is not None and wake.due for wake in wakes)
+        """Whether a delay ends now, or a reaction has asked for another."""
+        return any(map(self.is_due, (self._again, *self._timers.values())))
 
     def fire(self) -> None:
-        self.react()
+        self.react(self._chart.phases)
+        self.finish()
 
-    def react(self) -> bool:
-        """One reaction; whether a mode was entered."""
-        chart, is_new = self._chart, not self._is_begun
-        if is_new:
+    def react(self, phases: Sequence[Mapping[str, Sequence[Rule]]]) -> None:
+        """One reaction, unless there was one at this tag; of the phases the first in which a transition is enabled."""
+        chart, taken = self._chart, list[Rule]()
+        if not self._is_begun:
             self._is_begun = True
             self._enter(chart.initial)
-        for waiting, wake in self._timers.items():
-            if wake is not None and wake.due:
-                self._timers[waiting] = None
-        taken: list[Rule] = []
-        rule = self._choose(chart.leaving[self._current])
+        if self._reacted == self.tag:
+            return
+        rule = None
+        for phase in phases:
+            rule = rule or self._choose(phase[self._current])
         while rule is not None:
             taken.append(rule)
             if len(taken) > MOST_IMMEDIATE:
                 way = " -> ".join(dict.fromkeys(each.target for each in taken))
                 raise EpicycleError(f"{MOST_IMMEDIATE:,} immediate transitions in one reaction: {way} -> ...")
+            self._reacted = self.tag
             self._take(rule)
             rule = self._choose(chart.immediate[self._current])
-        is_new = is_new or bool(taken)
-        if is_new and any(self.holds_alone(each) for each in chart.leaving[self._current]):
-            self._again = self.wake_in(0)
-        return is_new
+
+    def finish(self) -> None:
+        """Tell the mode that it has come to, and react again if it can go on from there without any token."""
+        self._timers = {rule: None if self.is_due(wake) else wake for rule, wake in self._timers.items()}
+        if self.is_due(self._again):
+            self._again = None
+        if self._is_new:
+            self._is_new = False
+            self.mode.send(self._current)
+            if any(self.holds_alone(each) for each in self._chart.leaving[self._current]):
+                self._again = self.wake_in(0)
 
     def holds_alone(self, rule: Rule) -> bool:
         """Whether a transition would be enabled at the next microstep, if no token came."""
-        return not (rule.otherwise or rule.on) and self._is_open(rule) and self.holds(rule)
+        return not (rule.otherwise or rule.on or rule.error) and self._is_open(rule) and self.holds(rule)
 
     def _is_open(self, rule: Rule) -> bool:
         """Whether the delay of a transition is over."""
-        return rule.delay is None or self._timers.get(rule, rule) is None
+        if rule.delay is None or rule not in self._timers:
+            return rule.delay is None
+        wake = self._timers[rule]
+        return wake is None or self.is_due(wake)
 
     def _is_enabled(self, rule: Rule) -> bool:
+        if rule.error != (self.error is not None):
+            return False
         return self._is_open(rule) and (not rule.on or any(map(self.is_present, rule.on))) and self.holds(rule)
 
     def _choose(self, rules: Sequence[Rule]) -> Rule | None:
@@ -257,14 +292,15 @@ class ModalActor(Actor):
         self.leaves(self._current)
         if rule.act is not None:
             self.act(rule)
+        self.error = None
+        self.moves(rule)
         self._enter(rule.target)
 
     def _enter(self, mode: str) -> None:
         for wake in self._timers.values():
             if wake is not None:
                 wake.cancel()
-        self._current = mode
-        self.mode.send(mode)
+        self._current, self._is_new = mode, True
         self.enters(mode)
         self._timers = {
             rule: self.wake_in(self.delay_of(rule)) for rule in self._chart.leaving[mode] if rule.delay is not None
@@ -285,6 +321,7 @@ def transition(
     otherwise: bool = False,
     immediate: bool = False,
     nondeterministic: bool = False,
+    preemptive: bool = False,
 ) -> Callable[[M], M]:
     """A method of a ``ModalActor`` that is what a transition does.
 
@@ -293,7 +330,10 @@ def transition(
     a text with a unit, or a function of the actor.  A method may be several transitions.
     """
     delay = Parameter(float, unit="s", min=0).convert(after) if isinstance(after, (str, int, float)) else after
-    rule = Rule(_texts(source), target, _texts(on), when, delay, None, priority, otherwise, immediate, nondeterministic)
+    rule = Rule(
+        _texts(source), target, _texts(on), when, delay, None,
+        priority, otherwise, immediate, nondeterministic, preemptive,
+    )  # fmt: skip
 
     def mark(method: M) -> M:
         vars(method).setdefault("_transitions", []).insert(0, rule)  # decorators apply from below

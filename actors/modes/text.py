@@ -12,7 +12,9 @@ from ..expression import Formula, FormulaParameter
 
 _QUOTED: Final = re.compile(r"'[^']*'|\"[^\"]*\"")
 _ARROW: Final = re.compile(r"\s*(?P<sources>[^>]+?)\s*->\s*(?P<target>[^\s;]+)(?P<rest>(\s.*)?)", re.DOTALL)
-_FLAG: Final = re.compile(r"\s*(?:(?P<flag>else|immediate|nondeterministic)|priority\s+(?P<priority>-?\d+))(?=\s|$)")
+_FLAG: Final = re.compile(
+    r"\s*(?:(?P<flag>else|immediate|nondeterministic|preemptive|history|error)|priority\s+(?P<priority>-?\d+))(?=\s|$)"
+)
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
 _ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
 _FORM: Final = "'a -> b on PORT after TIME when CONDITION do NAME = VALUE; ...'"
@@ -73,6 +75,10 @@ class _ActionsParameter(Parameter[Any]):
 class Mode(Configurable):
     """What is said of a mode."""
 
+    refused: ClassVar[Mapping[str, str]] = {
+        "refinement": "a mode of an actor has no refinement: write the modes into a composite, beside its 'inputs'"
+    }
+
     flow = MappingParameter(FormulaParameter(), {}, doc="how fast variables change in it, per s; others stand still")
     entry = _ActionsParameter("what is done whenever it is entered")
     exit = _ActionsParameter("what is done whenever it is left")
@@ -95,6 +101,9 @@ class Transition(Configurable):
     else_ = Parameter(bool, False, doc="whether it is enabled only if no other is")
     immediate = Parameter(bool, False, doc="whether it can be taken in the reaction in which its mode is entered")
     nondeterministic = Parameter(bool, False, doc="whether one is drawn if several such are enabled")
+    preemptive = Parameter(bool, False, doc="whether it goes before others, and before its mode's refinement fires")
+    history = Parameter(bool, False, doc="whether the refinement of its target goes on where it was left")
+    error = Parameter(bool, False, doc="whether it is for errors of its mode's refinement; 'error' says which")
 
 
 class ModesParameter(Parameter[Any]):

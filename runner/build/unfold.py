@@ -15,11 +15,13 @@ from typing import Any
 from epicycle.actors import Actor, Parameter
 
 from ..catalogue import Catalogue, CatalogueError, PortTypeError, read_type, token_types
+from ..graph import Modal
 from ..language import CompositeText, PartText, PortText
 from ..text import RAISE_IT, Position, did_you_mean
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors
 from .draft import Draft
+from .modes import connect_modes
 from .settle import Settler, converted, drift, local_nanoseconds
 
 MAX_DEPTH = 50
@@ -101,9 +103,32 @@ class Unfolding:
         self.draft.is_wired = self.draft.is_wired and composite.is_wired
         for connection in composite.connections:
             wiring.resolve(connection, names).make(self.draft)
+        if composite.machine is not None:
+            self._modes(path, composite, names, within)
         self.aspects += ((path, part, names) for part in composite.aspects.values())
 
-    def instances(self, path: str, part: PartText, names: Names, within: tuple[str, ...] = ()) -> Child | None:
+    def _modes(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...]) -> None:
+        """Make the machine of a composite with modes and their refinements, and connect them."""
+        graph, made = self.draft.graph, dict[str, str]()
+        assert composite.machine is not None
+        machine = f"{path}.{composite.machine.name}"
+        self.instances(machine, composite.machine, names, within)
+        for mode, part in composite.refinements.items():
+            full = f"{path}.{mode}"
+            kind = self._type(full, part, within)
+            if isinstance(kind, CompositeText):
+                self.instances(full, part, names, within, is_refinement=True)
+                made[mode] = full
+            elif kind is not None:
+                message = f"{full}: {part.type.text} is an actor, and a refinement is a composite"
+                self._tell(message, part.type.position, path, "write a composite class with that actor in it")
+        if made:
+            graph.modal[path] = Modal(machine, made)
+        connect_modes(path, composite, self.known.composites, self.draft, self.problems)
+
+    def instances(
+        self, path: str, part: PartText, names: Names, within: tuple[str, ...] = (), *, is_refinement: bool = False
+    ) -> Child | None:
         """Make the instances of one entry of ``actors``; None if there is no such type."""
         kind = self._type(path, part, within)
         if kind is None:
@@ -125,7 +150,7 @@ class Unfolding:
                 inside = self.settler.parameters(instance, kind, part.values, scope, part.position)
                 if "index" in scope:
                     inside.setdefault("index", scope["index"])
-                self.composite(instance, kind, inside, part.position, within)
+                self.composite(instance, kind, inside, part.position, within, is_refinement=is_refinement)
             else:
                 self._actor(instance, kind, part, scope)
         if isinstance(kind, CompositeText):
@@ -225,6 +250,8 @@ class Unfolding:
         inside: Names,
         position: Position | None,
         within: tuple[str, ...] = (),
+        *,
+        is_refinement: bool = False,
     ) -> None:
         """One instance of a composite, its ports and all that is in it; ``inside`` are its parameters."""
         graph = self.draft.graph
@@ -234,7 +261,11 @@ class Unfolding:
             for name, port in composite.ports(direction).items():
                 kind = self._port_type(composite, port)
                 graph.add_composite_port(f"{path}.{name}", direction, position, kind, port.position)
-        if composite.director is not None:
+        if is_refinement:
+            graph.add_refinement(path)
+        elif composite.director is None and composite.refinements:
+            graph.add_director(path, None, 1.0)
+        elif composite.director is not None:
             local: dict[str, Any] = {"start": None, "drift": 1.0}
             for key, entry in composite.director.items():
                 convert = local_nanoseconds if key == "start" else drift

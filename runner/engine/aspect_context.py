@@ -12,6 +12,7 @@ from ..results import EventLog, Signal
 from .director import Director
 from .errors import ActorError, CrowdError, LoopError
 from .local_time import LocalDirector
+from .refinement import Refinement
 from .way import Call, Deliver
 
 
@@ -20,7 +21,7 @@ class EngineContext:
 
     def __init__(
         self,
-        local: Director | LocalDirector,
+        local: Director | LocalDirector | Refinement,
         director: Director,
         log: EventLog,
         latest: dict[str, Any],

@@ -20,6 +20,7 @@ from .agenda import Turn
 from .director import Director
 from .errors import ActorError
 from .local_time import LocalDirector
+from .refinement import Refinement
 
 
 class Execution:
@@ -29,11 +30,12 @@ class Execution:
     ``forget`` when it has lost its state.
     """
 
-    def __init__(self, actor: Actor, director: Director, local: Director | LocalDirector) -> None:
+    def __init__(self, actor: Actor, director: Director, local: Director | LocalDirector | Refinement) -> None:
         self.actor = actor
         self.way: Callable[[Job], None] = self.execute
         self.refresh: list[Callable[[], None]] = []
         self.forget: Callable[[], None] = _nothing
+        self.refinement: Refinement | None = None  # that it is in, if errors in there lead to a transition
         self.seed = director.seed
         self.ranks = director.ranks
         self.environment = local.environment
@@ -128,6 +130,8 @@ class Execution:
     def _carry_out(self, job: Job) -> None:
         if job.life != self._life or not job.is_wanted:
             return
+        if self.refinement is not None and not self.refinement.is_open:
+            return
         if self._gates:
             self._held.append(job)
             return
@@ -140,7 +144,12 @@ class Execution:
             refresh()
         turn, self._open = self._open, None
         start = perf_counter()
-        self._director.fire(self._turns[job.rank].of_actor)
+        try:
+            self._director.fire(self._turns[job.rank].of_actor)
+        except ActorError as error:
+            if self.refinement is None:
+                raise
+            self.refinement.conductor.fail(error)
         if job.watch is not None:
             job.watch(perf_counter() - start)
         self._open = turn

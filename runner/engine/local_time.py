@@ -17,13 +17,14 @@ from epicycle.actors import Actor, Tag, Wake, Way
 from ..graph import Clock
 from .agenda import Delivery
 from .director import Director
+from .refinement import Refinement
 from .way import Call
 
 
 class LocalDirector:
     """The director as the actors and aspects inside a composite with a clock of its own see it."""
 
-    def __init__(self, director: Director, clock: Clock) -> None:
+    def __init__(self, director: Director | Refinement, clock: Clock) -> None:
         self.environment = LocalEnvironment(director.environment, clock)
         self.seed = director.seed
         self._director = director
@@ -86,11 +87,18 @@ class Passage(Actor):
     What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.
     """
 
-    def __init__(self, path: str, director: Director) -> None:
+    def __init__(self, path: str, director: Director | Refinement) -> None:
         super().__init__(path)
         self.enter(director)
+        self.gate: Refinement | None = None  # behind it, which may be closed: what comes then is lost
+        self.beside: Actor | None = None  # who fires when something has come through
         self._director = director
         self._lanes: dict[object, _Lane] = {}
+
+    def clear(self) -> None:
+        """Forget what waits."""
+        for lane in self._lanes.values():
+            lane.waiting.clear()
 
     def lane(self, channel: object, onward: Way) -> Way:
         """Where a token of a channel goes that has come so far; ``onward`` is where it goes when it has passed."""
@@ -104,6 +112,10 @@ class Passage(Actor):
 
     def fire(self) -> None:
         now = self.tag
+        if self.gate is not None and not self.gate.is_open:
+            self.clear()
+        if self.beside is not None:
+            self._director.trigger(self.beside)
         for lane in self._lanes.values():
             if lane.waiting and lane.passed != now:
                 lane.passed = now

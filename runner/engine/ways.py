@@ -12,6 +12,7 @@ from epicycle.actors import (
     Emitter,
     EpicycleError,
     OutputPort,
+    StateMachine,
     Way,
     declared_parameters,
 )
@@ -28,7 +29,7 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..graph import Clock, Hop, ModelGraph, WovenAspect
+from ..graph import Clock, Hop, ModelGraph, WovenAspect, is_within
 from ..results import EventLog, Signal
 from ..text import describe
 from .aspect_context import EngineContext
@@ -37,6 +38,7 @@ from .errors import ActorError, LoopError
 from .execution import Execution
 from .local_time import LocalDirector, Passage
 from .parameters import VaryingParameter
+from .refinement import Conductor, Refinement
 from .requests import Requests
 from .way import Call, Delayed, Deliver, Guarded, Screened, Sender, all_of
 
@@ -89,23 +91,77 @@ class Ways:
                 listeners.setdefault(woven.model.response, []).append(partial(self._answer, woven))
         for path in dict.fromkeys(path for woven in aspects for path in woven.looks_at):
             listeners.setdefault(path, []).append(partial(self._latest.__setitem__, path))
-        self._directors: dict[str, Director | LocalDirector] = {}
+        self._directors: dict[str, Director | LocalDirector | Refinement] = {}
+        self._conductors: dict[str, Conductor] = {}
         self._passages: dict[str, Passage] = {}
+        self._refinements: dict[str, Refinement] = {}
         for composite, clock in self.graph.clocks.items():
-            self._directors[composite] = director if clock.is_global else LocalDirector(director, clock)
-            for paths in self.graph.borders(composite):
-                self._passages.update({path: Passage(path, director) for path in paths})
+            self._add_director(composite, clock)
         changed = {path.rpartition(".")[0] for woven in aspects for path in woven.parameters}
         self._executions = {
             path: Execution(actor, director, self._by_clock(path))
             for path, actor in actors.items()
-            if path in self._woven_at or path in changed
+            if path in self._woven_at or path in changed or self._is_caught(path)
         }
         self._emitters = self._find()
         self._vary_parameters(aspects)
         for path, execution in self._executions.items():
+            if self._is_caught(path):
+                refinement = self._refinements[self.graph.refinement_of(path)]
+                execution.refinement = refinement
             execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
+
+    def _add_director(self, composite: str, clock: Clock) -> None:
+        """What is asked for under a director of its own."""
+        outside = self._base(self.graph.director_of(composite)) if composite else self.director
+        for paths in self.graph.borders(composite):
+            self._passages.update({path: Passage(path, outside) for path in paths})
+        if self.graph.refinement_of(composite) == composite != "":
+            modal = composite.rpartition(".")[0]
+            inside = Refinement(composite, self._directors[modal], self.director)
+            self._refinements[composite] = self._directors[composite] = inside
+            conductor = self._conductors[modal]
+            conductor.refinements[composite.rpartition(".")[2]] = inside
+            conductor.insides[composite.rpartition(".")[2]] = partial(self._begin_anew, composite)
+            inside.conductor = conductor
+            for path in self.graph.borders(composite)[0]:
+                self._passages[path].gate = inside
+            return
+        base = self._base(composite)
+        self._directors[composite] = base if clock.is_global else LocalDirector(base, clock)
+        if composite in self.graph.modal:
+            machine = self.actors[self.graph.modal[composite].machine]
+            assert isinstance(machine, StateMachine)
+            conductor = Conductor(composite, machine, self.director, self._directors[composite])
+            self._conductors[composite] = conductor
+            if machine.is_preemptive:
+                for path in self.graph.borders(composite)[0]:
+                    self._passages[path].beside = conductor
+
+    def _base(self, composite: str) -> Director | Refinement:
+        """Whose time a composite's clock counts from."""
+        refinement = self.graph.refinement_of(composite)
+        return self._refinements[refinement] if refinement else self.director
+
+    def _is_caught(self, path: str) -> bool:
+        """Whether an actor is in a refinement for whose errors there are transitions."""
+        refinement = self._refinements.get(self.graph.refinement_of(path))
+        return refinement is not None and refinement.conductor.machine.catches
+
+    def _begin_anew(self, refinement: str) -> None:
+        """Let all that is in a refinement begin anew."""
+        for path, passage in self._passages.items():
+            if is_within(path, refinement):
+                passage.clear()
+        for path, actor in self.actors.items():
+            if is_within(path, refinement):
+                execution = self._executions.get(path)
+                if execution is not None:
+                    execution.kill()
+                else:
+                    actor.halt()
+                actor.restart()
 
     def _vary_parameters(self, aspects: list[WovenAspect]) -> None:
         """Let the aspects that stand at a parameter change it before each firing of its actor."""
@@ -122,7 +178,7 @@ class Ways:
                 entry = self._through(woven, path, path, entry)
             self._executions[owner].refresh.append(partial(entry.go, varying.nominal))
 
-    def director_of(self, path: str) -> Director | LocalDirector:
+    def director_of(self, path: str) -> Director | LocalDirector | Refinement:
         """The director that an actor or composite stands under, with its time."""
         return self._directors[self.graph.director_of(path)]
 
@@ -130,7 +186,7 @@ class Ways:
         """What an actor sees of the run."""
         return self._executions.get(path) or self._by_clock(path)
 
-    def _by_clock(self, path: str) -> Director | LocalDirector:
+    def _by_clock(self, path: str) -> Director | LocalDirector | Refinement:
         """The director by the clock of an actor, if that is wrong."""
         clock = before = self.graph.clocks[self.graph.director_of(path)]
         for woven, aspect in self._wrong_clocks:
@@ -142,7 +198,8 @@ class Ways:
                 clock = Clock(clock.start + ahead, clock.rate * speed)
         if clock == before:
             return self.director_of(path)
-        return self.director if clock.is_global else LocalDirector(self.director, clock)
+        base = self._base(self.graph.director_of(path))
+        return base if clock.is_global else LocalDirector(base, clock)
 
     @property
     def executed(self) -> Container[str]:

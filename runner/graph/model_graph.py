@@ -54,6 +54,14 @@ class Detour(Hop):
     aspect: str
 
 
+@dataclass(frozen=True)
+class Modal:
+    """A composite with modes whose machine has refinements: their paths, by the mode."""
+
+    machine: str
+    refinements: Mapping[str, str]
+
+
 class ModelGraph:
     """The flattened graph of one model, which is built and then frozen: to change it again, change a ``copy``.
 
@@ -68,6 +76,7 @@ class ModelGraph:
         # The composites with a director of their own, which are actors to the graph around them; "" is the model.
         self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
+        self.modal: dict[str, Modal] = {}  # composites with modes, by their path
         self.priorities: dict[str, int] = {}
         self.positions: dict[str, Position] = {}  # also of "aspect NAME"
         self.tags: dict[str, tuple[str, ...]] = {}  # what the model's author put on actors and composites
@@ -153,6 +162,11 @@ class ModelGraph:
         self.members[path] = []
         self.clocks[path] = self.clocks[outer].inside(start, drift)
 
+    def add_refinement(self, path: str) -> None:
+        """Give a composite a director of its own, whose time goes on in one mode alone; clocks in it count by that."""
+        self.add_director(path, None, 1.0)
+        self.clocks[path] = Clock()
+
     def add_composite_port(
         self, path: str, direction: str, position: Position | None, type: Any = None, declared: Position | None = None
     ) -> None:
@@ -206,7 +220,7 @@ class ModelGraph:
         """What is known of parts, the actors first."""
         return (
             self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
-            self._borders, self._parts,
+            self._borders, self._parts, self.modal,
         )  # fmt: skip
 
     def remove(self, path: str) -> None:
@@ -249,6 +263,15 @@ class ModelGraph:
         while around not in self.clocks:
             around = around.rpartition(".")[0]
         return around
+
+    def refinement_of(self, path: str) -> str:
+        """The innermost refinement that this is in, or is; "" if there is none."""
+        if not self.modal:
+            return ""
+        refinements = {each for modal in self.modal.values() for each in modal.refinements.values()}
+        while path and path not in refinements:
+            path = path.rpartition(".")[0]
+        return path
 
     def director_over(self, hop: Hop) -> str:
         """The director in whose time a connection stands: of the composite that declares it."""

@@ -29,6 +29,9 @@ def firing_order(graph: ModelGraph) -> dict[str, int]:
     def unfold(director: str) -> None:
         inputs, outputs = graph.borders(director)
         order.extend([port] for port in inputs)
+        modal = graph.modal.get(director)
+        if modal is not None:  # its conductor is first, and its machine last
+            order.append([director])
         for turn in _turns(graph, director, depths(graph, director, regions[director])):
             if turn[0] in graph.clocks:
                 unfold(turn[0])
@@ -123,11 +126,15 @@ def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> list[list
     If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a turn of their own.
     """
     turns: list[tuple[int, int, list[str]]] = []
+    modal = graph.modal.get(director)
     for member in graph.members[director]:
+        if modal is not None and member == modal.machine:
+            continue
         inputs = [] if member in graph.clocks else ports_of(graph, member)[0]
         found: dict[int, list[str]] = {depth[member]: [member]}
         for port in inputs:
             found.setdefault(depth[port], []).append(port)
         turns += [(deep, graph.priorities.get(member, 0), paths) for deep, paths in found.items()]
     # The sort is stable: the order of declaration decides ties.
-    return [paths for _, _, paths in sorted(turns, key=lambda turn: turn[:2])]
+    order = [paths for _, _, paths in sorted(turns, key=lambda turn: turn[:2])]
+    return order if modal is None else [*order, [modal.machine, *ports_of(graph, modal.machine)[0]]]

@@ -116,6 +116,8 @@ class CompositeText:
     inputs: dict[str, PortText] = field(default_factory=dict)
     outputs: dict[str, PortText] = field(default_factory=dict)
     director: dict[str, Entry] | None = None  # what is said of its own one
+    machine: PartText | None = None  # of its modes
+    refinements: dict[str, PartText] = field(default_factory=dict)  # by the mode
     actors: dict[str, PartText] = field(default_factory=dict)
     connections: tuple[ConnectionText, ...] = ()
     is_wired: bool = True  # whether all its connections could be read

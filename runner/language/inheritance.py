@@ -113,6 +113,8 @@ class _Heir:
             inputs=self._ports("input"),
             outputs=self._ports("output"),
             director=base.director if text.director is None else text.director,
+            machine=self._machine(),
+            refinements={**base.refinements, **text.refinements},
             actors=self._parts("actor", base.actors, text.actors),
             aspects=self._parts("aspect", self._still_aimed(removed), text.aspects),
             connections=(*kept, *(each for each in text.connections if not each.removes)),
@@ -127,6 +129,10 @@ class _Heir:
                 self._problem(f"{name!r} is the name of an actor and of a port", part.position, "rename one")
         self._check_removals()
         return result
+
+    def _machine(self) -> PartText | None:
+        old, new = self.base.machine, self.text.machine
+        return new or old if old is None or new is None else replace(new, values={**old.values, **new.values})
 
     def _problem(self, message: str, position: Position, *hints: str) -> None:
         self.problems.add(f"{self.text.name}: {message}", position, *hints)

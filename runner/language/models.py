@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from keyword import iskeyword, kwlist
 from typing import Any
 
-from epicycle.actors import Actor, Parameter, UnitError, declared_parameters, parse_unit
+from epicycle.actors import Actor, Parameter, StateMachine, UnitError, declared_parameters, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
@@ -236,6 +237,8 @@ def _base(reader: NodeReader, node: Node, what: str) -> Text:
     return Text(reader.name(node, what) or "", node.position)
 
 
+# What a composite class says of its machine, if it has one.
+OF_MODES = ("modes", "transitions", "initial", "variables", "held")
 COMPOSITE = Construct(
     "A composite class: a graph with ports of its own.",
     {
@@ -259,6 +262,11 @@ COMPOSITE = Construct(
             "Wires: 'actor.port -> actor.port, actor.port', '=>' for all to all; or {from, to, all, delay}.",
         ),
         "aspects": ASPECTS,
+        **{
+            name: Key(node_as(schema_of(parameter)), about(parameter))
+            for name, parameter in declared_parameters(StateMachine).items()
+            if name in OF_MODES
+        },
     },
 )
 # Where a class extends another, its actors and aspects may be changes to inherited ones.
@@ -293,6 +301,10 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
     before = len(problems)
     derived = "extends" in entries
     said = (HEIR if derived else COMPOSITE).values(reader, entries, repr(name), position)
+    machine = {key: entries[key] for key in OF_MODES if said.pop(key, None) is not None and key in entries}
+    if machine:
+        said.setdefault("outputs", {}).setdefault("mode", PortText("mode", position, doc="the mode it has come to"))
+        said |= _machine(reader, name, machine, entries, position)
     inputs, outputs = said.get("inputs", {}), said.get("outputs", {})
     for port in outputs.values():
         if port.name in inputs:
@@ -313,6 +325,39 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
         is_wired=None not in written,
         spoilt=len(problems) > before or (derived and not said["extends"].text),
     )
+
+
+def _machine(
+    reader: NodeReader, name: str, machine: dict[str, Entry], entries: dict[str, Entry], position: Position
+) -> dict[str, Any]:
+    """The machine of a composite with modes, and their refinements."""
+    for key in ("actors", "connections"):
+        if key in entries:
+            hint = "put them into the refinement of a mode, or into a composite around this one"
+            reader.problems.add(f"{name} has modes, and no {key} beside them", entries[key].key.position, hint)
+    refinements: dict[str, PartText] = {}
+    modes = machine.get("modes")
+    if modes is not None and isinstance(modes.value, Mapping):
+        left = {}
+        for mode, entry in modes.value.entries.items():
+            left[mode] = entry
+            if isinstance(entry.value, Mapping) and "refinement" in entry.value.entries:
+                inner = dict(entry.value.entries)
+                refinement = _refinement(reader, mode, inner.pop("refinement"))
+                if refinement is not None:
+                    refinements[mode] = refinement
+                left[mode] = replace(entry, value=replace(entry.value, entries=inner))
+        machine["modes"] = replace(modes, value=replace(modes.value, entries=left))
+    kind = Text("StateMachine", position)
+    return {"machine": PartText("machine", position, kind, machine), "refinements": refinements}
+
+
+def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | None:
+    """A composite class by its name, or as an actor's entry with its parameters."""
+    if isinstance(entry.value, Mapping):
+        return part(reader, mode, entry, "actor")
+    kind = reader.name(entry.value, f"the refinement of {mode}")
+    return None if kind is None else PartText(mode, entry.key.position, Text(kind, entry.value.position))
 
 
 COMPOSITES = Key(named(ref("composite"), _composite), "Composite classes, for the types of actors.")

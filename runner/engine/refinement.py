@@ -1,0 +1,252 @@
+"""Refinements: composites that are active in one mode of a machine, and whose time stands still in all others.
+
+What is asked for inside of one waits in an agenda of its own, in its local time.  The conductor of the machine's
+composite fires before all that is in there: it lets the machine take a preemptive transition, or else lets what is due
+go on in the active refinement.  The machine fires last, and whatever it enters begins at the next microstep.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+import simpy
+from simpy.events import NORMAL, Event, EventPriority
+
+from epicycle.actors import Actor, Context, StateMachine, Tag, Wake, Way, new_wake
+
+from .agenda import Delivery, Turn
+from .director import Director
+from .errors import ActorError, CrowdError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Entry = tuple[int, int, "Wake | Delivery | Event", "Turn | EventPriority | None"]
+
+
+class Refinement:
+    """The director as what is inside of a refinement sees it; ``outer`` is what is around its machine."""
+
+    def __init__(self, path: str, outer: Context, director: Director) -> None:
+        self.path = path
+        self.seed = director.seed
+        self.director = director
+        self.environment = _Environment(self, outer.environment)
+        self.conductor: Conductor
+        self.is_active = False
+        self._outer = outer
+        self._lag = 0  # how far its time is behind (ns)
+        self._stood = 0  # outer time since when it has stood still
+        self._agenda: list[Entry] = []
+        self._numbers = count()
+
+    @property
+    def time(self) -> int:
+        """The local time (ns)."""
+        return (self._outer.time if self.is_active else self._stood) - self._lag
+
+    @property
+    def tag(self) -> Tag:
+        """The present tag in local time."""
+        return Tag(self.time, self.director.tag.microstep)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it takes part in the present tag."""
+        return self.is_active and not self.conductor.has_left
+
+    def wake(self, actor: Actor, time: int) -> Wake:
+        """Fire ``actor`` at a local time; the present or past is the next microstep."""
+        now, present = self.time, self.director.now()
+        step = present.microstep + (self.director.present is not None)
+        wake = new_wake(time, 1) if time > now else new_wake(now, step)
+        turn = self.director.turn(actor, self.director.ranks[actor.path])
+        self._put(max(time, now), wake, turn)
+        return wake
+
+    def later(self, delay: int, way: Way, token: Any) -> None:
+        """Let a token go on after ``delay`` ns of local time."""
+        self._put(self.time + delay, self.director.hold(way, token), None)
+
+    def put_event(self, event: Event, priority: EventPriority, time: int) -> None:
+        """Let an event of SimPy's happen at a local time."""
+        self._put(time, event, priority)
+
+    def _put(self, time: int, what: Wake | Delivery | Event, how: Turn | EventPriority | None) -> None:
+        most = self.director.crowd.most
+        if len(self._agenda) >= most:
+            raise CrowdError(self.director.tag, most, f"things that are to come in {self.path}", ())
+        heapq.heappush(self._agenda, (time, next(self._numbers), what, how))
+        if self.is_active:
+            self.conductor.plan()
+
+    def hold(self, way: Way, token: Any) -> Delivery:
+        """What lets a token go on, later."""
+        return self.director.hold(way, token)
+
+    def trigger(self, actor: Actor) -> None:
+        """Fire ``actor`` at the present tag."""
+        self.director.trigger(actor)
+
+    def stop(self, reason: str) -> None:
+        """End the run."""
+        self.director.stop(reason)
+
+    # -- what its conductor does with it --------------------------------------------------------------------------
+
+    @property
+    def next_time(self) -> int | None:
+        """The outer time at which something is to be done."""
+        return self._agenda[0][0] + self._lag if self._agenda else None
+
+    def release(self) -> bool:
+        """Let go on what is due; whether anything is."""
+        now, due = self.time, []
+        while self._agenda and self._agenda[0][0] <= now:
+            due.append(heapq.heappop(self._agenda))
+        is_any = False
+        for _, _, what, how in due:
+            if isinstance(what, Delivery):
+                what.arrive()
+            elif isinstance(what, Event):
+                self.environment.release(what, how)
+            elif what.cancelled:
+                continue
+            else:
+                assert isinstance(how, Turn)
+                how.add(what)
+                self.director.want(how)
+            is_any = True
+        return is_any
+
+    def suspend(self) -> None:
+        """Its time stands still."""
+        self._stood = self._outer.time
+        self.is_active = False
+
+    def resume(self) -> None:
+        """Its time goes on where it stood."""
+        self._lag += self._outer.time - self._stood
+        self.is_active = True
+
+    def begin(self) -> None:
+        """It begins anew, with the time around it, and with nothing to do."""
+        for _, _, what, _ in self._agenda:
+            if isinstance(what, Wake):
+                what.cancel()
+        self._agenda.clear()
+        self._lag, self.is_active = 0, True
+
+
+class _Environment(simpy.Environment):
+    """The run's SimPy environment in the time of a refinement, for the processes inside."""
+
+    def __init__(self, refinement: Refinement, outer: Any) -> None:
+        super().__init__()
+        self._refinement = refinement
+        self._outer = outer
+
+    @property
+    def now(self) -> int | float:
+        """The local time (ns)."""
+        return self._refinement.time
+
+    def schedule(self, event: Event, priority: EventPriority = NORMAL, delay: int | float = 0) -> None:
+        """Let an event happen after ``delay`` ns of local time."""
+        if delay == 0 and self._refinement.is_active:
+            self._outer.schedule(event, priority, 0)
+        else:
+            self._refinement.put_event(event, priority, self._refinement.time + round(delay))
+
+    def release(self, event: Event, priority: Any) -> None:
+        """Let an event happen now."""
+        self._outer.schedule(event, priority, 0)
+
+
+class Conductor(Actor):
+    """Fires at the head of a composite with modes: it has the refinements, of which one is active at most."""
+
+    def __init__(self, path: str, machine: StateMachine, director: Director, outer: Context) -> None:
+        super().__init__(path)
+        self.enter(outer)
+        self.machine = machine
+        self.refinements: dict[str, Refinement] = {}
+        self.insides: dict[str, Callable[[], None]] = {}  # what lets all in a refinement begin anew
+        self.passages: Mapping[str, Any] = {}
+        self._director = director
+        self._active: Refinement | None = None
+        self._left: Tag | None = None  # the tag at which a preemptive transition, or an error, has cut a firing short
+        self._wake: Wake | None = None
+        self.failure: ActorError | None = None
+        machine.refinements = self
+
+    @property
+    def has_left(self) -> bool:
+        """Whether the active refinement has no part in the present tag any more."""
+        return self._left is not None and self._left == self._director.tag
+
+    def fire(self) -> None:
+        self._wake = None
+        if self.machine.is_preemptive and self.machine.preempt():
+            self._left = self._director.tag
+        elif self._active is not None and self._active.release():
+            self.machine.is_asked = True
+            self._director.trigger(self.machine)
+        self.plan()
+
+    def plan(self) -> None:
+        """Ask to be fired when something is to be done."""
+        times = [None if self._active is None else self._active.next_time]
+        if self.machine.is_preemptive:  # it is looked at before its refinement fires
+            times.append(self.machine.next_time)
+        time = min((each for each in times if each is not None), default=None)
+        if time is None or (self._wake is not None and not self._wake.cancelled and self._wake.time <= time):
+            return
+        if self._wake is not None:
+            self._wake.cancel()
+        self._wake = self.context.wake(self, time)
+
+    # -- for the machine ------------------------------------------------------------------------------------------
+
+    def begin(self, mode: str) -> None:
+        """The run begins, or begins anew, in a mode."""
+        for name, refinement in self.refinements.items():
+            refinement.begin()
+            if name != mode:
+                refinement.suspend()
+        self._left = self.failure = None
+        self._active = self.refinements.get(mode)
+
+    def go(self, mode: str, *, history: bool) -> None:
+        """Leave the present mode's refinement, and enter the other's: where it was left, or anew."""
+        if self._active is not None:
+            self._active.suspend()
+        if self._wake is not None:
+            self._wake.cancel()
+            self._wake = None
+        self._active = self.refinements.get(mode)
+        if self._active is None:
+            return
+        if history:
+            self._active.resume()
+        else:
+            self._active.begin()
+            self.insides[mode]()
+        self.plan()
+
+    def fail(self, error: ActorError) -> None:
+        """Something in the active refinement has failed: the machine says what comes of it."""
+        if not self.machine.catches:
+            raise error
+        self.failure = error
+        self._left = self._director.tag
+        self.machine.error = error.reason
+        self._director.trigger(self.machine)
+
+    def raise_failure(self) -> None:
+        """No transition of the machine takes the error."""
+        if self.failure is not None:
+            raise self.failure
