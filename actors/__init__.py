@@ -24,7 +24,7 @@ from .distributions import (
 from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
 from .functions import Expression, Function, LookupTable
 from .logic import Comparator, LogicGate
-from .modes import ModalActor, StateMachine, on_entry, on_exit, transition
+from .modes import ModalActor, Mode, StateMachine, on_entry, on_exit, transition
 from .queues import Queue, Server
 from .replay import Replay, ReplayError
 from .resources import Machine, Station
@@ -42,10 +42,10 @@ __all__ = [
     "Emitter", "EpicycleError", "Estimate", "Exponential", "Expression", "FilterError", "FilterPyEstimator", "Function",
     "Gamma", "GoalMonitor", "Histogram", "Inform", "InputPort", "Integrator", "Latest", "Line", "LogNormal",
     "LogicGate", "LookupTable", "Machine", "MappingParameter", "MathFunction", "Measurement", "Merge", "ModalActor",
-    "Moment", "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort",
-    "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter", "Process",
-    "Quantity", "Queue", "Ramp", "Random", "RandomInteger", "Ranks", "ReachGoal", "Recorder", "Repeat", "Replay",
-    "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor",
+    "Mode", "Moment", "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective",
+    "OutputPort", "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter",
+    "Process", "Quantity", "Queue", "Ramp", "Random", "RandomInteger", "Ranks", "ReachGoal", "Recorder", "Repeat",
+    "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor",
     "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "StateMachine", "Station", "Stop", "Stream",
     "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times", "Triangular", "Uniform",
     "UnitError", "UnscentedEstimator", "Vehicle", "Wake", "Way", "When", "abridged", "accepts", "array_parameter",

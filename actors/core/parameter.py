@@ -24,10 +24,10 @@ T = TypeVar("T")
 class ParameterError(EpicycleError):
     """A value that a parameter does not take; the message says what it takes.
 
-    ``keys`` lead to what is wrong within a mapping with a type; ``of_key``: it is the last key itself.
+    ``keys`` lead to what is wrong within a mapping, or within a list; ``of_key``: it is the last key itself.
     """
 
-    def __init__(self, message: str, keys: tuple[str, ...] = (), *, of_key: bool = False) -> None:
+    def __init__(self, message: str, keys: tuple[str | int, ...] = (), *, of_key: bool = False) -> None:
         super().__init__(message)
         self.keys = keys
         self.of_key = of_key

@@ -2,5 +2,6 @@
 
 from .machine import StateMachine
 from .modal import ModalActor, on_entry, on_exit, transition
+from .text import Mode
 
-__all__ = ["ModalActor", "StateMachine", "on_entry", "on_exit", "transition"]
+__all__ = ["ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"]

@@ -105,7 +105,7 @@ class StateMachine(ModalActor):
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for name in self.variables:
             if name in self._reserved:
-                raise ParameterError(f"variables: {name!r} has a meaning of its own")
+                raise ParameterError(f"variables: {name!r} has a meaning of its own", ("variables", name), of_key=True)
             ports[name] = OutputPort(self._type(name), doc="a variable, when it is asked for")
         named = [
             *(name for formula in read for name in formula.names),
@@ -150,18 +150,18 @@ class StateMachine(ModalActor):
             Rule(
                 each.from_, each.to, each.on, each.when, each.after, each.do or None,
                 each.priority, each.else_, each.immediate, each.nondeterministic,
-                each.preemptive, each.history, each.error,
+                each.preemptive, each.history, each.error, place,
             )
-            for each in self.transitions
+            for place, each in enumerate(self.transitions)
         ]  # fmt: skip
         final = [name for name, mode in self.modes.items() if mode.final]
         self._chart = Chart(tuple(self.modes), self.initial, final, rules)
         self._inputs = [name for name in self.inputs if name != "trigger"]
         for name in self.held:
-            _check_name("held", name, "input", self._inputs)
+            _check_name(("held", name), name, "input", self._inputs)
         for name, mode in self.modes.items():
             for variable in mode.flow:
-                _check_name(f"modes: {name}: flow", variable, "variable", self.variables)
+                _check_name(("modes", name, "flow", variable), variable, "variable", self.variables)
         numbers = {*self.held, *self.variables}
         self._conditions: dict[str, dict[Rule, Condition]] = {}
         for name, mode in self.modes.items():
@@ -482,7 +482,8 @@ class _Silent(dict[str, Any]):
         return super().__contains__(name)
 
 
-def _check_name(where: str, name: str, kind: str, known: Collection[str]) -> None:
+def _check_name(keys: tuple[str, ...], name: str, kind: str, known: Collection[str]) -> None:
     if name not in known:
-        near = did_you_mean(name, known)
-        raise ParameterError(f"{where}: there is no {kind} {name!r}{near}; {kind}s: {', '.join(known) or 'none'}")
+        where, near = ": ".join(keys[:-1]), did_you_mean(name, known)
+        message = f"{where}: there is no {kind} {name!r}{near}; {kind}s: {', '.join(known) or 'none'}"
+        raise ParameterError(message, keys, of_key=True)

@@ -52,6 +52,7 @@ class Rule:
     preemptive: bool = False
     history: bool = False
     error: bool = False
+    place: int = 0  # among the transitions, for messages
 
     def __str__(self) -> str:
         return f"{', '.join(self.sources)} -> {self.target}"
@@ -66,11 +67,11 @@ class Chart:
         if not modes:
             raise ParameterError("modes: there is none")
         self.modes = tuple(modes)
-        self.initial = self._known("initial", modes[0] if initial is None else initial)
-        self.final = frozenset(self._known("final", mode) for mode in final)
+        self.initial = self._known("initial", modes[0] if initial is None else initial, "initial")
+        self.final = frozenset(self._known("final", mode, "final") for mode in final)
         self.leaving: dict[str, tuple[Rule, ...]] = dict.fromkeys(modes, ())
         for rule in rules:
-            self._known(str(rule), rule.target)
+            self._known(str(rule), rule.target, "transitions", rule.place)
             for mode in self._sources(rule):
                 self.leaving[mode] += (rule,)
         self.immediate = self._those(lambda rule: rule.immediate)
@@ -82,18 +83,18 @@ class Chart:
     def _those(self, of_a_kind: Callable[[Rule], bool]) -> dict[str, tuple[Rule, ...]]:
         return {mode: tuple(filter(of_a_kind, leaving)) for mode, leaving in self.leaving.items()}
 
-    def _known(self, where: str, mode: str) -> str:
+    def _known(self, where: str, mode: str, *keys: str | int) -> str:
         if mode not in self.modes:
             near = did_you_mean(mode, self.modes)
-            raise ParameterError(f"{where}: there is no mode {mode!r}{near}; modes: {', '.join(self.modes)}")
+            raise ParameterError(f"{where}: there is no mode {mode!r}{near}; modes: {', '.join(self.modes)}", keys)
         return mode
 
     def _sources(self, rule: Rule) -> list[str]:
         if rule.sources == (ALL,):
             return [mode for mode in self.modes if mode != rule.target and mode not in self.final]
         for mode in rule.sources:
-            if self._known(str(rule), mode) in self.final:
-                raise ParameterError(f"{rule}: {mode!r} is final, so nothing leaves it")
+            if self._known(str(rule), mode, "transitions", rule.place) in self.final:
+                raise ParameterError(f"{rule}: {mode!r} is final, so nothing leaves it", ("transitions", rule.place))
         return list(rule.sources)
 
     def _check_reach(self) -> None:
@@ -104,7 +105,8 @@ class Chart:
                     reached.add(rule.target)
                     waiting.append(rule.target)
         if lost := [mode for mode in self.modes if mode not in reached]:
-            raise ParameterError(f"modes: {lost[0]!r} is never entered: no way leads there from {self.initial!r}")
+            message = f"{lost[0]!r} is never entered: no way leads there from {self.initial!r}"
+            raise ParameterError(message, ("modes", lost[0]), of_key=True)
 
     @staticmethod
     def _check_clear(mode: str, leaving: Sequence[Rule]) -> None:
@@ -118,7 +120,8 @@ class Chart:
             if first is not rule and not (first.nondeterministic and rule.nondeterministic):
                 raise ParameterError(
                     f"in {mode!r}, both {first} and {rule} are enabled whenever one is: give one a priority "
-                    "(the lower one goes first), or make both nondeterministic"
+                    "(the lower one goes first), or make both nondeterministic",
+                    ("transitions", rule.place),
                 )
 
 

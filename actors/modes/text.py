@@ -76,7 +76,7 @@ class Mode(Configurable):
     """What is said of a mode."""
 
     refused: ClassVar[Mapping[str, str]] = {
-        "refinement": "a mode of an actor has no refinement: write the modes into a composite, beside its 'inputs'"
+        "refinement": "a mode of an actor has no refinement: write modes into a composite, beside its 'inputs'"
     }
 
     flow = MappingParameter(FormulaParameter(), {}, doc="how fast variables change in it, per s; others stand still")
@@ -123,7 +123,10 @@ class ModesParameter(Parameter[Any]):
         for name, said in value.items():
             if not isinstance(name, str) or not name.isidentifier():
                 raise ParameterError(f"{name!r} is not a name", (str(name),), of_key=True)
-            found[name] = said if isinstance(said, Mode) else _made(Mode, {} if said is None else said, name)
+            try:
+                found[name] = said if isinstance(said, Mode) else _made(Mode, {} if said is None else said, name)
+            except ParameterError as error:
+                raise ParameterError(str(error), (name, *error.keys), of_key=error.of_key) from None
         return found
 
 
@@ -138,19 +141,22 @@ class TransitionsParameter(Parameter[Any]):
             raise ParameterError(f"{brief(value)} is not a {self.describe_type()}")
         found = []
         for place, each in enumerate(value):
-            said = read_transition(each) if isinstance(each, str) else each
             what = each if isinstance(each, str) else f"transition {place + 1}"
-            found.append(said if isinstance(said, Transition) else _made(Transition, said, what))
+            try:
+                said = read_transition(each) if isinstance(each, str) else each
+                found.append(said if isinstance(said, Transition) else _made(Transition, said, what))
+            except ParameterError as error:
+                raise ParameterError(str(error), (place, *error.keys), of_key=error.of_key) from None
         return tuple(found)
 
 
 def _made(kind: type[Any], said: object, what: str) -> Any:
     if not isinstance(said, Mapping):
-        raise ParameterError(f"{what}: {brief(said)} is not a mapping", (what,))
+        raise ParameterError(f"{what}: {brief(said)} is not a mapping")
     try:
         return kind(**said)
     except ParameterError as error:
-        raise ParameterError(f"{what}: {error}", (what, *error.keys), of_key=error.of_key) from None
+        raise ParameterError(f"{what}: {error}", error.keys, of_key=error.of_key) from None
 
 
 def read_transition(text: str) -> dict[str, object]:

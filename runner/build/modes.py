@@ -29,11 +29,13 @@ def connect_modes(
         draft.unknown.add(path)
         return
 
+    at = part.values["transitions"].key.position if "transitions" in part.values else part.position
+
     def join(source: str, destination: str, delay: int | None = None) -> None:
         graph.connect(f"{path}.{source}", f"{path}.{destination}", delay, part.position)
 
     def tell(message: str, *hints: str) -> None:
-        problems.add(f"{path}: {message}", part.position, *hints, scope=path)
+        problems.add(f"{path}: {message}", at, *hints, scope=path)
 
     refinements = {
         mode: classes[each.type.text] for mode, each in composite.refinements.items() if each.type.text in classes

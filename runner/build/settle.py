@@ -26,6 +26,7 @@ from ..text import (
     Node,
     Position,
     Problems,
+    Sequence,
     TooManyError,
     data_file,
     describe,
@@ -178,6 +179,15 @@ class Settler:
         found = converted(self.values, part.enabled, names, f"aspect {name}.enabled", scope, convert)
         return found is self.values.missing or bool(found)
 
+    def place_in(self, given: dict[str, Entry], error: Exception, position: Position) -> Position:
+        """Where in the values of a part something is that does not go with the others, if that is known."""
+        if not isinstance(error, ParameterError) or not error.keys or str(error.keys[0]) not in given:
+            return position
+        entry = given[str(error.keys[0])]
+        return (
+            entry.key.position if len(error.keys) == 1 else place_of(entry.value, error.keys[1:], of_key=error.of_key)
+        )
+
     def blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
         """Tell what the code of a class has against its values, or how it failed."""
         if isinstance(error, EpicycleError):
@@ -254,9 +264,12 @@ def converted(
     return values.missing
 
 
-def place_of(node: Node, keys: tuple[str, ...], *, of_key: bool) -> Position:
+def place_of(node: Node, keys: tuple[str | int, ...], *, of_key: bool) -> Position:
     """Where in a value, as far as it is written out, ``keys`` lead; ``of_key``: to the last of them itself."""
     for number, key in enumerate(keys, start=1):
+        if isinstance(node, Sequence) and isinstance(key, int):
+            node = node.items[key]
+            continue
         if not isinstance(node, Mapping) or key not in node.entries:
             break
         if of_key and number == len(keys):

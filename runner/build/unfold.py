@@ -238,7 +238,8 @@ class Unfolding:
                 self.actors.append(actor)
                 return
             except Exception as error:  # whatever an actor's own __init__ does
-                self.settler.blame(path, error, part.position, path)
+                place = self.settler.place_in(part.values, error, part.position)
+                self.settler.blame(path, error, place, path)
         self.draft.leave_out(path, actor_type)
 
     # -- composites -----------------------------------------------------------------------------------------------

@@ -30,12 +30,12 @@ Entry = tuple[int, int, "Wake | Delivery | Event", "Turn | EventPriority | None"
 class Refinement:
     """The director as what is inside of a refinement sees it; ``outer`` is what is around its machine."""
 
-    def __init__(self, path: str, outer: Context, director: Director) -> None:
+    def __init__(self, path: str, outer: Context, director: Director, conductor: Conductor) -> None:
         self.path = path
         self.seed = director.seed
         self.director = director
         self.environment = _Environment(self, outer.environment)
-        self.conductor: Conductor
+        self.conductor = conductor
         self.is_active = False
         self._outer = outer
         self._lag = 0  # how far its time is behind (ns)

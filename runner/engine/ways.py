@@ -117,19 +117,7 @@ class Ways:
         outside = self._base(self.graph.director_of(composite)) if composite else self.director
         for paths in self.graph.borders(composite):
             self._passages.update({path: Passage(path, outside) for path in paths})
-        if self.graph.refinement_of(composite) == composite != "":
-            modal = composite.rpartition(".")[0]
-            inside = Refinement(composite, self._directors[modal], self.director)
-            self._refinements[composite] = self._directors[composite] = inside
-            conductor = self._conductors[modal]
-            conductor.refinements[composite.rpartition(".")[2]] = inside
-            conductor.insides[composite.rpartition(".")[2]] = partial(self._begin_anew, composite)
-            inside.conductor = conductor
-            for path in self.graph.borders(composite)[0]:
-                self._passages[path].gate = inside
-            return
-        base = self._base(composite)
-        self._directors[composite] = base if clock.is_global else LocalDirector(base, clock)
+        self._directors[composite] = self._made_director(composite, clock)
         if composite in self.graph.modal:
             machine = self.actors[self.graph.modal[composite].machine]
             assert isinstance(machine, StateMachine)
@@ -138,6 +126,19 @@ class Ways:
             if machine.is_preemptive:
                 for path in self.graph.borders(composite)[0]:
                     self._passages[path].beside = conductor
+
+    def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
+        if not composite or self.graph.refinement_of(composite) != composite:
+            base = self._base(composite)
+            return base if clock.is_global else LocalDirector(base, clock)
+        modal, _, mode = composite.rpartition(".")
+        conductor = self._conductors[modal]
+        inside = Refinement(composite, self._directors[modal], self.director, conductor)
+        self._refinements[composite] = conductor.refinements[mode] = inside
+        conductor.insides[mode] = partial(self._begin_anew, composite)
+        for path in self.graph.borders(composite)[0]:
+            self._passages[path].gate = inside
+        return inside
 
     def _base(self, composite: str) -> Director | Refinement:
         """Whose time a composite's clock counts from."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 from keyword import iskeyword, kwlist
 from typing import Any
 
-from epicycle.actors import Actor, Parameter, StateMachine, UnitError, declared_parameters, parse_unit
+from epicycle.actors import Actor, Mode, Parameter, StateMachine, UnitError, declared_parameters, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
@@ -341,9 +341,11 @@ def _machine(
         left = {}
         for mode, entry in modes.value.entries.items():
             left[mode] = entry
-            if isinstance(entry.value, Mapping) and "refinement" in entry.value.entries:
-                inner = dict(entry.value.entries)
-                refinement = _refinement(reader, mode, inner.pop("refinement"))
+            if isinstance(entry.value, Mapping):
+                valid = (*declared_parameters(Mode), "refinement")
+                inner = dict(reader.entries(entry.value, f"mode {mode!r}", valid) or {})
+                said = inner.pop("refinement", None)
+                refinement = None if said is None else _refinement(reader, mode, said)
                 if refinement is not None:
                     refinements[mode] = refinement
                 left[mode] = replace(entry, value=replace(entry.value, entries=inner))
