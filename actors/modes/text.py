@@ -19,6 +19,7 @@ _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
 _ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
 _FORM: Final = "'a -> b on PORT after TIME when CONDITION do NAME = VALUE; ...'"
 
+_TRUTHS: Final[dict[Any, Any]] = {"true": True, "false": False}  # as YAML writes them
 Action = tuple[str, Formula]
 
 
@@ -51,7 +52,9 @@ class _ActionsParameter(Parameter[Any]):
         found = []
         for name, formula in given:
             try:
-                read = FormulaParameter().convert(formula)
+                read = FormulaParameter().convert(
+                    _TRUTHS.get(formula, formula) if isinstance(formula, str) else formula
+                )
             except ParameterError as error:
                 raise ParameterError(f"{name} = {error}", (name,)) from None
             assert read is not None
