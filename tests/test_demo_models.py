@@ -195,3 +195,46 @@ def test_figures_are_drawn(name: str, tmp_path: Path) -> None:
     for figure, drawn in figures.items():
         drawn.draw(results, tmp_path / f"{figure}.png")
         assert (tmp_path / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
+
+
+# -- modes ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_thermostat_switches_at_its_borders_as_often_as_the_formula_says() -> None:
+    results = run("thermostat", swing=0, until=200_000)
+    switches = results.signals["room.switch"].values
+    assert switches == pytest.approx([21, 19] * (len(switches) // 2) + [21] * (len(switches) % 2), abs=1e-8)
+    up, down = 7200 * math.log((35 - 19) / (35 - 21)), 7200 * math.log((21 - 5) / (19 - 5))
+    first = 7200 * math.log((35 - 20) / (35 - 21))
+    modes = results.signals["room.mode"]
+    wanted, time = [0.0], first
+    while time < 200_000:
+        wanted.append(time)
+        time += down if len(wanted) % 2 == 0 else up
+    assert modes.times == pytest.approx(wanted, abs=1e-5)
+
+
+def test_the_ball_leaves_the_table_and_falls_as_the_formula_says() -> None:
+    results = run("bouncing_modes", slowest=0.05)
+    modes = results.signals["ball.mode"]
+    ways = list(zip(modes.times, modes.values, strict=True))
+    off = next(time for time, mode in ways if mode == "off")
+    assert off == pytest.approx(2 / 0.8, abs=1e-9)
+    floor = [time for time, mode in ways if time > off]
+    assert floor[0] - off == pytest.approx(math.sqrt(2 / 9.81), abs=2e-9)
+    assert ways[-1][1] == "resting"
+    assert results.metrics["reached"] == pytest.approx(0.8 * ways[-1][0], abs=1e-6)
+
+
+def test_the_lights_are_never_green_for_both_and_pedestrians_wait_as_long_as_was_set() -> None:
+    results = run("traffic_light", rate=1.0, seed=3)
+    cars, walkers = results.signals["cars.mode"], results.signals["walkers.mode"]
+    both = (("cars", cars), ("walkers", walkers))
+    events = sorted((time, who, mode) for who, each in both for time, mode in zip(each.times, each.values, strict=True))
+    state = {"cars": "green", "walkers": "red"}
+    for _, who, mode in events:
+        state[str(who)] = str(mode)
+        assert not (state["cars"] in ("green", "asked", "yellow") and state["walkers"] != "red")
+    greens = [time for time, mode in zip(cars.times, cars.values, strict=True) if mode == "green"]
+    # With somebody always there: at least 30 s of green, 3 s of yellow, 12 s to walk, 4 s to clear, 2 s until it is told.
+    assert min(np.diff(greens)) == pytest.approx(30 + 3 + 12 + 4 + 2, abs=1e-6)
