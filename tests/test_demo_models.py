@@ -236,5 +236,5 @@ def test_the_lights_are_never_green_for_both_and_pedestrians_wait_as_long_as_was
         state[str(who)] = str(mode)
         assert not (state["cars"] in ("green", "asked", "yellow") and state["walkers"] != "red")
     greens = [time for time, mode in zip(cars.times, cars.values, strict=True) if mode == "green"]
-    # With somebody always there: at least 30 s of green, 3 s of yellow, 12 s to walk, 4 s to clear, 2 s until it is told.
+    # With somebody always there: 30 s of green, 3 s of yellow, 12 s to walk, 4 s to clear, 2 s until it is told.
     assert min(np.diff(greens)) == pytest.approx(30 + 3 + 12 + 4 + 2, abs=1e-6)
