@@ -62,6 +62,7 @@ def factor(text: str) -> float:
         "actor='observer[*].**' or port=plan; of several for one column one must fit, and each column",
     ),
     option("--json", action="store_true", help="print one JSON object instead of the table"),
+    imports=("build", "engine", "show"),
 )
 def run(options: argparse.Namespace) -> int:
     """Run a model once and report what came of it."""
