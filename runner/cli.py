@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str], *, is_program: bool) -> int:
     open_streams()
-    options = parser().parse_args(arguments)
+    options = parser(arguments).parse_args(arguments)
     options.given = ["epicycle", *arguments]
     try:
         with importing(for_good=is_program):
@@ -81,8 +81,8 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def parser() -> argparse.ArgumentParser:
-    """The options of all commands."""
+def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """What reads arguments: all commands, with the options of those that they may name, as these take long to make."""
     top = argparse.ArgumentParser(
         prog="epicycle", description="Discrete-event simulation of actor models that are written in YAML."
     )
@@ -90,7 +90,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     for each in COMMANDS:
         command = commands.add_parser(each.name, help=each.summary, description=each.description)
-        for add in each.options:
+        for add in each.options if each.name in arguments else ():
             add(command)
         command.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
         command.set_defaults(run=each.run, imports=each.imports)
