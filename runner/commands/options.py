@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from operator import methodcaller
 from pathlib import Path
@@ -158,6 +157,8 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
         **({} if options.max_actors is None else {"max_actors": options.max_actors}),
     )
     if strict and model.warnings:
+        from dataclasses import replace
+
         raise ModelError(replace(warning, severity="error") for warning in model.warnings)
     for warning in model.warnings:
         complain(str(warning))
