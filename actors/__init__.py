@@ -1,12 +1,14 @@
 """What can stand in a model graph: the actor contract, the library of actors, and the robots of the example."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from .compiled import CORE, CORE_MODULES, CORE_REASON
 
 # isort: split
 # What comes before decides what all imports behind find: compiled modules, or their sources.
 from .accumulation import Accumulator, Counter, Difference, Integrator
 from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
-from .continuous import ODE
 from .core import *
 from .distributions import (
     Bernoulli,
@@ -27,11 +29,14 @@ from .logic import Comparator, LogicGate
 from .queues import Queue, Server
 from .replay import Replay, ReplayError
 from .resources import Machine, Station
-from .robotics import *
 from .sinks import Display, Histogram, Recorder, Stop, Test
 from .sources import Clock, Const, CurrentMicrostep, CurrentTime, PoissonClock, Ramp, Random, Sequence, SingleEvent
 from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
+
+if TYPE_CHECKING:
+    from .continuous import ODE
+    from .robotics import *
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "REQUIRED",
@@ -55,3 +60,15 @@ __all__ = [
     "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
     "visible_lines",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    # What of __all__ is not here yet: differential equations and robots, which take as long to import as all else.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(".continuous" if name == "ODE" else ".robotics", __name__), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -116,7 +116,7 @@ class Types(Mapping[str, type[T]], Generic[T]):
     """Types by name; to look one up may import it, which raises ``CatalogueError`` if that fails."""
 
     def __init__(self, base: type[T], own: Mapping[str, type[T]]) -> None:
-        self._own = dict(own)
+        self._own = own
         self._kind = base.__name__.lower()
         self._offers = _Offers(base)
 
@@ -158,7 +158,7 @@ class Types(Mapping[str, type[T]], Generic[T]):
     def with_types(self, own: Mapping[str, type[T]]) -> Types[T]:
         """The same with further types, which go before others of their name."""
         result = Types.__new__(Types)
-        result.__dict__.update(self.__dict__, _own={**self._own, **own})
+        result.__dict__.update(self.__dict__, _own={**self._own, **own} if own else self._own)
         return result
 
 
@@ -188,13 +188,34 @@ class Catalogue:
         return Catalogue(actors, aspects), [*wrong, *wrong_too]
 
 
+class _Public(Mapping[str, type[T]], Generic[T]):
+    """The types of a public face, some of which it imports when they are asked for; without ``bases``."""
+
+    def __init__(self, face: ModuleType, base: type[T], *bases: type) -> None:
+        self._face = face
+        self._base = base
+        self._bases = (base, *bases)
+
+    def __getitem__(self, name: str) -> type[T]:
+        found = getattr(self._face, name) if name in self._face.__all__ else None
+        if not isinstance(found, type) or not issubclass(found, self._base):
+            raise KeyError(name)
+        if found in self._bases or isabstract(found):
+            raise KeyError(name)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in self._face.__all__ if name in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
 @cache
 def built_in() -> Catalogue:
     """What Epicycle's public faces offer; bases that define no behaviour are left out."""
-    actors = {name: each for name, each in _public(epicycle.actors, Actor) if each not in (Actor, Process)}
-    bases = (Aspect, JoinPointAspect, CompositeAspect, CompositeExecutionAspect)  # types of the last two are composites
-    aspects = {name: each for name, each in _public(epicycle.aspects, Aspect) if each not in bases}
-    return Catalogue(actors, aspects)
+    bases = (JoinPointAspect, CompositeAspect, CompositeExecutionAspect)  # types of the last two are composites
+    return Catalogue(_Public(epicycle.actors, Actor, Process), _Public(epicycle.aspects, Aspect, *bases))
 
 
 @cache
@@ -217,11 +238,6 @@ def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[Cat
         except CatalogueError as error:
             errors.append(error)
     return found, errors
-
-
-def _public(module: Any, base: type) -> list[tuple[str, Any]]:
-    found = ((name, getattr(module, name)) for name in module.__all__)
-    return [(n, o) for n, o in found if isinstance(o, type) and issubclass(o, base) and not isabstract(o)]
 
 
 class TypesError(EpicycleError):
