@@ -181,7 +181,6 @@ class Run:
             signals=self.signals,
             log=self.log,
             end=to_seconds(self.director.last.time),
-            covered=to_seconds(end),
             stopped=stopped,
             firings=self.director.firings,
             wall_time=self._spent,

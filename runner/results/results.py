@@ -40,7 +40,6 @@ class Results(Tabled):
     signals: dict[str, Signal]
     log: EventLog
     end: float  # s, the last tag
-    covered: float  # s, how much model time was run: to the stop time if that ended it, else to the last tag
     stopped: str  # why the run ended
     firings: int
     wall_time: float  # s
@@ -107,12 +106,12 @@ class Results(Tabled):
 
     def __repr__(self) -> str:
         return (
-            f"<Results of {self.model}, seed {self.seed}: {self.covered:g} s, ended by {self.stopped}, "
+            f"<Results of {self.model}, seed {self.seed}: {self.end:g} s, ended by {self.stopped}, "
             f"{counted(self.events, 'event')}, digest {self.digest[:16]}...>"
         )
 
     def _caption(self) -> str:
-        return f"{self.model}, seed {self.seed}: {self.covered:g} s of model time, ended by {self.stopped}"
+        return f"{self.model}, seed {self.seed}: {self.end:g} s of model time, ended by {self.stopped}"
 
     def _tables(self) -> list[Table]:
         figures = [

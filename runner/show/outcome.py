@@ -51,7 +51,7 @@ def summary_table(model: Model, results: Results) -> Group:
     """What a person sees at the end of a run."""
     head = Text.assemble(
         (visible(results.model), "bold"),
-        f"  seed {results.seed}, {results.covered:g} s of model time, ended by {visible(results.stopped)}",
+        f"  seed {results.seed}, {results.end:g} s of model time, ended by {visible(results.stopped)}",
     )
     rows = []
     for metric in model.metrics:

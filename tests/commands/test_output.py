@@ -209,20 +209,3 @@ def test_a_very_long_token_is_cut() -> None:
     assert first.endswith("97, 98, 99]] is too much")
     assert "characters left out" in first
     assert len(first) < 2100
-
-
-@pytest.mark.parametrize(
-    ("until", "covered"),
-    [("500 ms", "0.5 s"), ("3", "3 s"), ("2.5", "2.5 s"), (None, "4 s")],
-)
-def test_a_run_is_headed_with_the_time_that_it_covers(
-    until: str | None, covered: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Which goes beyond the last event if the stop time ends it."""
-    text = "model: m\nactors: {c: {type: Clock, period: 1, offset: 1}, r: {type: Recorder}}\n"
-    Path("m.yaml").write_text(text + 'connections: ["c.output -> r.input"]\nrun: {stop: 4}\n', encoding="utf-8")
-    assert main(["run", "m.yaml", *(() if until is None else ("--until", until))]) == 0
-    assert capsys.readouterr().out.partition("\n")[0] == f"m  seed 0, {covered} of model time, ended by stop time"
-    results = Simulation(load_model("m.yaml")).run(until=None if until is None else float(covered.split(maxsplit=1)[0]))
-    assert str(results).partition("\n")[0] == f"m, seed 0: {covered} of model time, ended by stop time"
-    assert repr(results).startswith(f"<Results of m, seed 0: {covered}, ended by stop time, ")
