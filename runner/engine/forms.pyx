@@ -10,11 +10,11 @@ import os
 
 from cpython.float cimport PyFloat_FromDouble
 
-from epicycle.actors cimport InputPort, Line, ParameterPort, Wake
+from epicycle.actors cimport InputPort, Line, ParameterPort, Wake, nanoseconds_of, seconds_of
 from epicycle.runner.engine.agenda cimport Turn
 from epicycle.runner.engine.director cimport Director
 from epicycle.runner.engine.native cimport (
-    Drawing, Native, count_of, drawing_of, to_nanoseconds, to_seconds, tokens_of,
+    Drawing, Native, count_of, drawing_of, tokens_of,
 )
 from epicycle.runner.engine.way cimport Sender
 
@@ -34,7 +34,7 @@ cdef class DelayForm(Native):
     cdef bint take(self) except -1:
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.line = self.actor._held._line
-        self.delay = to_nanoseconds(self.actor.delay)
+        self.delay = nanoseconds_of(self.actor.delay)
         return self.output is not None
 
     cpdef fire(self):
@@ -60,7 +60,7 @@ cdef class Ticking(Native):
         if values is not None and type(values) not in (list, tuple):
             return False
         self.values = None if values is None else list(values)
-        self.stop = 2**63 - 1 if self.actor.stop_time is None else to_nanoseconds(self.actor.stop_time)
+        self.stop = 2**63 - 1 if self.actor.stop_time is None else nanoseconds_of(self.actor.stop_time)
         return self.output is not None
 
     cdef int send(self, long long tick) except -1:
@@ -79,7 +79,7 @@ cdef class ClockForm(Ticking):
     cdef bint take(self) except -1:
         if self.actor.start.width or self.actor.stop.width or not Ticking.take(self):
             return False
-        self.period = to_nanoseconds(self.actor.period)
+        self.period = nanoseconds_of(self.actor.period)
         self.offsets = self.actor._offsets
         return True
 
@@ -112,7 +112,7 @@ cdef class PoissonForm(Ticking):
         cdef long long tick = self.actor._tick
         self.send(tick)
         self.actor._tick = tick + 1
-        self.again_at(self.now() + to_nanoseconds(self.drawing.next()))
+        self.again_at(self.now() + nanoseconds_of(self.drawing.next()))
 
 
 cdef class ServerForm(Native):
@@ -174,8 +174,8 @@ cdef class ServerForm(Native):
             self.size.go(size)
 
     cdef int serve(self, token, double time) except -1:
-        cdef long long nanoseconds = to_nanoseconds(time)
-        cdef double rest = time - to_seconds(nanoseconds)
+        cdef long long nanoseconds = nanoseconds_of(time)
+        cdef double rest = time - seconds_of(nanoseconds)
         self.keep(self.line, self.now() + nanoseconds, (token, rest))
         return 0
 
@@ -317,12 +317,8 @@ SOURCES = (
     ("sources.py", "Random", "606d80f45d45a9e4"),
     ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
-    ("core/laws.py", "between", "0e5fc0d38a4fab80"),
-    ("core/laws.py", "gamma", "395f2d85bf3dfec1"),
+    ("core/laws.py", "gamma", "da1afffdbd29a311"),
     ("core/laws.py", "normal", "c6bfa77a937cc231"),
-    ("core/laws.py", "normal_quantile", "f210084d76cce693"),
-    ("core/laws.py", "standard_gamma", "047c145471ee3512"),
-    ("core/laws.py", "standard_normal", "4c8196a1bb6687ad"),
     ("core/laws.py", "uniform", "36b3b17c5a3d5e40"),
     ("core/port_parameter.py", "ParameterPort", "db98994b759143f6"),
     ("core/elementary/sums.py", "total", "dc84358727c0bc10"),
