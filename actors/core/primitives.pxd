@@ -13,5 +13,6 @@ cdef class Words:
 
 cdef long long nearest(double number) noexcept
 cdef double log(double x) except? -1.0
+cpdef bint is_alone(thing) noexcept
 cdef int empty(list tokens) except -1
 cdef tuple reduced(thing)

@@ -30,6 +30,11 @@ class Words:
         return self._ahead.pop()
 
 
+def is_alone(thing: object) -> bool:
+    """Whether nobody else holds a thing that the caller has in a variable; Python does not look."""
+    return False
+
+
 def empty(tokens: list[Any]) -> None:
     """Take everything out of a list."""
     tokens.clear()

@@ -12,6 +12,7 @@ from .elementary import log as far_log
 from .elementary import tables
 
 cdef extern from "Python.h":
+    Py_ssize_t Py_REFCNT(object)
     void Py_SET_SIZE(object, Py_ssize_t)
     PyObject* PyList_GET_ITEM(object, Py_ssize_t)
 
@@ -85,6 +86,10 @@ cdef tuple reduced(thing):
     """How pickle makes a thing of a class in C again: by its slots, as it does by itself in Python."""
     names = [name for base in type(thing).__mro__ for name in getattr(base, "__slots__", ())]
     return copyreg.__newobj__, (type(thing),), (None, {name: getattr(thing, name) for name in names})
+
+
+cpdef bint is_alone(thing) noexcept:
+    return Py_REFCNT(thing) == 1
 
 
 cdef int empty(list tokens) except -1:

@@ -4,6 +4,7 @@ cimport cython
 from epicycle.actors cimport InputPort, Moment, Wake, Way
 
 
+@cython.final
 cdef class Turn:
     cdef public object actor
     cdef public Form form
@@ -24,10 +25,12 @@ cdef class Form:
     cpdef fire(self)
 
 
+@cython.final
 cdef class Instant(Moment):
     cdef public list pending, turns, wakes
     cdef public Turn turn
     cdef public Wake wake
+    cpdef begin(self, long long time, long microstep)
     cpdef add(self, Turn turn, Wake wake)
 
 
@@ -35,6 +38,7 @@ cdef class Instant(Moment):
 cpdef Instant new_instant(long long time, long microstep)
 
 
+@cython.final
 cdef class Delivery:
     cdef public Way way
     cdef public object token

@@ -7,6 +7,8 @@ from typing import Any
 
 from epicycle.actors import Actor, InputPort, Moment, Wake, Way
 
+_NOTHING: list[Any] = []  # what a port shows whose tokens are for a later turn
+
 
 class Turn:
     """The place of an actor in the firing order: where it fires for its wake-ups, or for the tokens of some inputs.
@@ -56,7 +58,7 @@ class Turn:
     def hold(self) -> None:
         """The actor fires: it does not see yet what is for a later turn."""
         for port in self.later:
-            port.hide()
+            port.shown = _NOTHING
 
     def clear(self) -> None:
         """The actor has fired: what it has not read is gone."""
@@ -64,7 +66,7 @@ class Turn:
             if port.arrived:
                 port.clear()
         for port in self.later:
-            port.show()
+            port.shown = port.arrived
 
 
 class Form:
@@ -91,6 +93,11 @@ class Instant(Moment):
     turns: list[Turn] | None
     wakes: list[Wake | None] | None  # of each of these turns
 
+    def begin(self, time: int, microstep: int) -> None:
+        """Nothing is to be done yet."""
+        self.time, self.microstep = time, microstep
+        self._tag = self.pending = self.turn = self.wake = self.turns = self.wakes = None
+
     def add(self, turn: Turn, wake: Wake | None) -> None:
         """Let an actor have a turn, for a wake-up if there is one."""
         if self.turn is None:
@@ -105,8 +112,7 @@ class Instant(Moment):
 def new_instant(time: int, microstep: int) -> Instant:
     """An instant at which nothing is to be done yet."""
     instant = Instant.__new__(Instant)
-    instant.time, instant.microstep = time, microstep
-    instant._tag = instant.pending = instant.turn = instant.wake = instant.turns = instant.wakes = None
+    instant.begin(time, microstep)
     return instant
 
 
