@@ -25,16 +25,14 @@ from .order import NEVER, Line, Ranks, Times
 from .parameter import (
     REQUIRED,
     Configurable,
-    MappingParameter,
     Parameter,
     ParameterError,
-    array_parameter,
     bounds_text,
     declared_parameters,
-    texts_parameter,
     unknown_parameter,
     variants,
 )
+from .parameter_kinds import MappingParameter, array_parameter, texts_parameter
 from .port_parameter import PortParameter
 from .port_types import accepts, shaped, token_type, type_name
 from .ports import Emitter, InputPort, OutputPort, PortError, Way

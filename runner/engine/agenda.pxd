@@ -1,7 +1,7 @@
 # Types for C; what everything is for is said in agenda.py.
 
 cimport cython
-from epicycle.actors cimport InputPort, Moment, Wake, Way
+from epicycle.actors cimport InputPort, Moment, Wake, Way, is_alone
 
 
 @cython.final
@@ -30,12 +30,11 @@ cdef class Instant(Moment):
     cdef public list pending, turns, wakes
     cdef public Turn turn
     cdef public Wake wake
-    cpdef begin(self, long long time, long microstep)
     cpdef add(self, Turn turn, Wake wake)
 
 
 @cython.locals(instant=Instant)
-cpdef Instant new_instant(long long time, long microstep)
+cpdef Instant new_instant(long long time, long microstep, Instant past=*)
 
 
 @cython.final

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, Moment, Wake, Way
+from epicycle.actors import Actor, InputPort, Moment, Wake, Way, is_alone
 
 _NOTHING: list[Any] = []  # what a port shows whose tokens are for a later turn
 
@@ -93,11 +93,6 @@ class Instant(Moment):
     turns: list[Turn] | None
     wakes: list[Wake | None] | None  # of each of these turns
 
-    def begin(self, time: int, microstep: int) -> None:
-        """Nothing is to be done yet."""
-        self.time, self.microstep = time, microstep
-        self._tag = self.pending = self.turn = self.wake = self.turns = self.wakes = None
-
     def add(self, turn: Turn, wake: Wake | None) -> None:
         """Let an actor have a turn, for a wake-up if there is one."""
         if self.turn is None:
@@ -109,10 +104,11 @@ class Instant(Moment):
             self.wakes.append(wake)
 
 
-def new_instant(time: int, microstep: int) -> Instant:
-    """An instant at which nothing is to be done yet."""
-    instant = Instant.__new__(Instant)
-    instant.begin(time, microstep)
+def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:
+    """An instant at which nothing is to be done yet; one that is past serves again if nobody has kept it."""
+    instant = past if past is not None and is_alone(past) else Instant.__new__(Instant)
+    instant.time, instant.microstep = time, microstep
+    instant._tag = instant.pending = instant.turn = instant.wake = instant.turns = instant.wakes = None
     return instant
 
 

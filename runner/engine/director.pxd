@@ -1,7 +1,7 @@
 # Types for C; what everything is for is said in director.py.
 
 cimport cython
-from epicycle.actors cimport InputPort, Moment, Ranks, Times, Wake, Way, is_alone, new_wake
+from epicycle.actors cimport InputPort, Moment, Ranks, Times, Wake, Way, new_wake
 from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, new_instant
 
 
@@ -35,15 +35,12 @@ cdef class Director:
     cpdef later(self, long long delay, way, token)
     cpdef Delivery hold(self, way, token)
     cpdef want(self, Turn turn)
-    cpdef Instant _after(self, Instant now, long long time)
-    @cython.locals(instant=Instant, present=Instant)
-    cpdef Instant _to_come(self, long long time, long microstep)
+    @cython.locals(instant=Instant)
+    cpdef Instant _to_come(self, Instant now, long long time)
     @cython.locals(now=Instant)
     cpdef _await_present(self)
-    @cython.locals(instant=Instant)
+    @cython.locals(instant=Instant, past=Instant)
     cpdef Instant _await(self, long long time, long microstep)
-    @cython.locals(instant=Instant)
-    cpdef Instant _instant(self, long long time, long microstep)
     @cython.locals(turn=Turn, delivery=Delivery, turns=list, ready=Ranks, place=cython.Py_ssize_t)
     cpdef _handle(self, Instant instant)
     cpdef _wake_up(self, Turn turn, Wake wake)

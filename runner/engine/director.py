@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import NEVER, InputPort, Moment, Process, Ranks, Tag, Times, Wake, Way, is_alone, new_wake
+from epicycle.actors import NEVER, InputPort, Moment, Process, Ranks, Tag, Times, Wake, Way, new_wake
 
 from ..text import NORMAL, Limits, describe
 from . import errors
@@ -50,9 +50,9 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times", "_next", "_on_their_way",
-        "_past", "_queue", "_rank", "_ready", "_reason", "_recent", "_stop_after", "_time", "_times", "_turns", "crowd",
-        "firings", "present", "ranks", "seed", "steps",
+        "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times",
+        "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent", "_stop_after", "_time",
+        "_times", "_turns", "crowd", "firings", "present", "ranks", "seed", "steps",
     )  # fmt: skip
 
     def __init__(self, order: dict[str, int], seed: int, limits: Limits = NORMAL) -> None:
@@ -127,14 +127,14 @@ class Director:
         now = self.now()
         if self.present is None and time <= now.time:
             return self._call_now(turn, now)
-        return self._wake_at(turn, self._after(now, time))
+        return self._wake_at(turn, self._to_come(now, time))
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
-        """Fire ``actor`` at a tag and rank that are still to come."""
+        """Fire ``actor`` at a tag and rank that are still to come (``next_turn``)."""
         turn, now = self.turn(actor, rank), self.now()
         if tag.time == now.time and tag.microstep == now.microstep:
             return self._call_now(turn, now)
-        return self._wake_at(turn, self._to_come(tag.time, tag.microstep))
+        return self._wake_at(turn, self._to_come(now, tag.time))
 
     def want_at(self, turn: Turn, time: int) -> Moment:
         """Let an actor have a turn at ``time`` that it cannot call off; at which tag."""
@@ -142,7 +142,7 @@ class Director:
         if self.present is None and time <= now.time:
             self.want(turn)
             return now
-        instant = self._after(now, time)
+        instant = self._to_come(now, time)
         instant.add(turn, None)
         return instant
 
@@ -175,7 +175,7 @@ class Director:
     def later(self, delay: int, way: Way, token: Any) -> None:
         """Let a token go on after ``delay`` ns; 0 is the next microstep."""
         now = self.now()
-        instant = self._after(now, now.time + delay)
+        instant = self._to_come(now, now.time + delay)
         if instant.pending is None:
             instant.pending = []
         instant.pending.append(self.hold(way, token))
@@ -222,19 +222,14 @@ class Director:
             if self.present is None:
                 self._await_present()
 
-    def _after(self, now: Instant, time: int) -> Instant:
-        """What is to be done at a later time, or else at the next microstep."""
-        return self._to_come(time, 1) if time > now.time else self._to_come(now.time, now.microstep + 1)
-
-    def _to_come(self, time: int, microstep: int) -> Instant:
-        """What is to be done at a tag after the present one: the next microstep, or the first one of a later time."""
-        present = self.present
-        if time > (self.now() if present is None else present).time:
+    def _to_come(self, now: Instant, time: int) -> Instant:
+        """What is to be done after the present tag: at the next microstep, or at the first one of a later time."""
+        if time > now.time:
             instant = self._times.at(time)
-            return self._await(time, microstep) if instant is None else instant
+            return self._await(time, 1) if instant is None else instant
         if self._next is None:
-            self._next = self._instant(time, microstep)
-            if present is None:
+            self._next = new_instant(now.time, now.microstep + 1)
+            if self.present is None:
                 self._await_present()
         return self._next
 
@@ -249,16 +244,9 @@ class Director:
         if self._times.size > self._most_times:
             what = "times at which something is still to come"
             raise CrowdError(Tag(time, microstep), self._most_times, what, self._who())
-        instant = self._instant(time, microstep)
+        past, self._past = self._past, None
+        instant = new_instant(time, microstep, past)
         self._times.add(instant)
-        return instant
-
-    def _instant(self, time: int, microstep: int) -> Instant:
-        """A tag at which nothing is to be done yet: one that is over serves again, if nobody has kept it."""
-        instant, self._past = self._past, None
-        if instant is None or not is_alone(instant):
-            return new_instant(time, microstep)
-        instant.begin(time, microstep)
         return instant
 
     # -- time -----------------------------------------------------------------------------------------------------

@@ -63,12 +63,9 @@ cdef class Ticking(Native):
         self.stop = 2**63 - 1 if self.actor.stop_time is None else nanoseconds_of(self.actor.stop_time)
         return self.output is not None
 
-    cdef int send(self, long long tick) except -1:
-        self.output.go(tick if self.values is None else self.values[tick % len(self.values)])
+    cdef int send(self, tick) except -1:
+        self.output.go(tick if self.values is None else self.values[<long long>tick % len(self.values)])
         return 0
-
-    cdef Wake again_at(self, long long time):
-        return None if time > self.stop else self.wake_at(time)
 
 
 cdef class ClockForm(Ticking):
@@ -85,19 +82,20 @@ cdef class ClockForm(Ticking):
 
     cpdef fire(self):
         cdef Wake wake = self.actor._wake
-        cdef long long tick, cycle
+        cdef long long tick, cycle, following
         cdef Py_ssize_t count = len(self.offsets)
         if wake is None or not wake.due:
             return
-        tick = self.actor._tick
-        self.send(tick)
-        tick += 1
+        number = self.actor._tick
+        self.send(number)
+        tick = number + 1
         self.actor._tick = tick
         cycle = self.actor._cycle
         if tick % count == 0:
             cycle += self.period
             self.actor._cycle = cycle
-        self.actor._wake = self.again_at(cycle + <long long>self.offsets[tick % count])
+        following = cycle + <long long>self.offsets[tick % count]
+        self.actor._wake = None if following > self.stop else self.wake_at(following)
 
 
 cdef class PoissonForm(Ticking):
@@ -109,10 +107,13 @@ cdef class PoissonForm(Ticking):
         return Ticking.take(self)
 
     cpdef fire(self):
-        cdef long long tick = self.actor._tick
+        cdef long long following
+        tick = self.actor._tick
         self.send(tick)
         self.actor._tick = tick + 1
-        self.again_at(self.now() + nanoseconds_of(self.drawing.next()))
+        following = self.now() + nanoseconds_of(self.drawing.next())
+        if following <= self.stop:  # nobody calls it off, so that it needs no wake-up
+            self.director.want_at(self.turn, following)
 
 
 cdef class ServerForm(Native):
@@ -145,7 +146,7 @@ cdef class ServerForm(Native):
         return self.output is not None and self.size is not None and self.rejected is not None
 
     cpdef fire(self):
-        cdef long long size = self.actor._size
+        cdef long long size = self.line.size + len(self.waiting)
         cdef Py_ssize_t place
         cdef list tokens
         cdef double time
