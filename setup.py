@@ -95,6 +95,8 @@ def copied() -> list[Path]:
         for ending in (".pxd", ".pyx", ".py"):
             if source.with_suffix(ending).exists():
                 shutil.copy2(source.with_suffix(ending), target.with_suffix(ending))
+            else:
+                target.with_suffix(ending).unlink(missing_ok=True)  # of an earlier build
         found.append(target.with_suffix(".pyx" if target.with_suffix(".pyx").exists() else ".py"))
         if found[-1].suffix == ".pyx":  # of which the Python source is the twin
             target.with_suffix(".py").unlink(missing_ok=True)

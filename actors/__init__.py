@@ -54,7 +54,7 @@ __all__ = [
     "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times", "Triangular", "Uniform", "UnitError",
     "UnscentedEstimator", "Vehicle", "Wake", "Way", "When", "abridged", "accepts", "array_parameter", "bounds_text",
     "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean",
-    "digits", "elementary", "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
     "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
     "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
     "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
