@@ -80,7 +80,9 @@ wheel: $(DEV)
 
 clean:
 	rm -rf $(VENV) build dist epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -f actors/compiled.json
 	find actors aspects models runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find actors aspects runner \( -name '*.so' -o -name '*.pyd' \) -exec rm -f {} +
 
 # Two stamps on one environment; both grow stale when pyproject.toml changes.
 $(BIN)/python:

@@ -95,6 +95,8 @@ def copied() -> list[Path]:
         for ending in (".pxd", ".pyx", ".py"):
             if source.with_suffix(ending).exists():
                 shutil.copy2(source.with_suffix(ending), target.with_suffix(ending))
+            else:
+                target.with_suffix(ending).unlink(missing_ok=True)  # of an earlier build
         found.append(target.with_suffix(".pyx" if target.with_suffix(".pyx").exists() else ".py"))
         if found[-1].suffix == ".pyx":  # of which the Python source is the twin
             target.with_suffix(".py").unlink(missing_ok=True)
@@ -110,6 +112,7 @@ class BuildCore(build_ext):
     def run(self) -> None:
         """Build what has changed."""
         check_forms()
+        self.remove_stale()
         self.parallel = self.parallel or os.cpu_count()
         try:
             from Cython import __version__ as cython
@@ -132,6 +135,18 @@ class BuildCore(build_ext):
             extension.include_dirs = [*extension.include_dirs, *ready.include_dirs]
         super().run()
         self._say()
+
+    def remove_stale(self) -> None:
+        """Remove what was compiled of modules that are in the core no longer: Python would prefer it to their sources.
+
+        That is each file in the folder of one of our packages that ends as what this Python compiles, and that no
+        module of the core is compiled to.  What another Python has compiled there it alone imports.
+        """
+        wanted = {Path(self.get_ext_fullpath(name)) for name in core["CORE_MODULES"]}
+        for package in self.distribution.packages or ():
+            any_module = Path(self.get_ext_fullpath(f"{package}.x"))
+            for file in set(any_module.parent.glob(f"*{any_module.name[1:]}")) - wanted:
+                file.unlink()
 
     def _say(self) -> None:
         files = [Path(self.get_ext_fullpath(each.name)) for each in self.extensions]

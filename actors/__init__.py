@@ -1,12 +1,14 @@
 """What can stand in a model graph: the actor contract, the library of actors, and the robots of the example."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from .compiled import CORE, CORE_MODULES, CORE_REASON
 
 # isort: split
 # What comes before decides what all imports behind find: compiled modules, or their sources.
 from .accumulation import Accumulator, Counter, Difference, Integrator
 from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
-from .continuous import ODE
 from .core import *
 from .distributions import (
     Bernoulli,
@@ -24,15 +26,18 @@ from .distributions import (
 from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
 from .functions import Expression, Function, LookupTable
 from .logic import Comparator, LogicGate
-from .modes import ModalActor, Mode, StateMachine, on_entry, on_exit, transition
 from .queues import Queue, Server
 from .replay import Replay, ReplayError
 from .resources import Machine, Station
-from .robotics import *
 from .sinks import Display, Histogram, Recorder, Stop, Test
 from .sources import Clock, Const, CurrentMicrostep, CurrentTime, PoissonClock, Ramp, Random, Sequence, SingleEvent
 from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
+
+if TYPE_CHECKING:
+    from .continuous import ODE
+    from .modes import *
+    from .robotics import *
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "REQUIRED",
@@ -50,9 +55,25 @@ __all__ = [
     "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times", "Triangular", "Uniform",
     "UnitError", "UnscentedEstimator", "Vehicle", "Wake", "Way", "When", "abridged", "accepts", "array_parameter",
     "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
-    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag",
-    "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths",
-    "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened",
-    "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter",
-    "variants", "visible", "visible_character", "visible_lines",
+    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest",
+    "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit",
+    "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
+    "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
+    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip
+
+
+_OF_MODES = ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition")
+
+
+def __getattr__(name: str) -> Any:
+    # What of __all__ is not here yet: robots, and what solves differential equations, take as long as all else.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = ".continuous" if name == "ODE" else ".modes" if name in _OF_MODES else ".robotics"
+    found = globals()[name] = getattr(import_module(module, __name__), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

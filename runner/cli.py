@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
-from .collection import seldom_collecting
+from .collection import importing, seldom_collecting
 from .commands import COMMANDS
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
 from .leaving import leave
@@ -17,12 +18,20 @@ from .printing import complain, complain_traceback, open_streams
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input."""
     if arguments is None:  # as a program, not called by one
-        return leave(main(sys.argv[1:]))
+        return leave(_run(sys.argv[1:], is_program=True))
+    return _run(arguments, is_program=False)
+
+
+def _run(arguments: Sequence[str], *, is_program: bool) -> int:
     open_streams()
-    options = parser().parse_args(arguments)
+    options = parser(arguments).parse_args(arguments)
     options.given = ["epicycle", *arguments]
     try:
-        from epicycle.actors import EpicycleError
+        with importing(for_good=is_program):
+            from epicycle.actors import EpicycleError
+
+            for name in options.imports:
+                import_module(f".{name}", __package__)
     except ImportError as error:
         if error.name != "EPICYCLE_CORE":
             raise
@@ -72,8 +81,8 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def parser() -> argparse.ArgumentParser:
-    """The options of all commands."""
+def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """What reads arguments: all commands, with the options of those that they may name, as these take long to make."""
     top = argparse.ArgumentParser(
         prog="epicycle", description="Discrete-event simulation of actor models that are written in YAML."
     )
@@ -81,10 +90,10 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     for each in COMMANDS:
         command = commands.add_parser(each.name, help=each.summary, description=each.description)
-        for add in each.options:
+        for add in each.options if each.name in arguments else ():
             add(command)
         command.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
-        command.set_defaults(run=each.run)
+        command.set_defaults(run=each.run, imports=each.imports)
     return top
 
 

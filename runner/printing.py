@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import codecs
 import json
-import logging
 import os
 import sys
-import traceback
 from collections.abc import Container, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
@@ -51,6 +49,8 @@ def complain(text: str) -> None:
 
 def complain_traceback(error: BaseException) -> None:
     """Show through which lines of code an exception came, or the one that an error of ours tells of."""
+    import traceback
+
     from epicycle.actors import visible_lines
 
     print(
@@ -120,6 +120,8 @@ def columns(head: Iterable[str], rows: Iterable[Iterable[str]], *, whole: Contai
 @contextmanager
 def notices(terminal: Console) -> Iterator[None]:
     """Show what the loggers of Epicycle say: what takes long, and the lines of ``Display``."""
+    import logging
+
     from rich.logging import RichHandler
 
     logger = logging.getLogger("epicycle")

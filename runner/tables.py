@@ -9,8 +9,6 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, visible
 
-from .html import table, tag
-
 MAX_ROWS = 40
 
 
@@ -41,12 +39,30 @@ def as_text(caption: str, tables: Iterable[Table]) -> str:
 
 def as_html(caption: str, tables: Iterable[Table]) -> str:
     """The same for a notebook, in plain HTML that takes on the notebook's own style."""
+    from .html import table, tag  # here, for few runs are shown so
+
     parts = [tag("p", caption)]
     for each in tables:
         if each.rows:
             parts.append(table(each.head, each.rows[:MAX_ROWS], names=0, scopes=False))
             parts += [tag("p", each.more)] if each.more else []
     return tag("div", parts)
+
+
+class Tabled:
+    """What a prompt and a notebook show as a caption and tables."""
+
+    def _caption(self) -> str:
+        raise NotImplementedError
+
+    def _tables(self) -> list[Table]:
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return as_text(self._caption(), self._tables())
+
+    def _repr_html_(self) -> str:
+        return as_html(self._caption(), self._tables())
 
 
 def pandas_module() -> Any:

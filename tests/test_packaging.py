@@ -4,6 +4,7 @@ import ast
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import setuptools
 
 from epicycle.actors import CORE_MODULES
 
@@ -344,6 +346,45 @@ def test_what_is_shared_is_imported_from_the_root(folder: str) -> None:
     files = [file for file in (ROOT / folder).rglob("*.py") if file != ROOT / "tests/mutation/trial.py"]  # tries copies
     assert len(files) > 10
     assert [file.name for file in files if change.search(file.read_text(encoding="utf-8"))] == []
+
+
+def test_the_build_removes_what_was_compiled_of_modules_that_no_longer_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(setuptools, "setup", lambda **_: None)
+    script = runpy.run_path(str(ROOT / "setup.py"))
+    ending, core = sysconfig.get_config_var("EXT_SUFFIX"), Path(*CORE_MODULES[0].split(".")[1:])
+    kept = [f"{core}{ending}", f"{core.parent}/gone.cpython-399-nowhere.so", "actors/gone.py", f"elsewhere/own{ending}"]
+    stale = [f"{core.parent}/gone{ending}", f"actors/gone{ending}", f"runner/study/plan/gone{ending}"]
+    for name in (*kept, *stale):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    monkeypatch.chdir(tmp_path)
+    folders = CONFIG["tool"]["setuptools"]["package-dir"]
+    build = script["BuildCore"](setuptools.Distribution({"packages": PACKAGES, "package_dir": folders}))
+    build.inplace = True
+    build.ensure_finalized()
+    build.remove_stale()
+    left = [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()]
+    assert sorted(left) == sorted(kept)
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="there is no make")
+def test_make_clean_removes_all_that_is_compiled(tmp_path: Path) -> None:
+    sources = [
+        "actors/core/tag.py",
+        "actors/core/order.pyx",
+        "results/run/manifest.json",
+        "models/mm1.yaml",
+        "tests/a.py",
+    ]
+    made = ["actors/core/tag.cpython-311.so", "aspects/gone.pyd", "runner/engine/way.so", "actors/compiled.json"]
+    for name in (*sources, *made, "runner/__pycache__/cli.pyc", "build/core/tag.c"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    run_in(tmp_path, "make", "-s", "-f", ROOT / "Makefile", "clean")
+    left = [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()]
+    assert sorted(left) == sorted(sources)
 
 
 @pytest.mark.slow

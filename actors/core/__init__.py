@@ -25,19 +25,18 @@ from .order import NEVER, Line, Ranks, Times
 from .parameter import (
     REQUIRED,
     Configurable,
-    MappingParameter,
     Parameter,
     ParameterError,
-    array_parameter,
     bounds_text,
     declared_parameters,
-    texts_parameter,
     unknown_parameter,
     variants,
 )
+from .parameter_kinds import MappingParameter, array_parameter, texts_parameter
 from .port_parameter import PortParameter
 from .port_types import accepts, shaped, token_type, type_name
 from .ports import Emitter, InputPort, OutputPort, PortError, Way
+from .primitives import is_alone
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, random_stream
@@ -50,8 +49,8 @@ __all__ = [
     "ParameterError", "Pending", "PortError", "PortParameter", "Process", "Quantity", "Ranks", "Stream", "Tag", "Times",
     "UnitError", "Wake", "Way", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert",
     "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
-    "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share",
-    "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular", "read_table",
-    "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type",
-    "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
+    "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
+    "normal_share", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular",
+    "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds",
+    "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip

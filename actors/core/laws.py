@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
+from math import sqrt
 from typing import Final, Protocol
 
 from .elementary import acos, cos, exp, expm1, log, log1p, tan
@@ -80,7 +81,7 @@ def normal_quantile(share: float) -> float:
             + 21213.794301586595867) * r + 5394.1960214247511077) * r + 687.18700749205790830) * r
             + 42.313330701600911252) * r + 1.0)  # fmt: skip
         return q * above / below
-    r = math.sqrt(-log(share if q < 0.0 else 1.0 - share))
+    r = sqrt(-log(share if q < 0.0 else 1.0 - share))
     if r <= 5.0:
         r -= 1.6
         above = (((((((7.74545014278341407640e-4 * r + 0.0227238449892691845833) * r + 0.241780725177450611770) * r
@@ -157,7 +158,7 @@ def power(bits: Bits, a: float) -> float:
 def rayleigh(bits: Bits, scale: float = 1.0) -> float:
     """Rayleigh: the length of a plane vector of two normal numbers with deviation ``scale``."""
     _not_negative(scale=scale)
-    return scale * math.sqrt(2.0 * standard_exponential(bits))
+    return scale * sqrt(2.0 * standard_exponential(bits))
 
 
 def laplace(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
@@ -191,8 +192,8 @@ def triangular(bits: Bits, left: float, mode: float, right: float) -> float:
         raise ValueError(f"left = {left:g}, mode = {mode:g} and right = {right:g} are not in order")
     share, width = between(bits), right - left
     if share * width <= mode - left:
-        return left + math.sqrt(share * width * (mode - left))
-    return right - math.sqrt((1.0 - share) * width * (right - mode))
+        return left + sqrt(share * width * (mode - left))
+    return right - sqrt((1.0 - share) * width * (right - mode))
 
 
 def geometric(bits: Bits, p: float) -> int:
@@ -211,11 +212,12 @@ def standard_gamma(bits: Bits, shape: float) -> float:
 
     Source: Marsaglia and Tsang, A Simple Method for Generating Gamma Variables, ACM TOMS 26, 2000.
     """
-    _not_negative(shape=shape)
+    if not shape >= 0.0:
+        _not_negative(shape=shape)
     if shape < 1.0:
         return standard_gamma(bits, shape + 1.0) * power_of(between(bits), 1.0 / shape) if shape else 0.0
     d = shape - 1.0 / 3.0
-    c = 1.0 / math.sqrt(9.0 * d)
+    c = 1.0 / sqrt(9.0 * d)
     while True:
         x = standard_normal(bits)
         v = 1.0 + c * x
@@ -228,7 +230,8 @@ def standard_gamma(bits: Bits, shape: float) -> float:
 
 def gamma(bits: Bits, shape: float, scale: float = 1.0) -> float:
     """Gamma with mean ``shape * scale``; with a whole shape it is Erlang's law."""
-    _not_negative(scale=scale)
+    if not scale >= 0.0:
+        _not_negative(scale=scale)
     return scale * standard_gamma(bits, shape)
 
 
@@ -258,7 +261,7 @@ def beta(bits: Bits, a: float, b: float) -> float:
 def standard_t(bits: Bits, df: float) -> float:
     """Student's t with ``df`` degrees of freedom."""
     _positive(df=df)
-    return standard_normal(bits) / math.sqrt(chisquare(bits, df) / df)
+    return standard_normal(bits) / sqrt(chisquare(bits, df) / df)
 
 
 def f(bits: Bits, dfnum: float, dfden: float) -> float:
@@ -273,11 +276,11 @@ def vonmises(bits: Bits, mu: float, kappa: float) -> float:
     """
     _not_negative(kappa=kappa)
     if kappa > 1e6:  # normal to all digits that count, while the ratios below lose theirs
-        return math.remainder(mu + standard_normal(bits) / math.sqrt(kappa), 2.0 * math.pi)
+        return math.remainder(mu + standard_normal(bits) / sqrt(kappa), 2.0 * math.pi)
     if kappa < 1e-8:
         return math.remainder(mu + math.pi * (2.0 * between(bits) - 1.0), 2.0 * math.pi)
-    root = 1.0 + math.sqrt(1.0 + 4.0 * kappa * kappa)
-    rho = 2.0 * kappa / (root + math.sqrt(2.0 * root))  # (root - sqrt(2 root)) / (2 kappa) without cancellation
+    root = 1.0 + sqrt(1.0 + 4.0 * kappa * kappa)
+    rho = 2.0 * kappa / (root + sqrt(2.0 * root))  # (root - sqrt(2 root)) / (2 kappa) without cancellation
     s = (1.0 + rho * rho) / (2.0 * rho)
     while True:
         z = cos(math.pi * between(bits))
@@ -293,7 +296,7 @@ def wald(bits: Bits, mean: float, scale: float) -> float:
     _positive(mean=mean, scale=scale)
     x = standard_normal(bits)
     t = mean * x * x / (2.0 * scale)
-    small = mean / (1.0 + t + math.sqrt(t * (2.0 + t)))  # the smaller root; the product of both is mean^2
+    small = mean / (1.0 + t + sqrt(t * (2.0 + t)))  # the smaller root; the product of both is mean^2
     return small if between(bits) * (mean + small) <= mean else mean / small * mean
 
 
@@ -312,7 +315,7 @@ def poisson(bits: Bits, lam: float = 1.0) -> int:
             chance *= lam / k
             below += chance
         return k
-    b = 0.931 + 2.53 * math.sqrt(lam)
+    b = 0.931 + 2.53 * sqrt(lam)
     a = -0.059 + 0.02483 * b
     ceiling = 1.1239 + 1.1328 / (b - 3.4)
     while True:
@@ -347,7 +350,7 @@ def binomial(bits: Bits, n: int, p: float) -> int:
             chance *= (n - k + 1) * p / (k * q)
             below += chance
         return k
-    spread = math.sqrt(n * p * q)
+    spread = sqrt(n * p * q)
     b = 1.15 + 2.53 * spread
     a = -0.0873 + 0.0248 * b + 0.01 * p
     ceiling = (2.83 + 5.1 / b) * spread

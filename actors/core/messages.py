@@ -6,7 +6,6 @@ in it is obeyed by a terminal or hides, and there is never too much of it.
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import heapq
 import itertools
@@ -100,6 +99,8 @@ def nearest(name: str, candidates: Iterable[str], likeness: float = 0.6) -> str 
     asked, likely = name.casefold(), list(by_folded)
     if len(likely) > _MAX_COMPARED:
         likely = heapq.nlargest(_MAX_COMPARED, likely, key=lambda each: _shared_ends(asked, each))
+    import difflib  # here, as most names are right
+
     found = difflib.get_close_matches(asked, likely, n=1, cutoff=likeness)
     return by_folded[found[0]] if found else None
 

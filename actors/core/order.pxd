@@ -1,8 +1,10 @@
 # Types for C; what everything is for is said in order.py.
 
+cimport cython
 from epicycle.actors.core.moment cimport Moment, Wake
 
 
+@cython.final
 cdef class Ranks:
     cdef long long* items
     cdef readonly Py_ssize_t size
@@ -16,6 +18,7 @@ cdef struct Slot:
     Py_ssize_t number  # of what is to be done, in the list; below 0 where there is nothing
 
 
+@cython.final
 cdef class Times:
     cdef Ranks heap
     cdef list instants
@@ -38,6 +41,7 @@ cdef struct Item:
     Py_ssize_t place  # of the value and its wake-up, in the lists
 
 
+@cython.final
 cdef class Line:
     cdef list wakes, values
     cdef Item* heap

@@ -32,8 +32,6 @@ cdef class InputPort(Port):
     cpdef receive(self, token, channel)
     cpdef prepare(self)
     cpdef clear(self)
-    cpdef hide(self)
-    cpdef show(self)
     cpdef take(self)
     cpdef give(self, taken)
 

@@ -24,7 +24,6 @@ else:
     T = TypeVar("T")
 
 _ANY: Any = Any
-_NOTHING: list[Any] = []  # what a port shows that keeps its tokens to itself
 
 
 class PortError(EpicycleError):
@@ -182,14 +181,6 @@ class InputPort(Port[T]):
         empty(self.arrived)
         if self.channels is not None:
             empty(self.channels)
-        self.shown = self.arrived
-
-    def hide(self) -> None:
-        """Engine: show nothing until they are cleared or shown."""
-        self.shown = _NOTHING
-
-    def show(self) -> None:
-        """Engine: show what has come."""
         self.shown = self.arrived
 
     def take(self) -> tuple[list[Any], list[int]]:

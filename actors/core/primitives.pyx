@@ -1,17 +1,95 @@
-# cython: language_level=3, boundscheck=False, wraparound=False
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
 """What primitives.py does, in C."""
+
+import copyreg
 
 from cpython.object cimport PyObject
 from cpython.ref cimport Py_DECREF
-from libc.math cimport rint
+from libc.math cimport frexp, rint
+from libc.stdint cimport uint64_t
+
+from .elementary import log as far_log
+from .elementary import tables
 
 cdef extern from "Python.h":
+    Py_ssize_t Py_REFCNT(object)
     void Py_SET_SIZE(object, Py_ssize_t)
     PyObject* PyList_GET_ITEM(object, Py_ssize_t)
 
 
+cdef double INVERSES[1024]
+cdef double LOG_HIGH[1024]
+cdef double LOG_LOW[1024]
+cdef double LN_2_HIGH = tables.LN_2_HIGH
+cdef double LN_2_LOW = tables.LN_2_LOW
+cdef int entry
+for entry in range(len(tables.INVERSES)):
+    INVERSES[entry] = tables.INVERSES[entry]
+    LOG_HIGH[entry] = tables.LOG_HIGH[entry]
+    LOG_LOW[entry] = tables.LOG_LOW[entry]
+
+
 cdef long long nearest(double number) noexcept:
     return <long long>rint(number)
+
+
+cdef double log(double x) except? -1.0:
+    """The logarithm of ``elementary``, operation by operation."""
+    cdef int e, i
+    cdef double m, point, inverse, r, bent, start, first, rest
+    if not 0.0 < x < 1e300:
+        return far_log(x)
+    m = frexp(x, &e)
+    i = <int>(m * 512.0 + 0.5)
+    point = i * 0.001953125
+    inverse = INVERSES[i]
+    r = (m - point) * inverse
+    bent = r * r * (0.5 - r * (0.3333333333333333 - r * (0.25 - r * (0.2 - r * 0.16666666666666666))))
+    start = e * LN_2_HIGH + LOG_HIGH[i]
+    if start == 0.0:
+        return r - bent
+    first = (r + 393216.0) - 393216.0
+    rest = ((m - point) - first * point) * inverse
+    return (start + first) + (rest + ((e * LN_2_LOW + LOG_LOW[i]) - bent))
+
+
+cdef class Words:
+    __slots__ = ("_ahead", "_bits", "_block")
+
+    def __init__(self, bits):
+        self._bits = bits
+        self._block = 16
+
+    def __reduce__(self):
+        return reduced(self)
+
+    @property
+    def _ahead(self):
+        return [self.words[place] for place in range(self.left)]
+
+    @_ahead.setter
+    def _ahead(self, words):
+        self.left = 0
+        for word in words[:64]:
+            self.words[self.left] = word
+            self.left += 1
+
+    cpdef uint64_t word(self) except? 0:
+        if not self.left:
+            self._block = min(2 * self._block, 64)
+            self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
+        self.left -= 1
+        return self.words[self.left]
+
+
+cdef tuple reduced(thing):
+    """How pickle makes a thing of a class in C again: by its slots, as it does by itself in Python."""
+    names = [name for base in type(thing).__mro__ for name in getattr(base, "__slots__", ())]
+    return copyreg.__newobj__, (type(thing),), (None, {name: getattr(thing, name) for name in names})
+
+
+cpdef bint is_alone(thing) noexcept:
+    return Py_REFCNT(thing) == 1
 
 
 cdef int empty(list tokens) except -1:

@@ -22,30 +22,12 @@ from numpy.typing import ArrayLike
 
 from . import choices, laws
 from .messages import did_you_mean
+from .primitives import Words
 
 Size = int | Sequence[int] | None
 
 _STEP: Final = 1 / 2**53  # from one number of ``random`` to the next
-_MOST: Final = 64  # words taken from the generator at once, which costs a tenth of taking them one by one
 _PLAIN: Final = frozenset({float, int, bool})
-
-
-class Words:
-    """Random bits, 64 at a time."""
-
-    __slots__ = ("_ahead", "_bits", "_block")
-
-    def __init__(self, bits: np.random.PCG64) -> None:
-        self._bits = bits
-        self._ahead: list[int] = []  # words that have been taken already, the next one last
-        self._block = 16
-
-    def word(self) -> int:
-        """The next 64 random bits, as a number that is not negative."""
-        if not self._ahead:
-            self._block = min(2 * self._block, _MOST)
-            self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
-        return self._ahead.pop()
 
 
 class RandomStream(Words):
@@ -60,9 +42,6 @@ class RandomStream(Words):
     """
 
     __slots__ = ()
-
-    def __reduce__(self) -> tuple[Callable[..., RandomStream], tuple[Any, ...]]:
-        return _as_it_stood, (self._bits, self._ahead, self._block)
 
     def __repr__(self) -> str:
         return f"<Stream {self.state}>"
@@ -112,7 +91,7 @@ class RandomStream(Words):
 
     def _words(self, count: int) -> np.ndarray[Any, np.dtype[np.uint64]]:
         """The next words, as an array."""
-        ahead = [self._ahead.pop() for _ in range(min(count, len(self._ahead)))]
+        ahead = [self.word() for _ in range(min(count, len(self._ahead)))]
         return np.append(np.array(ahead, np.uint64), self._bits.random_raw(count - len(ahead)))
 
     def _many_below(self, bound: int, count: int) -> np.ndarray[Any, np.dtype[np.uint64]]:
@@ -246,8 +225,12 @@ def _method(law: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(law)
     def draw(self: RandomStream, *values: Any, **named: Any) -> Any:
-        if not named and len(values) <= len(parameters) and _PLAIN.issuperset(map(type, values)):
-            return law(self, *values)
+        if not named and len(values) <= len(parameters):
+            for value in values:
+                if type(value) not in _PLAIN:
+                    break
+            else:
+                return law(self, *values)
         given = signature.bind(self, *values, **named)
         given.apply_defaults()
         return self._drawn(functools.partial(law, self), given.args[-1], *given.args[1:-1], dtype=dtype)
@@ -258,12 +241,6 @@ def _method(law: Callable[..., Any]) -> Callable[..., Any]:
 
 for _law in laws.OF_ONE_VALUE:
     setattr(RandomStream, _law.__name__, _method(_law))
-
-
-def _as_it_stood(bits: np.random.PCG64, ahead: list[int], block: int) -> RandomStream:
-    stream = RandomStream(bits)
-    stream._ahead, stream._block = ahead, block
-    return stream
 
 
 def _shape(size: Size) -> tuple[int, ...]:

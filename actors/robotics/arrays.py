@@ -1,12 +1,13 @@
-"""Arrays of a few floats, of which NumPy looks at none without taking its time; compiled, where there was a compiler.
+"""Arrays of a few floats, of which NumPy looks at none without taking its time, and their way into numba's kernels.
 
-``arrays.pyx`` does the same in C, where that takes a tenth of it.
+``arrays.pyx`` does the same in C, where there was a compiler, and takes a tenth of that.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 # Of floats: arithmetic on arrays of two takes ten times as long.
 Pair = tuple[float, float]
+Function = TypeVar("Function", bound=Callable[..., object])
 
 _FLOAT = np.dtype(np.float64)  # NumPy looks for it at each call where the type is given instead
 
@@ -61,3 +63,14 @@ def stacked(rows: Iterable[Array], columns: int) -> Array:
     for place, row in enumerate(kept):
         table[place, : len(row)] = row
     return table
+
+
+def entered(jitted: Function, compiled: Callable[[], Any], takes: str, gives: str) -> Function:
+    """A kernel as Python calls it: by numba's own way, which looks at each array for long.
+
+    In C it is called by its address, which the object has that ``compiled`` returns, and given that of a row of words:
+    first a function that makes an array of an address and its shape; then what the kernel ``takes``, a float (d), an
+    int (i), a bool (b), or an array of so many dimensions (1 to 9), which is its address and a word for each length.
+    What it ``gives`` stands there when it returns 1.
+    """
+    return jitted

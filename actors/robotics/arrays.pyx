@@ -1,9 +1,11 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Arrays of a few floats: what arrays.py does, in C, for plain arrays of doubles and tuples of floats."""
+"""Arrays of a few floats, and kernels: what arrays.py does, in C, for plain arrays of doubles and tuples of floats."""
 
 cimport numpy
 from cpython.float cimport PyFloat_AS_DOUBLE
+from cpython.ref cimport Py_DECREF, Py_INCREF
 from libc.math cimport isfinite
+from libc.stdint cimport int64_t, intptr_t
 from libc.string cimport memcpy
 
 import math
@@ -109,3 +111,93 @@ cpdef stacked(rows, Py_ssize_t columns):
         memcpy(data, numbers_of(row), 8 * size_of(row))
         data += columns
     return table
+
+
+cdef extern from *:
+    """
+    static void fetch(const char *code, Py_ssize_t span) {
+        for (const char *end = code + span; code < end; code += 64) __builtin_prefetch(code, 0, 2);
+    }
+    """
+    void fetch(const char*, Py_ssize_t) noexcept
+DEF WORDS = 128  # more than any kernel takes
+ctypedef int64_t (*Code)(int64_t*) noexcept
+
+
+cdef class Entry:
+    """A kernel that is called by its address; what it takes becomes words, see ``entered`` in arrays.py."""
+
+    cdef Code code  # none before the first call
+    cdef object owner  # of the code
+    cdef object compiled
+    cdef bytes takes, gives
+    cdef public Py_ssize_t span
+    cdef readonly object jitted  # the same, as kernels call it
+
+    def __init__(self, jitted, compiled, str takes, str gives):
+        self.jitted, self.compiled = jitted, compiled
+        self.takes, self.gives = takes.encode(), gives.encode()
+        assert sum([1 + int(each) if each.isdigit() else 1 for each in takes]) < WORDS
+
+    def __call__(self, *arguments):
+        cdef int64_t[WORDS] words
+        cdef int64_t* word = words + 1
+        cdef const char* kinds = self.takes
+        cdef Py_ssize_t place, count = len(self.takes)
+        cdef int axis
+        cdef list kept = None
+        if self.code is NULL:
+            self.owner = self.compiled()
+            self.code = <Code><intptr_t>self.owner.address
+        if self.span:
+            fetch(<const char*>self.code, self.span)
+        if len(arguments) != count:
+            raise TypeError(f"a kernel of {count} arguments is given {len(arguments)}")
+        for place in range(count):
+            value = arguments[place]
+            if kinds[place] == c"d":
+                (<double*>word)[0] = value
+            elif kinds[place] == c"i":
+                word[0] = value
+            elif kinds[place] == c"b":
+                word[0] = bool(value)
+            else:
+                if not is_plain(value):
+                    value = np.array(value, FLOAT, order="C")
+                    kept = [value, kept]
+                if numpy.PyArray_NDIM(<numpy.ndarray>value) != kinds[place] - c"0":
+                    raise TypeError(f"argument {place} of a kernel has {value.ndim} dimensions")
+                word[0] = <int64_t><intptr_t>numbers_of(value)
+                for axis in range(numpy.PyArray_NDIM(<numpy.ndarray>value)):
+                    word += 1
+                    word[0] = numpy.PyArray_DIM(<numpy.ndarray>value, axis)
+            word += 1
+        words[0] = <int64_t><intptr_t>&boxed
+        if self.code(words) != 1:
+            raise MemoryError("a kernel has failed")
+        if len(self.gives) == 1:
+            return given(self.gives[0], words)
+        return tuple([given(self.gives[place], words + place) for place in range(len(self.gives))])
+
+
+cdef int64_t boxed(double* data, numpy.npy_intp* shape, int64_t dimensions) noexcept:
+    made = numpy.PyArray_SimpleNew(dimensions, shape, numpy.NPY_DOUBLE)
+    memcpy(numbers_of(made), data, 8 * size_of(made))
+    Py_INCREF(made)
+    return <int64_t><intptr_t><void*>made
+
+
+cdef given(char kind, int64_t* word):
+    if kind == c"d":
+        return (<double*>word)[0]
+    if kind == c"i":
+        return word[0]
+    if kind == c"b":
+        return word[0] != 0
+    made = <object><void*><intptr_t>word[0]
+    Py_DECREF(made)
+    return made
+
+
+def entered(jitted, compiled, takes, gives):
+    return Entry(jitted, compiled, takes, gives)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
-
-import networkx as nx
+from typing import Any
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
-from ..graph import Detour, Hop, ModelGraph, dependencies
+from ..graph import Detour, Hop, ModelGraph, Region, dependencies, find_loop, in_order
 from ..text import RAISE_IT, Problems, in_general
 from .draft import Draft
 
@@ -36,26 +35,32 @@ def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
 def check_passages(graph: ModelGraph, problems: Problems) -> bool:
     """Whether the ways through composite ports end, and are few enough to be followed one by one."""
     ports = graph.ports
-    between = nx.DiGraph(ports.subgraph([path for path, port in ports.nodes(data="port") if port is None]))
-    if not nx.is_directed_acyclic_graph(between):
-        cycle = [source for source, _ in nx.find_cycle(between)]
-        hop = graph.outgoing(cycle[-1])[0]
+    between = {
+        path: [hop.destination for hop in graph.outgoing(path) if ports[hop.destination].port is None]
+        for path, node in ports.items()
+        if node.port is None
+    }
+    if cycle := find_loop(between):
+        hop = next(hop for hop in graph.outgoing(cycle[-1]) if hop.destination == cycle[0])
         message = f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}"
         hint = "a composite that hands its input straight on to its output cannot be connected to itself"
         problems.add(message, hop.position, hint)
         return False
-    if nx.dag_longest_path_length(between) > MAX_PASSAGE:
-        path = nx.dag_longest_path(between)
-        problems.add(f"a way of more than {MAX_PASSAGE} composite ports in a row, from {path[0]} to {path[-1]}")
-        return False
     # How many wires lead on from each port, without walking along them: they may be very many.
     onward: dict[str, int] = {}
-    for path in reversed(list(nx.topological_sort(between))):
-        onward[path] = sum(onward.get(far, 1) for _, far in ports.out_edges(path))
+    last: dict[str, tuple[int, str]] = {}  # how many composite ports are behind each in a row, and the last of them
+    for path in reversed(in_order(between)):
+        onward[path] = sum(onward.get(hop.destination, 1) for hop in graph.outgoing(path))
+        last[path] = max(((last[far][0] + 1, last[far][1]) for far in between[path]), default=(0, path))
+    first = max(last, key=last.__getitem__, default="")
+    if first and last[first][0] > MAX_PASSAGE:
+        what = f"a way of more than {MAX_PASSAGE} composite ports in a row"
+        problems.add(f"{what}, from {first} to {last[first][1]}")
+        return False
     wires = 0
     for actor in graph.actors.values():
         for port in actor.outputs.values():
-            wires += sum(onward.get(far, 1) for _, far in ports.out_edges(port.path))
+            wires += sum(onward.get(hop.destination, 1) for hop in graph.outgoing(port.path))
             limit = graph.limits.wires
             if wires > limit:
                 problems.add(f"the model has more than {limit:,} wires", graph.positions.get(actor.path), RAISE_IT)
@@ -65,7 +70,7 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
 
 def check_types(graph: ModelGraph, problems: Problems) -> None:
     """What each port sends or hands on must be what the next port with a type takes."""
-    for path in graph.ports.nodes:
+    for path in graph.ports:
         given = graph.type_of(path)
         if given is None:
             continue
@@ -76,7 +81,7 @@ def check_types(graph: ModelGraph, problems: Problems) -> None:
                 continue
             way = " -> ".join([path, *(hop.destination for hop in hops)])
             first, last = hops[0].position, hops[-1].position
-            verb = "sends" if graph.ports.nodes[path]["port"] is not None else "hands on"
+            verb = "sends" if graph.ports[path].port is not None else "hands on"
             problems.add(
                 f"{path} {verb} {type_name(given)}, but {far} takes {type_name(wanted)}",
                 first,
@@ -103,7 +108,7 @@ def _who(graph: ModelGraph, port: str) -> str:
     if owner in graph.actors:
         what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.positions.get(owner)
     else:
-        what, at = f"{port} is a port of {graph.composites.get(owner, owner)}", graph.ports.nodes[port].get("declared")
+        what, at = f"{port} is a port of {graph.composites.get(owner, owner)}", graph.ports[port].declared
     return f"{what}, declared at {at}" if at is not None else ""
 
 
@@ -142,7 +147,13 @@ def _may_be_connected(draft: Draft, path: str) -> bool:
     """Whether a missing connection may be due to another problem: a wrong connection, or an actor not made."""
     if not draft.is_wired or not draft.open:
         return not draft.is_wired
-    return not draft.open.isdisjoint((path, *nx.ancestors(draft.graph.ports, path)))
+    before = [path]
+    known = {path}
+    while before:
+        sources = {hop.source for hop in draft.graph.incoming(before.pop())} - known
+        known |= sources
+        before += sources
+    return not draft.open.isdisjoint(known)
 
 
 def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
@@ -155,24 +166,30 @@ def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
 
 def check_loops(graph: ModelGraph, problems: Problems) -> None:
     """Every loop needs a delay somewhere, or no order of firing exists within a tag."""
-    declared = {path: place for place, path in enumerate(graph.ports.nodes)}
     for region in dependencies(graph).values():
-        for component in nx.strongly_connected_components(region):
+        if not find_loop(region):
+            continue
+        import networkx as nx  # here, as it takes long and most models have no such loop
+
+        declared = {path: place for place, path in enumerate(graph.ports)}
+        for component in nx.strongly_connected_components(nx.from_dict_of_lists(region, nx.DiGraph)):
             if len(component) > 1:
                 # A graph in the order of declaration: a view would follow that of a set, which varies between runs.
                 inner = nx.DiGraph()
                 for path in sorted(component, key=declared.__getitem__):
-                    inner.add_edges_from((path, far, way) for far, way in region.adj[path].items() if far in component)
-                _add_loop(graph, _shortest_loop(graph, inner), problems)
+                    inner.add_edges_from((path, far) for far in region[path] if far in component)
+                _add_loop(graph, _shortest_loop(graph, inner, region), problems)
 
 
-def _shortest_loop(graph: ModelGraph, inner: nx.DiGraph) -> list[list[Hop]]:
+def _shortest_loop(graph: ModelGraph, inner: Any, region: Region) -> list[list[Hop]]:
     """The ways from actor to actor around a loop, from the first actor of a strongly connected graph back to it."""
+    import networkx as nx
+
     start = next(path for path in inner if graph.is_end(path))
     loop = [start, *min((nx.shortest_path(inner, after, start) for after in inner.successors(start)), key=len)]
     ways: list[list[Hop]] = []
-    for edge in pairwise(loop):
-        hop = inner.edges[edge].get("hop")
+    for source, destination in pairwise(loop):
+        hop = region[source][destination]
         if hop is not None:
             if graph.is_end(hop.source):
                 ways.append([])
@@ -235,16 +252,21 @@ def check_reach(graph: ModelGraph, problems: Problems) -> None:
         if path in alive:
             continue
         alive.add(path)
-        waiting += [*graph.ports.successors(path), *detours.get(path, ())]
-        port = graph.ports.nodes[path]["port"]
+        waiting += [*(hop.destination for hop in graph.outgoing(path)), *detours.get(path, ())]
+        port = graph.ports[path].port
         if isinstance(port, InputPort):
             waiting += [output.path for output in port.actor.outputs.values()]
-    idle = nx.DiGraph()
-    for actor in graph.actors.values():
-        if not actor.is_source and not any(port.path in alive for port in actor.inputs.values()):
-            idle.add_node(actor.path)
-    if not idle:
+    never = [
+        actor.path
+        for actor in graph.actors.values()
+        if not actor.is_source and not any(port.path in alive for port in actor.inputs.values())
+    ]
+    if not never:
         return
+    import networkx as nx
+
+    idle: Any = nx.DiGraph()
+    idle.add_nodes_from(never)
     for wire in graph.wires():
         if wire.destination.actor.path in idle:
             idle.add_edge(wire.source.actor.path, wire.destination.actor.path)

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-
-import networkx as nx
+from itertools import chain
 
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import CompositeAspect, FiringTime, Request
 
-from ..graph import AspectModel, Detour, ModelGraph, WovenAspect
+from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, find_loop
 from ..language import PartText, PointcutText
 from ..text import PathIndex, Position, Problems, did_you_mean
 from .looks import without_port
@@ -62,7 +61,7 @@ class ModelWeaving(Weaving):
             for hop in self.graph.incoming(port):
                 message = f"{port} is for the tokens of this aspect, and nothing else can be connected to it"
                 self._problem(message, hop.position, "add another input for what else the composite needs")
-            if isinstance(self.graph.ports.nodes[port]["port"], OutputPort):
+            if isinstance(self.graph.ports[port].port, OutputPort):
                 hint = "let that one stand here, too, or add another composite"
                 self._problem(f"{self.path} is the model of another aspect already", self.position, hint)
         self._check_types()
@@ -77,7 +76,7 @@ class ModelWeaving(Weaving):
                 self.graph.disconnect(hop)
             self.graph.open_requests(port)
         if self._response:
-            self.graph.ports.nodes[self._response]["type"] = Request
+            self.graph.ports[self._response].type = Request
         if not self._response or self._is_misplaced:
             return woven
         return replace(woven, model=AspectModel(self.path, self.kind, self._response, self._asked, self._times))
@@ -157,12 +156,12 @@ class ModelWeaving(Weaving):
     def _check_types(self) -> None:
         """Whether the ports, if they declare types, take and give requests."""
         for port in filter(None, (*self._request_ports, self._response)):
-            node = self.graph.ports.nodes[port]
-            wanted = node.get("type")
+            node = self.graph.ports[port]
+            wanted = node.type
             if wanted is not None and not accepts(wanted, Request):
                 what = f"{port.rpartition('.')[2]} of {self.kind} is for {type_name(wanted)}"
                 hint = "leave out its type: the actors inside get requests, which hold the tokens"
-                self._problem(f"{what}, but through an aspect go requests", node.get("declared"), hint)
+                self._problem(f"{what}, but through an aspect go requests", node.declared, hint)
 
     def _check_directors(self, woven: WovenAspect) -> None:
         """Whether all places stand under the composite's own director, which has one order and one time for them."""
@@ -221,10 +220,10 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
             for port in (*actor.inputs.values(), *actor.outputs.values()):
                 add(port.path, model.requests[place], woven)
     senders: dict[str, list[str]] = {}
-    for port in graph.ports.nodes if at else ():
-        if graph.direction(port) == "output" and graph.is_end(port):
-            senders[port] = lead([port], port)  # an aspect at an output stands before the send
-    for *_, hop in graph.ports.edges(data="hop") if at else ():
+    for path in graph.ports if at else ():
+        if graph.direction(path) == "output" and graph.is_end(path):
+            senders[path] = lead([path], path)  # an aspect at an output stands before the send
+    for hop in chain.from_iterable(map(graph.outgoing, graph.ports)) if at else ():
         sources = senders.get(hop.source, [hop.source]) if hop.delay is None else []
         sources = lead(sources, _place(hop.source, hop.destination))
         if hop.destination not in senders:
@@ -238,19 +237,21 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
 def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> bool:
     """Whether no aspect stands in another that stands in it, or the tokens of both would never come out."""
     models = [(woven, woven.model.path) for woven in aspects if woven.model is not None]
-    inside = nx.DiGraph()
+    inside: dict[str, list[str]] = {}
     for woven, _ in models:
         ends = [*woven.ports, *woven.actors, *(end for ends in woven.connections for end in ends)]
-        for other, path in models:
-            if woven is not other and any(end.startswith(f"{path}.") for end in ends):
-                inside.add_edge(woven.name, other.name)
-    is_sound = nx.is_directed_acyclic_graph(inside)
-    if not is_sound:
-        first, second = nx.find_cycle(inside)[0]
+        inside[woven.name] = [
+            other.name
+            for other, path in models
+            if woven is not other and any(end.startswith(f"{path}.") for end in ends)
+        ]
+    loop = find_loop(inside)
+    if loop:
+        first, second, *_ = loop
         message = f"aspect {first}: it stands inside of {second}, and {second} inside of it"
         hint = f"a token would never come out: let one of them stand elsewhere, or leave it out: '!{second}.**'"
         problems.add(message, graph.positions.get(f"aspect {first}"), hint)
-    return bool(is_sound)
+    return not loop
 
 
 def _place(source: str, destination: str) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import Actor, declared_ports, has_own_ports
 
-from ..graph import ModelGraph
+from ..graph import ModelGraph, PortNode
 from ..text import could_be_within
 
 
@@ -46,7 +46,7 @@ class Draft:
     def leave_out(self, path: str, actor_type: type[Actor]) -> None:
         """Put the ports of an actor in its place that could not be made, so that what names them is not wrong, too."""
         for name, port in declared_ports(actor_type).items():
-            self.graph.ports.add_node(f"{path}.{name}", port=None, direction=port.direction)
+            self.graph.ports[f"{path}.{name}"] = PortNode(None, port.direction)
             self.open.add(f"{path}.{name}")
         self.kinds.add(actor_type.__name__)
         if has_own_ports(actor_type):

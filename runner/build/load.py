@@ -97,7 +97,8 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
     """The model that declarations stand for, in passes; it is good only if there are no problems then."""
     problems, values, root = settler.problems, settler.values, text.root
     model = Model(root.name, doc=root.doc)
-    for name in sorted(known.composites.keys() & known.catalogue.actors.keys()):
+    # Without a composite nobody needs to know what all packages offer.
+    for name in sorted(known.composites.keys() & known.catalogue.actors.keys() if known.composites else ()):
         at = known.composites[name].position
         problems.add(f"composite {name!r} has the name of an actor type", at, "give it another name")
     values.of_model = root.parameters

@@ -12,7 +12,7 @@ from ..collection import without_collection
 from ..graph import Metric, ModelGraph, Watched, WovenAspect, check_processors, firing_order, is_within
 from ..language import Values
 from ..shown import short
-from ..tables import Table, as_html, as_text
+from ..tables import Table, Tabled
 from ..text import NAME, NAMES_HAVE, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
@@ -27,7 +27,7 @@ from .weave_all import arranged
 DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 
 
-class Model(Scope):
+class Model(Scope, Tabled):
     """A model graph that can be run, made by ``load_model`` or built in Python.
 
     >>> model = Model("two_clocks", stop=10.0, seed=1)
@@ -235,12 +235,6 @@ class Model(Scope):
 
     def __repr__(self) -> str:
         return f"<Model {self._caption()}>"
-
-    def __str__(self) -> str:
-        return as_text(self._caption(), self._tables())
-
-    def _repr_html_(self) -> str:
-        return as_html(self._caption(), self._tables())
 
     @property
     def extent(self) -> str:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from epicycle.actors import StateMachine
-
 from ..language import CompositeText
 from ..text import Problems, did_you_mean
 from .draft import Draft
@@ -20,6 +18,8 @@ def connect_modes(
     has it.  The machine's guards know what refinements send.  An input of a refinement that is called as a variable
     gets its value whenever a mode is entered.
     """
+    from epicycle.actors import StateMachine  # with all that solves differential equations, which takes a while
+
     graph, name = draft.graph, composite.name
     assert composite.machine is not None
     part = composite.machine

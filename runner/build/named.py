@@ -178,7 +178,7 @@ class Named:
         path: str = port.path
         if not path:
             self._tell(f"{port!r} is declared in a class", "give the port of an actor that was added to the model")
-        elif path not in graph.ports or graph.ports.nodes[path]["port"] not in (port, None):
+        elif path not in graph.ports or graph.ports[path].port not in (port, None):
             self._tell(f"the actor of {path} is not part of this model", "add it to the model first")
         else:
             return path

@@ -17,7 +17,7 @@ class Paths:
 
     def __init__(self, draft: Draft, ports: Iterable[str] | None = None) -> None:
         self._draft, self._graph = draft, draft.graph
-        self.ports = self._index(draft.graph.ports.nodes if ports is None else ports)
+        self.ports = self._index(draft.graph.ports if ports is None else ports)
 
     def _index(self, paths: Iterable[str]) -> PathIndex:
         return PathIndex(paths, self._graph.limits)

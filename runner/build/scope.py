@@ -195,7 +195,7 @@ class Scope:
         if full in graph.composites:
             return self._model.scope(full)
         if full in graph.ports:
-            port = graph.ports.nodes[full]["port"]
+            port = graph.ports[full].port
             return CompositePort(full, graph.direction(full)) if port is None else port
         known = [*graph.actors, *graph.composites, *graph.ports]
         raise mistake(f"there is no {full!r}{did_you_mean(full, known)}", call_site())
@@ -281,7 +281,7 @@ class Scope:
         """What can be said of new connections at once; the rest is said when the model is whole."""
         graph, new = self._model.graph, dict[str, Link]()
         for link in links.found:
-            source, target = (graph.ports.nodes[path]["port"] for path in (link.source, link.destination))
+            source, target = (graph.ports[path].port for path in (link.source, link.destination))
             if source is not None and target is not None and not accepts(target.type, source.type):
                 taken = f"{target.path} takes {type_name(target.type)}"
                 problems.add(f"{source.path} sends {type_name(source.type)}, but {taken}", link.position)

@@ -42,7 +42,7 @@ _INDEX = re.compile(r"\[(\d+|\*)\]")
 # What people may try to set, and how it is done.
 _NO_PARAMETERS = {
     "seed": "the seed of a run is the option --seed",
-    "stop": "the time at which a run ends is the option --until",
+    "stop": "a single run is ended by --until, or let the model have a parameter for it: 'stop: ${end}'",
     "count": "let the model have a parameter for it: 'count: ${n}'",
     "priority": "let the model have a parameter for it: 'priority: ${p}'",
     "enabled": "an aspect is taken out by --without, or let the model have a parameter for it: 'enabled: ${on}'",

@@ -40,8 +40,7 @@ class Watching:
         self.graph = draft.graph
         self.values = values
         self.problems = problems
-        ports = self.graph.ports.nodes(data="direction")
-        outputs = (path for path, direction in ports if direction == "output")
+        outputs = (path for path, node in self.graph.ports.items() if node.direction == "output")
         self._outputs = PathIndex(outputs, self.graph.limits)
         self._recorded = set(recorded)
         self._watched = 0
@@ -158,7 +157,7 @@ class Watching:
         if found or self.draft.excuses(text.text):
             return found
         guess = self._outputs.did_you_mean(text.text)
-        if text.text in self.graph.ports.nodes:
+        if text.text in self.graph.ports:
             self.problems.add(
                 f"{what}: {text.text} is an input port, but an output port is needed{guess}", text.position
             )

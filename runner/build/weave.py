@@ -301,7 +301,7 @@ class Weaving(View):
             self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
             return []
         if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
-            known = [f"{hop.source} -> {hop.destination}" for *_, hop in self.graph.ports.edges(data="hop")]
+            known = [f"{hop.source} -> {hop.destination}" for hop in self.graph.hops]
             near = did_you_mean(f"{self._full(left)} -> {self._full(right)}", known)
             self._problem(f"{pointcut.text!r} matches no connection{near}", pointcut)
         return found

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import isabstract
@@ -87,36 +87,56 @@ class _Offer:
         )
 
 
+class _Offers:
+    """What the installed packages offer of a kind; they are searched when it is asked for, which takes a while."""
+
+    def __init__(self, base: type) -> None:
+        self._base = base
+        self.loaded: dict[str, Any] = {}  # types, or what is wrong with them
+
+    @cached_property
+    def qualified(self) -> dict[str, _Offer]:
+        """By ``package.Name``."""
+        found: dict[str, _Offer] = {}
+        offers = (_Offer(point, self._base) for point in entry_points(group=GROUPS[self._base]))
+        for offer in sorted(offers, key=lambda offer: offer.qualified):
+            found.setdefault(offer.qualified, offer)
+        return found
+
+    @cached_property
+    def by_name(self) -> dict[str, list[str]]:
+        """What is called so, qualified."""
+        found: dict[str, list[str]] = {}
+        for qualified, offer in self.qualified.items():
+            found.setdefault(offer.point.name, []).append(qualified)
+        return found
+
+
 class Types(Mapping[str, type[T]], Generic[T]):
     """Types by name; to look one up may import it, which raises ``CatalogueError`` if that fails."""
 
-    def __init__(self, base: type[T], own: Mapping[str, type[T]], points: Iterable[EntryPoint] = ()) -> None:
-        self._own = dict(own)
+    def __init__(self, base: type[T], own: Mapping[str, type[T]]) -> None:
+        self._own = own
         self._kind = base.__name__.lower()
-        self._loaded: dict[str, type[T] | CatalogueError] = {}
-        self._offers: dict[str, _Offer] = {}
-        for offer in sorted((_Offer(point, base) for point in points), key=lambda offer: offer.qualified):
-            self._offers.setdefault(offer.qualified, offer)
-        self._by_name: dict[str, list[str]] = {}
-        for qualified, offer in self._offers.items():
-            self._by_name.setdefault(offer.point.name, []).append(qualified)
+        self._offers = _Offers(base)
 
     def __getitem__(self, name: str) -> type[T]:
         if name in self._own:
             return self._own[name]
-        qualified = self._by_name.get(name, [name])
+        offers, loaded = self._offers.qualified, self._offers.loaded
+        qualified = self._offers.by_name.get(name, [name])
         if len(qualified) > 1:
-            packages = " and ".join(repr(self._offers[each].distribution) for each in qualified)
+            packages = " and ".join(repr(offers[each].distribution) for each in qualified)
             raise CatalogueError(
                 f"{self._kind} type {name!r} is offered by the packages {packages}", f"write {' or '.join(qualified)}"
             )
-        offer = self._offers[qualified[0]]
-        if qualified[0] not in self._loaded:
+        offer = offers[qualified[0]]
+        if qualified[0] not in loaded:
             try:
-                self._loaded[qualified[0]] = offer.load()
+                loaded[qualified[0]] = offer.load()
             except CatalogueError as error:
-                self._loaded[qualified[0]] = error
-        found = self._loaded[qualified[0]]
+                loaded[qualified[0]] = error
+        found: type[T] | CatalogueError = loaded[qualified[0]]
         if isinstance(found, CatalogueError):
             raise found
         if (distribution := offer.point.dist) is not None:
@@ -124,21 +144,21 @@ class Types(Mapping[str, type[T]], Generic[T]):
         return found
 
     def __contains__(self, name: object) -> bool:
-        return name in self._own or name in self._by_name or name in self._offers
+        return name in self._own or name in self._offers.by_name or name in self._offers.qualified
 
     def __iter__(self) -> Iterator[str]:
         """The shortest name of each type."""
         yield from self._own
-        for name, qualified in self._by_name.items():
+        for name, qualified in self._offers.by_name.items():
             yield from [name] if len(qualified) == 1 and name not in self._own else qualified
 
     def __len__(self) -> int:
-        return len(self._own) + len(self._offers)
+        return len(self._own) + len(self._offers.qualified)
 
     def with_types(self, own: Mapping[str, type[T]]) -> Types[T]:
         """The same with further types, which go before others of their name."""
         result = Types.__new__(Types)
-        result.__dict__.update(self.__dict__, _own={**self._own, **own})
+        result.__dict__.update(self.__dict__, _own={**self._own, **own} if own else self._own)
         return result
 
 
@@ -168,23 +188,41 @@ class Catalogue:
         return Catalogue(actors, aspects), [*wrong, *wrong_too]
 
 
+class _Public(Mapping[str, type[T]], Generic[T]):
+    """The types of a public face, some of which it imports when they are asked for; without ``bases``."""
+
+    def __init__(self, face: ModuleType, base: type[T], *bases: type) -> None:
+        self._face = face
+        self._base = base
+        self._bases = (base, *bases)
+
+    def __getitem__(self, name: str) -> type[T]:
+        found = getattr(self._face, name) if name in self._face.__all__ else None
+        if not isinstance(found, type) or not issubclass(found, self._base):
+            raise KeyError(name)
+        if found in self._bases or isabstract(found):
+            raise KeyError(name)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in self._face.__all__ if name in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
 @cache
 def built_in() -> Catalogue:
     """What Epicycle's public faces offer; bases that define no behaviour are left out."""
-    actors = {name: each for name, each in _public(epicycle.actors, Actor) if each not in (Actor, Process)}
-    bases = (Aspect, JoinPointAspect, CompositeAspect, CompositeExecutionAspect)  # types of the last two are composites
-    aspects = {name: each for name, each in _public(epicycle.aspects, Aspect) if each not in bases}
-    return Catalogue(actors, aspects)
+    bases = (JoinPointAspect, CompositeAspect, CompositeExecutionAspect)  # types of the last two are composites
+    return Catalogue(_Public(epicycle.actors, Actor, Process), _Public(epicycle.aspects, Aspect, *bases))
 
 
 @cache
 def installed() -> Catalogue:
     """What Epicycle and the installed packages offer."""
     own = built_in()
-    return Catalogue(
-        Types(Actor, own.actors, entry_points(group=GROUPS[Actor])),
-        Types(Aspect, own.aspects, entry_points(group=GROUPS[Aspect])),
-    )
+    return Catalogue(Types(Actor, own.actors), Types(Aspect, own.aspects))
 
 
 def _with(types: Mapping[str, type[T]], more: dict[str, type[T]]) -> Mapping[str, type[T]]:
@@ -200,11 +238,6 @@ def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[Cat
         except CatalogueError as error:
             errors.append(error)
     return found, errors
-
-
-def _public(module: Any, base: type) -> list[tuple[str, Any]]:
-    found = ((name, getattr(module, name)) for name in module.__all__)
-    return [(n, o) for n, o in found if isinstance(o, type) and issubclass(o, base) and not isabstract(o)]
 
 
 class TypesError(EpicycleError):

@@ -13,7 +13,12 @@ from .options import CHANGES, DONE, JSON, MODEL, TYPES, command, load, option, o
 # -- models -----------------------------------------------------------------------------------------------------------
 
 
-@command("check a model or a study", *MODEL, option("--strict", action="store_true", help="take warnings for errors"))
+@command(
+    "check a model or a study",
+    *MODEL,
+    option("--strict", action="store_true", help="take warnings for errors"),
+    imports=("build",),
+)
 def validate(options: argparse.Namespace) -> int:
     """Check a model, or a study with all that it varies, without running it."""
     from epicycle.actors import EpicycleError
@@ -77,6 +82,7 @@ def _validate_study(options: argparse.Namespace) -> int:
         help="open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)",
     ),
     option("--expand", action="store_true", help="draw every instance of an array, also where they are alike"),
+    imports=("build", "show.graph"),
 )
 def graph(options: argparse.Namespace) -> int:
     """Draw the model graph: actors, composites, ports, connections with their delays, and aspects."""
@@ -95,7 +101,7 @@ def graph(options: argparse.Namespace) -> int:
     return DONE
 
 
-@command("list the packaged models, disturbances and studies")
+@command("list the packaged models, disturbances and studies", imports=("build",))
 def models(options: argparse.Namespace) -> int:
     """List the models that come with Epicycle, the disturbances for --disturb, and the studies."""
     from ..build import load_model
@@ -124,7 +130,11 @@ def models(options: argparse.Namespace) -> int:
 
 
 @command(
-    "list the actors, or describe one", option("name", metavar="NAME", nargs="?", help="an actor type"), TYPES, JSON
+    "list the actors, or describe one",
+    option("name", metavar="NAME", nargs="?", help="an actor type"),
+    TYPES,
+    JSON,
+    imports=("show",),
 )
 def actors(options: argparse.Namespace) -> int:
     """List the actors that a model may use, or describe one: its ports and parameters."""
@@ -144,6 +154,7 @@ def actors(options: argparse.Namespace) -> int:
     ),
     *CHANGES,
     JSON,
+    imports=("show",),
 )
 def aspects(options: argparse.Namespace) -> int:
     """List the aspects that a model may use, describe one, or show which aspects stand at the ports of a model, in the
@@ -222,6 +233,7 @@ def _print_reference(
     "write a JSON Schema of model files, for editors",
     option("-o", "--out", metavar="FILE", type=Path, help="write to FILE (default: standard output)"),
     TYPES,
+    imports=("show.report",),
 )
 def schema(options: argparse.Namespace) -> int:
     """Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language

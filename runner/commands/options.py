@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from operator import methodcaller
 from pathlib import Path
@@ -30,19 +29,21 @@ several: Callable[..., Option] = partial(option, action="append", default=[])  #
 class Command(NamedTuple):
     """A command: its name, what ``epicycle --help`` and its own ``--help`` say of it, its options, and what it does.
 
-    ``run`` returns the exit code.  Nothing heavy is imported before it runs, so that ``--help`` answers at once.
+    ``run`` returns the exit code.  Nothing heavy is imported before it runs, so that ``--help`` answers at once;
+    ``imports`` are the packages that it needs in any case.
     """
 
     name: str
     summary: str
     description: str | None
     options: tuple[Option, ...]
+    imports: tuple[str, ...]
     run: Run
 
 
-def command(summary: str, *options: Option) -> Callable[[Run], Command]:
+def command(summary: str, *options: Option, imports: tuple[str, ...]) -> Callable[[Run], Command]:
     """Make a command of a function, which has its name and whose docstring describes it."""
-    return lambda run: Command(run.__name__, summary, run.__doc__, options, run)
+    return lambda run: Command(run.__name__, summary, run.__doc__, options, imports, run)
 
 
 # -- what options say -------------------------------------------------------------------------------------------------
@@ -156,6 +157,8 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
         **({} if options.max_actors is None else {"max_actors": options.max_actors}),
     )
     if strict and model.warnings:
+        from dataclasses import replace
+
         raise ModelError(replace(warning, severity="error") for warning in model.warnings)
     for warning in model.warnings:
         complain(str(warning))

@@ -16,6 +16,8 @@ from .options import MODEL, SEED, command, complain_of, load, number, option, se
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from rich.console import Console
+
     from ..build import Model
 
 PATIENCE = 5.0  # s after which a run can be judged
@@ -62,6 +64,7 @@ def factor(text: str) -> float:
         "actor='observer[*].**' or port=plan; of several for one column one must fit, and each column",
     ),
     option("--json", action="store_true", help="print one JSON object instead of the table"),
+    imports=("build", "engine", "show"),
 )
 def run(options: argparse.Namespace) -> int:
     """Run a model once and report what came of it."""
@@ -135,8 +138,6 @@ def outlook(elapsed: float, now: float, end: float) -> str:
 @contextmanager
 def progress(model: Model, until: float | None) -> Iterator[Callable[[float], None]]:
     """A bar on a terminal's standard error, and notices of what takes long."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     end = until if until is not None else model.stop
     latest = -math.inf
 
@@ -145,23 +146,30 @@ def progress(model: Model, until: float | None) -> Iterator[Callable[[float], No
         if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing of the run
             watch.start()
         latest = now
-        bar.update(task, completed=now, now=f"{now:.1f}" if now >= 1.0 else f"{now:.3g}")
+        show(now)
 
     def judge() -> None:
         if end is not None and (text := outlook(PATIENCE, latest, end)):
             complain(text)
 
     terminal = console(stderr=True)
-    about = TextColumn("{task.description} {task.fields[now]} s of model time", markup=False)
-    bar = Progress(
-        about, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True, disable=not terminal.is_terminal
-    )
+    drawn = _bar(terminal, model.name, end) if terminal.is_terminal else nullcontext(lambda now: None)
     # One step of the run may take for ever, so it is looked at from outside.
     watch = threading.Timer(PATIENCE, judge)
     watch.daemon = True
     try:
-        with notices(terminal), bar:
-            task = bar.add_task(model.name, total=end, now="0")
+        with notices(terminal), drawn as show:
             yield look
     finally:
         watch.cancel()
+
+
+@contextmanager
+def _bar(terminal: Console, name: str, end: float | None) -> Iterator[Callable[[float], None]]:
+    """A bar; the call that says how far the run is."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    about = TextColumn("{task.description} {task.fields[now]} s of model time", markup=False)
+    with Progress(about, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as bar:
+        task = bar.add_task(name, total=end, now="0")
+        yield lambda now: bar.update(task, completed=now, now=f"{now:.1f}" if now >= 1.0 else f"{now:.3g}")

@@ -85,6 +85,7 @@ SESSION = (
     option("--yes", action="store_true", help="do not ask back whether so many runs are meant"),
     TYPES,
     *SESSION,
+    imports=("show.report", "study"),
 )
 def study(options: argparse.Namespace) -> int:
     """Make all runs of a study that are not in its results folder yet."""
@@ -109,7 +110,7 @@ def study(options: argparse.Namespace) -> int:
     return _session(plan, options.out or Path("results") / found.name, options)
 
 
-@command("resume a study", FOLDER, *SESSION)
+@command("resume a study", FOLDER, *SESSION, imports=("study",))
 def resume(options: argparse.Namespace) -> int:
     """Make the runs that are missing in the results folder of a study."""
     from ..study import plan_of_folder
@@ -205,6 +206,7 @@ def _about_others(results: StudyResults) -> Iterator[str]:
     FOLDER,
     option("--conditions", action="store_true", help="for each condition"),
     option("--json", action="store_true", help="print one JSON object"),
+    imports=("study",),
 )
 def status(options: argparse.Namespace) -> int:
     """Say how far a study is, also while it is running."""
@@ -249,6 +251,7 @@ def status(options: argparse.Namespace) -> int:
     FOLDER_OF_STUDY,
     option("run_key", metavar="RUN", help="the run's name in the column 'run', or its beginning"),
     option("--out", metavar="DIR", type=Path, help="where to write (default: DIR/replays/RUN)"),
+    imports=("build", "show", "study"),
 )
 def replay(options: argparse.Namespace) -> int:
     """Repeat one run of a study alone, with its event log, all recorded signals and figures."""
@@ -287,6 +290,7 @@ def replay(options: argparse.Namespace) -> int:
     FOLDER_OF_STUDY,
     option("--out", metavar="DIR", type=Path, help="where to write (default: the results folder)"),
     option("--jobs", metavar="N", type=COUNT, help="runs that are repeated at once (default: one a core)"),
+    imports=("show.report", "study"),
 )
 def report(options: argparse.Namespace) -> int:
     """Write report.html, one file that holds all, and its figures; the study need not be finished."""

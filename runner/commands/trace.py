@@ -32,6 +32,7 @@ WIDEST = 80  # characters of a token
     option("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'"),
     option("--to", metavar="TIME", help="end there (default: the end of the run)"),
     option("--json", action="store_true", help="print one JSON object a line"),
+    imports=("build", "engine"),
 )
 def trace(options: argparse.Namespace) -> int:
     """Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."""

@@ -1,9 +1,10 @@
 # Types for C; what everything is for is said in agenda.py.
 
 cimport cython
-from epicycle.actors cimport InputPort, Moment, Wake, Way
+from epicycle.actors cimport InputPort, Moment, Wake, Way, is_alone
 
 
+@cython.final
 cdef class Turn:
     cdef public object actor
     cdef public Form form
@@ -24,6 +25,7 @@ cdef class Form:
     cpdef fire(self)
 
 
+@cython.final
 cdef class Instant(Moment):
     cdef public list pending, turns, wakes
     cdef public Turn turn
@@ -32,9 +34,10 @@ cdef class Instant(Moment):
 
 
 @cython.locals(instant=Instant)
-cpdef Instant new_instant(long long time, long microstep)
+cpdef Instant new_instant(long long time, long microstep, Instant past=*)
 
 
+@cython.final
 cdef class Delivery:
     cdef public Way way
     cdef public object token

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, Moment, Wake, Way
+from epicycle.actors import Actor, InputPort, Moment, Wake, Way, is_alone
+
+_NOTHING: list[Any] = []  # what a port shows whose tokens are for a later turn
 
 
 class Turn:
@@ -56,7 +58,7 @@ class Turn:
     def hold(self) -> None:
         """The actor fires: it does not see yet what is for a later turn."""
         for port in self.later:
-            port.hide()
+            port.shown = _NOTHING
 
     def clear(self) -> None:
         """The actor has fired: what it has not read is gone."""
@@ -64,7 +66,7 @@ class Turn:
             if port.arrived:
                 port.clear()
         for port in self.later:
-            port.show()
+            port.shown = port.arrived
 
 
 class Form:
@@ -102,9 +104,9 @@ class Instant(Moment):
             self.wakes.append(wake)
 
 
-def new_instant(time: int, microstep: int) -> Instant:
-    """An instant at which nothing is to be done yet."""
-    instant = Instant.__new__(Instant)
+def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:
+    """An instant at which nothing is to be done yet; one that is past serves again if nobody has kept it."""
+    instant = past if past is not None and is_alone(past) else Instant.__new__(Instant)
     instant.time, instant.microstep = time, microstep
     instant._tag = instant.pending = instant.turn = instant.wake = instant.turns = instant.wakes = None
     return instant

@@ -3,8 +3,8 @@
 
 from cpython.float cimport PyFloat_FromDouble
 
-from epicycle.actors cimport InputPort
-from epicycle.runner.engine.native cimport Native, all_floats, count_of, to_seconds, tokens_of
+from epicycle.actors cimport InputPort, seconds_of
+from epicycle.runner.engine.native cimport Native, all_floats, count_of, tokens_of
 from epicycle.runner.engine.way cimport Sender
 
 from epicycle.actors import AddSubtract, Counter, Expression, Integrator, Scale
@@ -68,7 +68,7 @@ cdef class ExpressionForm(Native):
         if not has_come or len(self.latest) < len(self.ports):
             return
         for name in self.names:
-            given.append(PyFloat_FromDouble(to_seconds(self.now())) if name == "time" else self.latest[name])
+            given.append(PyFloat_FromDouble(seconds_of(self.now())) if name == "time" else self.latest[name])
         try:
             value = self.function(*given)
         except UNDECIDED:
@@ -153,7 +153,7 @@ cdef class IntegratorForm(Native):
             return
         integral = sum_before
         if before is not None:
-            value, elapsed = before, to_seconds(self.now() - <long long>self.actor._since)
+            value, elapsed = before, seconds_of(self.now() - <long long>self.actor._since)
         if not tokens:
             if count_of(self.trigger):
                 self.output.go(PyFloat_FromDouble(integral + elapsed * value))

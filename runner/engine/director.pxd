@@ -9,14 +9,14 @@ cdef long long _NOTICED
 
 
 cdef class Director:
-    cdef public object environment, seed, crowd, ranks, _stop_after, _reason
+    cdef public object _environment, seed, crowd, ranks, _stop_after, _reason
     cdef public list _queue, _recent, _turns
     cdef public Ranks _ready
     cdef public Times _times
-    cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps
+    cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps, _time
     cdef public long _rank
-    cdef public Instant present, _last, _next
-    cdef public bint _is_interrupted
+    cdef public Instant present, _last, _next, _past
+    cdef public bint _has_simpy, _is_interrupted
     @cython.locals(last=Instant, time=cython.longlong)
     cpdef Instant now(self)
     cpdef wake(self, actor, long long time)
@@ -35,11 +35,11 @@ cdef class Director:
     cpdef later(self, long long delay, way, token)
     cpdef Delivery hold(self, way, token)
     cpdef want(self, Turn turn)
-    @cython.locals(instant=Instant, present=Instant)
-    cpdef Instant _to_come(self, long long time, long microstep)
+    @cython.locals(instant=Instant)
+    cpdef Instant _to_come(self, Instant now, long long time)
     @cython.locals(now=Instant)
     cpdef _await_present(self)
-    @cython.locals(instant=Instant)
+    @cython.locals(instant=Instant, past=Instant)
     cpdef Instant _await(self, long long time, long microstep)
     @cython.locals(turn=Turn, delivery=Delivery, turns=list, ready=Ranks, place=cython.Py_ssize_t)
     cpdef _handle(self, Instant instant)

@@ -50,14 +50,16 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times", "_next", "_on_their_way",
-        "_queue", "_rank", "_ready", "_reason", "_recent", "_stop_after", "_times", "_turns", "crowd", "environment",
-        "firings", "present", "ranks", "seed", "steps",
+        "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times",
+        "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent", "_stop_after", "_time",
+        "_times", "_turns", "crowd", "firings", "present", "ranks", "seed", "steps",
     )  # fmt: skip
 
     def __init__(self, order: dict[str, int], seed: int, limits: Limits = NORMAL) -> None:
-        self.environment = Environment(initial_time=0)
-        self._queue = self.environment.queue
+        self._environment = Environment(initial_time=0)
+        self._queue = self._environment.queue
+        self._has_simpy = False  # whether somebody has seen the environment
+        self._time = 0  # what SimPy's time is until then
         self.seed = seed
         self.crowd = Crowd(limits.tokens)
         self._on_their_way = 0  # tokens, to times and microsteps to come
@@ -67,6 +69,7 @@ class Director:
         # The tag that is being handled, also while its time has another; None between, while SimPy does things.
         self.present: Instant | None = None
         self._last = new_instant(0, 0)  # the latest tag that was handled, or is being handled
+        self._past: Instant | None = None  # the one before it, which may serve again
         self.ranks = order  # of actors and of their inputs
         self._turns: list[Turn | None] = [None] * (max(order.values(), default=0) + 1)  # by rank
         # What is to be done: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
@@ -97,12 +100,20 @@ class Director:
         """The latest tag that was handled, or is being handled."""
         return self._last.tag
 
+    @property
+    def environment(self) -> Environment:
+        """SimPy's part of the run: whoever asks for it is told the time from then on."""
+        if not self._has_simpy:
+            self._has_simpy = True
+            self._environment._now = self._time
+        return self._environment
+
     def now(self) -> Instant:
         """The present tag, with what is to be done at it if it is being handled."""
         if self.present is not None:
             return self.present
         # SimPy's time need not be whole; what comes between two nanoseconds belongs to the later one.
-        now, last = math.ceil(self.environment.now), self._last
+        now, last = math.ceil(self._environment.now) if self._has_simpy else self._time, self._last
         return new_instant(now, 1) if now > last.time else new_instant(last.time, last.microstep + 1)
 
     # -- what actors and aspects ask for --------------------------------------------------------------------------
@@ -113,19 +124,17 @@ class Director:
 
     def wake_turn(self, turn: Turn, time: int) -> Wake:
         """Let an actor have a turn at ``time``."""
-        instant, now = self.present, self.now()
-        if instant is None and time <= now.time:
+        now = self.now()
+        if self.present is None and time <= now.time:
             return self._call_now(turn, now)
-        if time > now.time:
-            return self._wake_at(turn, self._to_come(time, 1))
-        return self._wake_at(turn, self._to_come(now.time, now.microstep + 1))
+        return self._wake_at(turn, self._to_come(now, time))
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
-        """Fire ``actor`` at a tag and rank that are still to come."""
+        """Fire ``actor`` at a tag and rank that are still to come (``next_turn``)."""
         turn, now = self.turn(actor, rank), self.now()
         if tag.time == now.time and tag.microstep == now.microstep:
             return self._call_now(turn, now)
-        return self._wake_at(turn, self._to_come(tag.time, tag.microstep))
+        return self._wake_at(turn, self._to_come(now, tag.time))
 
     def want_at(self, turn: Turn, time: int) -> Moment:
         """Let an actor have a turn at ``time`` that it cannot call off; at which tag."""
@@ -133,7 +142,7 @@ class Director:
         if self.present is None and time <= now.time:
             self.want(turn)
             return now
-        instant = self._to_come(time, 1) if time > now.time else self._to_come(now.time, now.microstep + 1)
+        instant = self._to_come(now, time)
         instant.add(turn, None)
         return instant
 
@@ -166,7 +175,7 @@ class Director:
     def later(self, delay: int, way: Way, token: Any) -> None:
         """Let a token go on after ``delay`` ns; 0 is the next microstep."""
         now = self.now()
-        instant = self._to_come(now.time + delay, 1) if delay > 0 else self._to_come(now.time, now.microstep + 1)
+        instant = self._to_come(now, now.time + delay)
         if instant.pending is None:
             instant.pending = []
         instant.pending.append(self.hold(way, token))
@@ -213,15 +222,14 @@ class Director:
             if self.present is None:
                 self._await_present()
 
-    def _to_come(self, time: int, microstep: int) -> Instant:
-        """What is to be done at a tag after the present one: the next microstep, or the first one of a later time."""
-        present = self.present
-        if time > (self.now() if present is None else present).time:
+    def _to_come(self, now: Instant, time: int) -> Instant:
+        """What is to be done after the present tag: at the next microstep, or at the first one of a later time."""
+        if time > now.time:
             instant = self._times.at(time)
-            return self._await(time, microstep) if instant is None else instant
+            return self._await(time, 1) if instant is None else instant
         if self._next is None:
-            self._next = new_instant(time, microstep)
-            if present is None:
+            self._next = new_instant(now.time, now.microstep + 1)
+            if self.present is None:
                 self._await_present()
         return self._next
 
@@ -236,7 +244,8 @@ class Director:
         if self._times.size > self._most_times:
             what = "times at which something is still to come"
             raise CrowdError(Tag(time, microstep), self._most_times, what, self._who())
-        instant = new_instant(time, microstep)
+        past, self._past = self._past, None
+        instant = new_instant(time, microstep, past)
         self._times.add(instant)
         return instant
 
@@ -255,16 +264,26 @@ class Director:
             for delivery in instant.pending:
                 delivery.arrive()
             self._on_their_way -= len(instant.pending)
-        while ready.size:
-            turn = turns[ready.pop()]
+        turn = None
+        try:
+            while ready.size:
+                turn = turns[ready.pop()]
+                assert turn is not None
+                turn.is_wanted = False
+                self._rank = turn.rank
+                if turn.wake is not None and not self.use_wakes(turn):
+                    continue
+                if self.present is not instant:
+                    self._begin(instant)
+                self.fire(turn)
+                turn.clear()
+        except BaseException as error:  # whatever an actor raises, sys.exit() too, is its failure
             assert turn is not None
-            turn.is_wanted = False
-            self._rank = turn.rank
-            if turn.wake is not None and not self.use_wakes(turn):
-                continue
-            if self.present is not instant:
-                self._begin(instant)
-            self.fire(turn)
+            turn.clear()
+            if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):  # of an aspect on the way of a token
+                raise
+            doing = "run()" if isinstance(turn.actor, Process) else "fire()"
+            raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
         if self._next is None:
             self.present = None
 
@@ -277,7 +296,7 @@ class Director:
 
     def _begin(self, instant: Instant) -> None:
         """Something happens at a tag, for the first time."""
-        self.present = self._last = instant
+        self._past, self._last, self.present = self._last, instant, instant
         if instant.microstep > self._most_microsteps - 10:
             if instant.microstep > self._most_microsteps:
                 raise LoopError(instant.time, tuple(dict.fromkeys(self._recent or ())))
@@ -298,18 +317,10 @@ class Director:
             self._recent.append(turn.actor.path)
         if turn.later:
             turn.hold()
-        try:
-            if turn.form is not None:
-                turn.form.fire()
-            else:
-                turn.actor.fire()
-        except (ActorError, LoopError, KeyboardInterrupt):  # of an aspect on the way of a token, of the user
-            raise
-        except BaseException as error:  # whatever an actor raises, sys.exit() too, is its failure
-            doing = "run()" if isinstance(turn.actor, Process) else "fire()"
-            raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
-        finally:
-            turn.clear()
+        if turn.form is not None:
+            turn.form.fire()
+        else:
+            turn.actor.fire()
 
     def interrupt(self) -> None:
         """Raise ``KeyboardInterrupt`` in the place of the next firing, or of the next instant."""
@@ -328,7 +339,7 @@ class Director:
         Returns why it ended; nothing if that is because ``most`` steps are done, of which each is a tag or an event of
         SimPy's.
         """
-        environment, times, queue = self.environment, self._times, self._queue
+        environment, times, queue = self._environment, self._times, self._queue
         last_step = NEVER if most is None else self.steps + most
         last_time = NEVER - 1 if stop is None else stop
         here, never = 0, NEVER
@@ -368,7 +379,9 @@ class Director:
                     self._next = None
                     self._handle(instant)
                 else:
-                    environment._now = upcoming
+                    self._time = upcoming
+                    if self._has_simpy:
+                        environment._now = upcoming
                     self._handle(times.pop())
             except BaseException as error:
                 self.present = None

@@ -18,7 +18,7 @@ from epicycle.aspects import ActorPoint, Job
 from ..text import describe
 from .agenda import Turn
 from .director import Director
-from .errors import ActorError
+from .errors import ActorError, LoopError
 from .local_time import LocalDirector
 from .refinement import Refinement
 
@@ -146,13 +146,21 @@ class Execution:
         start = perf_counter()
         try:
             self._director.fire(self._turns[job.rank].of_actor)
-        except ActorError as error:
-            if self.refinement is None:
+        except Exception as error:
+            if self.refinement is None or isinstance(error, LoopError):
                 raise
-            self.refinement.conductor.fail(error)
+            self.refinement.conductor.fail(self._failed(error))
         if job.watch is not None:
             job.watch(perf_counter() - start)
         self._open = turn
+
+    def _failed(self, error: Exception) -> ActorError:
+        """The error as the director tells it."""
+        if isinstance(error, ActorError):  # of an aspect on the way of a token
+            return error
+        found = ActorError(self.actor.path, self._director.last, "fire()", describe(error))
+        found.__cause__ = error
+        return found
 
     # -- what aspects do with the actor as a whole ----------------------------------------------------------------
 

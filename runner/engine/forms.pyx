@@ -10,11 +10,11 @@ import os
 
 from cpython.float cimport PyFloat_FromDouble
 
-from epicycle.actors cimport InputPort, Line, ParameterPort, Wake
+from epicycle.actors cimport InputPort, Line, ParameterPort, Wake, nanoseconds_of, seconds_of
 from epicycle.runner.engine.agenda cimport Turn
 from epicycle.runner.engine.director cimport Director
 from epicycle.runner.engine.native cimport (
-    Drawing, Native, count_of, drawing_of, to_nanoseconds, to_seconds, tokens_of,
+    Drawing, Native, count_of, drawing_of, tokens_of,
 )
 from epicycle.runner.engine.way cimport Sender
 
@@ -34,7 +34,7 @@ cdef class DelayForm(Native):
     cdef bint take(self) except -1:
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.line = self.actor._held._line
-        self.delay = to_nanoseconds(self.actor.delay)
+        self.delay = nanoseconds_of(self.actor.delay)
         return self.output is not None
 
     cpdef fire(self):
@@ -60,15 +60,12 @@ cdef class Ticking(Native):
         if values is not None and type(values) not in (list, tuple):
             return False
         self.values = None if values is None else list(values)
-        self.stop = 2**63 - 1 if self.actor.stop_time is None else to_nanoseconds(self.actor.stop_time)
+        self.stop = 2**63 - 1 if self.actor.stop_time is None else nanoseconds_of(self.actor.stop_time)
         return self.output is not None
 
-    cdef int send(self, long long tick) except -1:
-        self.output.go(tick if self.values is None else self.values[tick % len(self.values)])
+    cdef int send(self, tick) except -1:
+        self.output.go(tick if self.values is None else self.values[<long long>tick % len(self.values)])
         return 0
-
-    cdef Wake again_at(self, long long time):
-        return None if time > self.stop else self.wake_at(time)
 
 
 cdef class ClockForm(Ticking):
@@ -79,25 +76,26 @@ cdef class ClockForm(Ticking):
     cdef bint take(self) except -1:
         if self.actor.start.width or self.actor.stop.width or not Ticking.take(self):
             return False
-        self.period = to_nanoseconds(self.actor.period)
+        self.period = nanoseconds_of(self.actor.period)
         self.offsets = self.actor._offsets
         return True
 
     cpdef fire(self):
         cdef Wake wake = self.actor._wake
-        cdef long long tick, cycle
+        cdef long long tick, cycle, following
         cdef Py_ssize_t count = len(self.offsets)
         if wake is None or not wake.due:
             return
-        tick = self.actor._tick
-        self.send(tick)
-        tick += 1
+        number = self.actor._tick
+        self.send(number)
+        tick = number + 1
         self.actor._tick = tick
         cycle = self.actor._cycle
         if tick % count == 0:
             cycle += self.period
             self.actor._cycle = cycle
-        self.actor._wake = self.again_at(cycle + <long long>self.offsets[tick % count])
+        following = cycle + <long long>self.offsets[tick % count]
+        self.actor._wake = None if following > self.stop else self.wake_at(following)
 
 
 cdef class PoissonForm(Ticking):
@@ -109,10 +107,13 @@ cdef class PoissonForm(Ticking):
         return Ticking.take(self)
 
     cpdef fire(self):
-        cdef long long tick = self.actor._tick
+        cdef long long following
+        tick = self.actor._tick
         self.send(tick)
         self.actor._tick = tick + 1
-        self.again_at(self.now() + to_nanoseconds(self.drawing.next()))
+        following = self.now() + nanoseconds_of(self.drawing.next())
+        if following <= self.stop:  # nobody calls it off, so that it needs no wake-up
+            self.director.want_at(self.turn, following)
 
 
 cdef class ServerForm(Native):
@@ -145,7 +146,7 @@ cdef class ServerForm(Native):
         return self.output is not None and self.size is not None and self.rejected is not None
 
     cpdef fire(self):
-        cdef long long size = self.actor._size
+        cdef long long size = self.line.size + len(self.waiting)
         cdef Py_ssize_t place
         cdef list tokens
         cdef double time
@@ -174,8 +175,8 @@ cdef class ServerForm(Native):
             self.size.go(size)
 
     cdef int serve(self, token, double time) except -1:
-        cdef long long nanoseconds = to_nanoseconds(time)
-        cdef double rest = time - to_seconds(nanoseconds)
+        cdef long long nanoseconds = nanoseconds_of(time)
+        cdef double rest = time - seconds_of(nanoseconds)
         self.keep(self.line, self.now() + nanoseconds, (token, rest))
         return 0
 
@@ -317,12 +318,8 @@ SOURCES = (
     ("sources.py", "Random", "606d80f45d45a9e4"),
     ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
-    ("core/laws.py", "between", "0e5fc0d38a4fab80"),
-    ("core/laws.py", "gamma", "395f2d85bf3dfec1"),
+    ("core/laws.py", "gamma", "da1afffdbd29a311"),
     ("core/laws.py", "normal", "c6bfa77a937cc231"),
-    ("core/laws.py", "normal_quantile", "f210084d76cce693"),
-    ("core/laws.py", "standard_gamma", "047c145471ee3512"),
-    ("core/laws.py", "standard_normal", "4c8196a1bb6687ad"),
     ("core/laws.py", "uniform", "36b3b17c5a3d5e40"),
     ("core/port_parameter.py", "ParameterPort", "db98994b759143f6"),
     ("core/elementary/sums.py", "total", "dc84358727c0bc10"),

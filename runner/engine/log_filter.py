@@ -49,7 +49,7 @@ class LogFilter:
 
     def check(self, model: Model) -> None:
         """Raise ``LogError`` if nothing that the log of a model may hold fits some pattern."""
-        ports = model.graph.ports.nodes
+        ports = model.graph.ports
         aspects = [woven.aspect for woven in model.aspects]
         valid = {
             "actor": list(dict.fromkeys(path.rpartition(".")[0] for path in ports)),

@@ -1,22 +1,16 @@
 # What native forms are made of; see native.pyx.
 
-from libc.stdint cimport uint64_t
-
-from epicycle.actors.core.random cimport Words
+from epicycle.actors.core.primitives cimport Words
 from epicycle.actors cimport InputPort, Line, Wake
 from epicycle.runner.engine.agenda cimport Form, Instant, Turn
 from epicycle.runner.engine.director cimport Director
 from epicycle.runner.engine.way cimport Sender
 
 
-cdef long long to_nanoseconds(double seconds) except? -1
-cdef double to_seconds(long long nanoseconds) except? -1.0
-
-
 cdef class Drawing:
     cdef public int law
     cdef public double first, second
-    cdef public object stream
+    cdef public Words stream
     cdef double next(self) except? -1.0
 
 

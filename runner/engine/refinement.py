@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import simpy
 from simpy.events import NORMAL, Event, EventPriority
 
-from epicycle.actors import Actor, Context, StateMachine, Tag, Wake, Way, new_wake
+from epicycle.actors import Actor, Context, Tag, Wake, Way, new_wake
 
 from .agenda import Delivery, Turn
 from .director import Director
@@ -23,6 +23,8 @@ from .errors import ActorError, CrowdError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from epicycle.actors import StateMachine
 
 Entry = tuple[int, int, "Wake | Delivery | Event", "Turn | EventPriority | None"]
 

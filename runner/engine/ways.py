@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 from functools import partial
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from epicycle.actors import (
     Actor,
@@ -12,7 +12,6 @@ from epicycle.actors import (
     Emitter,
     EpicycleError,
     OutputPort,
-    StateMachine,
     Way,
     declared_parameters,
 )
@@ -41,6 +40,9 @@ from .parameters import VaryingParameter
 from .refinement import Conductor, Refinement
 from .requests import Requests
 from .way import Call, Delayed, Deliver, Guarded, Screened, Sender, all_of
+
+if TYPE_CHECKING:
+    from epicycle.actors import StateMachine
 
 T = TypeVar("T")
 P = TypeVar("P", bound=JoinPoint)
@@ -119,8 +121,7 @@ class Ways:
             self._passages.update({path: Passage(path, outside) for path in paths})
         self._directors[composite] = self._made_director(composite, clock)
         if composite in self.graph.modal:
-            machine = self.actors[self.graph.modal[composite].machine]
-            assert isinstance(machine, StateMachine)
+            machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
             conductor = Conductor(composite, machine, self.director, self._directors[composite])
             self._conductors[composite] = conductor
             if machine.is_preemptive:

@@ -1,8 +1,9 @@
 """The frozen model: actors, composites, ports and connections, aspects at their places, what is watched, and ranks."""
 
 from .clock import Clock
-from .model_graph import Detour, Hop, Modal, ModelGraph, Wire, is_within
-from .ranks import dependencies, firing_order
+from .digraph import find_loop, in_order
+from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
+from .ranks import Region, dependencies, firing_order
 from .watched import Metric, Watched
 from .woven import AspectModel, WovenAspect, check_processors, extent
 
@@ -14,12 +15,16 @@ __all__ = [
     "Metric",
     "Modal",
     "ModelGraph",
+    "PortNode",
+    "Region",
     "Watched",
     "Wire",
     "WovenAspect",
     "check_processors",
     "dependencies",
     "extent",
+    "find_loop",
     "firing_order",
+    "in_order",
     "is_within",
 ]

@@ -1,7 +1,7 @@
 """The model graph: every port of every actor and composite as a node, every connection as an edge.
 
-It is a networkx multigraph that validation, scheduling, weaving and drawing read.  A *wire* is a way through it from
-an actor's output port, through any composite ports, to an actor's input port.
+Validation, scheduling, weaving and drawing read it.  A *wire* is a way through it from an actor's output port, through
+any composite ports, to an actor's input port.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any
-
-import networkx as nx
 
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
@@ -62,6 +60,16 @@ class Modal:
     refinements: Mapping[str, str]
 
 
+@dataclass(slots=True)
+class PortNode:
+    """A port in the graph: an actor's, or one of a composite (``port`` is None) that tokens only pass through."""
+
+    port: InputPort[Any] | OutputPort[Any] | None
+    direction: str  # input or output
+    type: Any = None  # the type of what a composite's port hands on, if it declares one
+    declared: Position | None = None
+
+
 class ModelGraph:
     """The flattened graph of one model, which is built and then frozen: to change it again, change a ``copy``.
 
@@ -70,7 +78,7 @@ class ModelGraph:
     """
 
     def __init__(self, limits: Limits = NORMAL, inside: ModelGraph | None = None, director: str = "") -> None:
-        self.ports: Any = nx.MultiDiGraph()
+        self.ports: dict[str, PortNode] = {}
         self.actors: dict[str, Actor] = {}
         self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
         # The composites with a director of their own, which are actors to the graph around them; "" is the model.
@@ -83,7 +91,7 @@ class ModelGraph:
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
         self.limits: Limits = limits if inside is None else inside.limits
         self.is_frozen = False
-        self._outgoing: dict[str, list[Hop]] = {}  # the edges once more: walked often, and already in order
+        self._outgoing: dict[str, list[Hop]] = {}  # of each port, in their order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}
         self._parts: dict[str, dict[str, list[str]]] = {}
@@ -92,7 +100,6 @@ class ModelGraph:
 
     def freeze(self) -> None:
         """Nothing changes it any more: it may be run."""
-        nx.freeze(self.ports)
         self.is_frozen = True
 
     def _check_open(self) -> None:
@@ -104,7 +111,7 @@ class ModelGraph:
         made = ModelGraph(self.limits)
         for name, value in vars(self).items():
             setattr(made, name, copy(value))
-        made.ports = nx.MultiDiGraph(self.ports)
+        made.ports = {path: copy(node) for path, node in self.ports.items()}
         made.is_frozen = False
         made.members = {path: [*each] for path, each in self.members.items()}
         made._outgoing = {path: [*hops] for path, hops in self._outgoing.items()}
@@ -116,7 +123,7 @@ class ModelGraph:
     def merge(self, part: ModelGraph, director: str) -> None:
         """Take in a part that was made for this graph."""
         self._check_open()
-        self.ports.add_nodes_from(part.ports.nodes(data=True))
+        self.ports |= part.ports
         self.members[director] += part.members.pop("")
         del part.clocks[""]
         parts = part._parts
@@ -137,8 +144,9 @@ class ModelGraph:
         self.members[self.director_of(actor.path)].append(actor.path)
         if position is not None:
             self.positions[actor.path] = position
-        for port in (*actor.inputs.values(), *actor.outputs.values()):
-            self.ports.add_node(port.path, port=port, direction=port.direction)
+        ports: tuple[InputPort[Any] | OutputPort[Any], ...] = (*actor.inputs.values(), *actor.outputs.values())
+        for port in ports:
+            self.ports[port.path] = PortNode(port, port.direction)
 
     def add_composite(self, path: str, kind: str) -> None:
         """Add a composite, of that class."""
@@ -172,7 +180,7 @@ class ModelGraph:
     ) -> None:
         """Add a port of a composite; tokens only pass through it, which are of the ``type`` if there is one."""
         self._check_open()
-        self.ports.add_node(path, port=None, direction=direction, type=type, declared=declared)
+        self.ports[path] = PortNode(None, direction, type, declared)
         self._borders.setdefault(self.owner(path), ([], []))[direction == "output"].append(path)
         if position is not None:
             self.positions[path] = position
@@ -182,7 +190,7 @@ class ModelGraph:
         self._check_open()
         port = OutputPort(Request, multi=True)
         port.name, port.path = path.rpartition(".")[2], path
-        self.ports.nodes[path]["port"] = port
+        self.ports[path].port = port
 
     def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
         self._check_open()
@@ -191,7 +199,6 @@ class ModelGraph:
     def _enter(self, hop: Hop) -> None:
         self._order = hop.order + 1
         self._hops[hop.order] = hop
-        self.ports.add_edge(hop.source, hop.destination, key=hop.order, hop=hop)
         self._outgoing.setdefault(hop.source, []).append(hop)
         self._incoming.setdefault(hop.destination, []).append(hop)
 
@@ -202,7 +209,6 @@ class ModelGraph:
     def disconnect(self, hop: Hop) -> None:
         self._check_open()
         del self._hops[hop.order]
-        self.ports.remove_edge(hop.source, hop.destination, key=hop.order)
         self._outgoing[hop.source].remove(hop)
         self._incoming[hop.destination].remove(hop)
 
@@ -229,7 +235,7 @@ class ModelGraph:
         for port in [each for each in self.ports if is_within(each, path)]:
             for hop in {*self.incoming(port), *self.outgoing(port)}:
                 self.disconnect(hop)
-            self.ports.remove_node(port)
+            del self.ports[port]
         for actor in [each for each in self.actors if is_within(each, path)]:
             self.actors[actor].is_part = False
         for known in self._by_path():
@@ -245,13 +251,12 @@ class ModelGraph:
 
     def direction(self, path: str) -> str:
         """``input`` or ``output``."""
-        direction: str = self.ports.nodes[path]["direction"]
-        return direction
+        return self.ports[path].direction
 
     def type_of(self, path: str) -> Any:
         """The declared type of a port; None if a composite says nothing of it."""
-        node = self.ports.nodes[path]
-        return node.get("type") if node["port"] is None else node["port"].type
+        node = self.ports[path]
+        return node.type if node.port is None else node.port.type
 
     def owner(self, port: str) -> str:
         """The actor or composite that a port belongs to."""
@@ -287,7 +292,7 @@ class ModelGraph:
     def is_end(self, path: str) -> bool:
         """Whether a port belongs to something that fires, and tokens do not only pass through it."""
         owner = self.owner(path)
-        return owner in self.clocks or (self.ports.nodes[path]["port"] is not None and owner not in self.composites)
+        return owner in self.clocks or (self.ports[path].port is not None and owner not in self.composites)
 
     def outgoing(self, path: str) -> Sequence[Hop]:
         """The connections that leave a port, in the order of their declaration."""
@@ -300,24 +305,24 @@ class ModelGraph:
     def wires_from(self, port: OutputPort[Any]) -> list[Wire]:
         """All wires that begin at an output port."""
         return [
-            Wire(port, self.ports.nodes[hops[-1].destination]["port"], hops)
+            Wire(port, end, hops)
             for hops in self._ways(port.path, forward=True)
-            if isinstance(self.ports.nodes[hops[-1].destination]["port"], InputPort)
+            if isinstance(end := self.ports[hops[-1].destination].port, InputPort)
         ]
 
     def wires_to(self, port: InputPort[Any]) -> list[Wire]:
         """All wires that end at an input port; their order is that of the port's channels."""
         return [
-            Wire(self.ports.nodes[hops[0].source]["port"], port, hops)
+            Wire(start, port, hops)
             for hops in self._ways(port.path, forward=False)
-            if isinstance(self.ports.nodes[hops[0].source]["port"], OutputPort)
+            if isinstance(start := self.ports[hops[0].source].port, OutputPort)
         ]
 
     def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
         """The ways from a port to actors' ports; ``check_passages`` has seen to it that they end."""
         for hop in self.outgoing(path) if forward else self.incoming(path):
             far = hop.destination if forward else hop.source
-            if self.ports.nodes[far]["port"] is not None:
+            if self.ports[far].port is not None:
                 yield (hop,)
                 continue
             for rest in self._ways(far, forward=forward):
@@ -334,7 +339,7 @@ class ModelGraph:
         found, seen, waiting = [], {path}, [path]
         while waiting:
             here = waiting.pop()
-            port = self.ports.nodes[here]["port"]
+            port = self.ports[here].port
             if isinstance(port, OutputPort):
                 found.append(port)
             else:

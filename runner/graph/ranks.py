@@ -8,11 +8,15 @@ composite put in its place.
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import chain
+from typing import TypeAlias
 
-import networkx as nx
-
+from .digraph import in_order
 from .model_graph import Hop, ModelGraph
+
+# What must be known first within a tag, of one director: of each port those right behind it.  There is a connection
+# without delay between them (``Hop``), or within an actor the second depends on the first within the tag.
+Region: TypeAlias = dict[str, dict[str, Hop | None]]
 
 
 def firing_order(graph: ModelGraph) -> dict[str, int]:
@@ -21,7 +25,7 @@ def firing_order(graph: ModelGraph) -> dict[str, int]:
     Within a tag lower ranks come first.  An actor fires at its own rank for a wake-up and at that of an input for a
     token there, which is the same unless it has outputs that do not depend on this input at once.  Ranks go by depth
     (``depths``), at equal depth by priority, then in the order of declaration.  Raises
-    ``networkx.NetworkXUnfeasible`` if there is a loop without delay.
+    ``graphlib.CycleError`` if there is a loop without delay.
     """
     regions = dependencies(graph)
     order: list[list[str]] = []
@@ -43,35 +47,35 @@ def firing_order(graph: ModelGraph) -> dict[str, int]:
     return {path: rank for rank, paths in enumerate(order) for path in paths}
 
 
-def dependencies(graph: ModelGraph) -> dict[str, Any]:
-    """For each director the directed graph of what must be known first within a tag; its nodes are ports.
-
-    An edge between ports is a connection without delay (``hop``), one within an actor says that the output depends on
-    the input within the tag.
-    """
+def dependencies(graph: ModelGraph) -> dict[str, Region]:
+    """What must be known first under each director."""
     hops: dict[str, list[Hop]] = {director: [] for director in graph.clocks}
-    for *_, hop in graph.ports.edges(data="hop"):
+    for hop in graph.hops:
         if hop.delay is None:
             hops[graph.director_over(hop)].append(hop)
     for detour in graph.detours:
         hops[graph.director_over(detour)].append(detour)
-    regions: dict[str, Any] = {}
+    regions: dict[str, Region] = {}
     for director in reversed(graph.clocks):  # inner ones first: the outer ones need to know what depends on what
-        region = regions[director] = nx.DiGraph()
+        region = regions[director] = {}
         for hop in sorted(hops[director], key=lambda hop: hop.order, reverse=True):  # of parallel ones, the first
-            region.add_edge(hop.source, hop.destination, hop=hop)
-        inputs, outputs = graph.borders(director)
-        region.add_nodes_from((*inputs, *outputs))
+            region.setdefault(hop.source, {})[hop.destination] = hop
+            region.setdefault(hop.destination, {})
+        for port in chain(*graph.borders(director)):
+            region.setdefault(port, {})
         for member in graph.members[director]:
             inputs, outputs = ports_of(graph, member)
-            region.add_nodes_from((*inputs, *outputs))
+            for port in (*inputs, *outputs):
+                region.setdefault(port, {})
             if member in graph.clocks:
-                acting = [port for port in inputs if _acts(graph, member, regions[member], port)]
-                region.add_edges_from((port, output) for port in acting for output in outputs)
+                for port in inputs:
+                    if _acts(graph, member, regions[member], port):
+                        region[port].update(dict.fromkeys(outputs))
                 continue
             for output in graph.actors[member].outputs.values():
                 names = graph.actors[member].inputs if output.depends_on is None else output.depends_on
-                region.add_edges_from((f"{member}.{name}", output.path) for name in names)
+                for name in names:
+                    region[f"{member}.{name}"][output.path] = None
     return regions
 
 
@@ -83,7 +87,7 @@ def ports_of(graph: ModelGraph, member: str) -> tuple[list[str], list[str]]:
     return [port.path for port in actor.inputs.values()], [port.path for port in actor.outputs.values()]
 
 
-def _acts(graph: ModelGraph, director: str, region: Any, port: str) -> bool:
+def _acts(graph: ModelGraph, director: str, region: Region, port: str) -> bool:
     """Whether what enters a composite by a port makes a difference within the tag.
 
     If so, the composite can do nothing before it is there, or some of the actors inside would fire with a part of
@@ -91,11 +95,18 @@ def _acts(graph: ModelGraph, director: str, region: Any, port: str) -> bool:
     it, later.
     """
     _, borders = graph.borders(director)
-    ends = (far for _, far in nx.edge_bfs(region, port) if graph.is_end(far))
-    return any(far in borders or region.out_degree(far) or not ports_of(graph, graph.owner(far))[1] for far in ends)
+    waiting, seen = [port], {port}
+    while waiting:
+        for far in region[waiting.pop()].keys() - seen:
+            if not graph.is_end(far):
+                waiting.append(far)
+            elif far in borders or region[far] or not ports_of(graph, graph.owner(far))[1]:
+                return True
+            seen.add(far)
+    return False
 
 
-def depths(graph: ModelGraph, director: str, region: Any) -> dict[str, int]:
+def depths(graph: ModelGraph, director: str, region: Region) -> dict[str, int]:
     """The depth of each port and actor of one director, as in Ptolemy II.
 
     An output is as deep as the inputs that it depends on within the tag, and an input one deeper than the outputs that
@@ -105,17 +116,20 @@ def depths(graph: ModelGraph, director: str, region: Any) -> dict[str, int]:
     """
     own, _ = graph.borders(director)
     depth: dict[str, int] = {}
-    for path in nx.topological_sort(region):
+    for path in in_order(region):
         # Ports of composites without a director are no place to stop at: tokens only pass through them.
-        step = int(graph.is_end(path) and graph.direction(path) == "input" and path not in own)
-        depth[path] = max((depth[before] + step for before in region.predecessors(path)), default=0)
+        if path in depth and graph.is_end(path) and graph.direction(path) == "input" and path not in own:
+            depth[path] += 1
+        deep = depth.setdefault(path, 0)
+        for far in region[path]:
+            depth[far] = max(depth.get(far, 0), deep)
     result = dict(depth)
     for member in graph.members[director]:
         inputs, outputs = ports_of(graph, member)
         deep = min(depth[port] for port in outputs) if outputs else max((depth[port] for port in inputs), default=0)
-        free = max((depth[port] for port in inputs if not region.out_degree(port)), default=deep)
+        free = max((depth[port] for port in inputs if not region[port]), default=deep)
         for port in inputs:
-            result[port] = min((depth[output] for output in region.successors(port)), default=max(deep, free))
+            result[port] = min((depth[output] for output in region[port]), default=max(deep, free))
         result[member] = deep
     return result
 

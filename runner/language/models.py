@@ -6,7 +6,7 @@ from dataclasses import replace
 from keyword import iskeyword, kwlist
 from typing import Any
 
-from epicycle.actors import Actor, Mode, Parameter, StateMachine, UnitError, declared_parameters, parse_unit
+from epicycle.actors import Actor, Parameter, UnitError, declared_parameters, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
@@ -237,8 +237,27 @@ def _base(reader: NodeReader, node: Node, what: str) -> Text:
     return Text(reader.name(node, what) or "", node.position)
 
 
-# What a composite class says of its machine, if it has one.
-OF_MODES = ("modes", "transitions", "initial", "variables", "held")
+_VALUES: Schema = {"type": ["object", "string"]}
+_MODE: Schema = {"type": ["object", "null"], "properties": {"refinement": {"type": ["string", "object"]}}}
+# What a composite class says of its machine, if it has one: parameters of StateMachine, beside refinements.
+OF_MODES = {
+    "modes": Key(
+        node_as({"anyOf": [one_or_more(ref("name")), names_of(_MODE)]}),
+        "The modes of a composite that has no actors but these: a list of names, or 'name: {refinement, flow, entry, "
+        "exit, final}'.",
+    ),
+    "transitions": Key(
+        node_as({"type": "array", "items": {"type": ["string", "object"]}}),
+        "Its transitions, such as 'a -> b on port after 3 s when x > 2 do y = x; n = n + 1', or {from, to, when, ...}.",
+    ),
+    "initial": Key(node_as({"type": "string"}), "The mode in which it begins (default: the first)."),
+    "variables": Key(
+        node_as({"type": ["object", "string"]}), "What its guards and actions know: 'name: value at the start'."
+    ),
+    "held": Key(
+        node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: value before it'."
+    ),
+}
 COMPOSITE = Construct(
     "A composite class: a graph with ports of its own.",
     {
@@ -262,11 +281,7 @@ COMPOSITE = Construct(
             "Wires: 'actor.port -> actor.port, actor.port', '=>' for all to all; or {from, to, all, delay}.",
         ),
         "aspects": ASPECTS,
-        **{
-            name: Key(node_as(schema_of(parameter)), about(parameter))
-            for name, parameter in declared_parameters(StateMachine).items()
-            if name in OF_MODES
-        },
+        **OF_MODES,
     },
 )
 # Where a class extends another, its actors and aspects may be changes to inherited ones.
@@ -342,7 +357,7 @@ def _machine(
         for mode, entry in modes.value.entries.items():
             left[mode] = entry
             if isinstance(entry.value, Mapping):
-                valid = (*declared_parameters(Mode), "refinement")
+                valid = (*declared_parameters(_mode()), "refinement")
                 inner = dict(reader.entries(entry.value, f"mode {mode!r}", valid) or {})
                 said = inner.pop("refinement", None)
                 refinement = None if said is None else _refinement(reader, mode, said)
@@ -352,6 +367,12 @@ def _machine(
         machine["modes"] = replace(modes, value=replace(modes.value, entries=left))
     kind = Text("StateMachine", position)
     return {"machine": PartText("machine", position, kind, machine), "refinements": refinements}
+
+
+def _mode() -> type:
+    from epicycle.actors import Mode  # with all that solves differential equations, which takes a while
+
+    return Mode
 
 
 def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | None:

@@ -1,11 +1,14 @@
 # Types for C; what everything is for is said in packing.py.
 
+cimport cython
+
 cdef bint TAKES_NUMBERS
 
 
 cpdef bytes stamp(when)
 
 
+@cython.final
 cdef class Sheet:
     cdef readonly Py_ssize_t size
     cdef char* buffer

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import counted, did_you_mean, to_seconds
 
 from ..shown import short
-from ..tables import Table, as_html, as_text, pandas_module
+from ..tables import Table, Tabled, pandas_module
 from .encoding import cell, leaves
 from .log import EventLog
 from .outcome import Interval, Outcome
@@ -24,7 +24,7 @@ COLUMNS = ("time", "time_ns", "microstep", "signal", "field", "type", "value", "
 
 
 @dataclass(repr=False)
-class Results:
+class Results(Tabled):
     """The outcome of one run: ``metrics``, recorded ``signals``, counts and figures of ``aspects``, the ``log``
     and its ``digest``.  ``outcomes`` say more of each metric: its interval, or why it has no value.
 
@@ -109,12 +109,6 @@ class Results:
             f"<Results of {self.model}, seed {self.seed}: {self.end:g} s, ended by {self.stopped}, "
             f"{counted(self.events, 'event')}, digest {self.digest[:16]}...>"
         )
-
-    def __str__(self) -> str:
-        return as_text(self._caption(), self._tables())
-
-    def _repr_html_(self) -> str:
-        return as_html(self._caption(), self._tables())
 
     def _caption(self) -> str:
         return f"{self.model}, seed {self.seed}: {self.end:g} s of model time, ended by {self.stopped}"

@@ -42,12 +42,3 @@ class Samples:
             self.tokens, self.kind = array("q"), int
         else:
             self.tokens, self.kind = Past(self.tokens), None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _samples, (self.times, self.microsteps, self.tokens, self.kind)
-
-
-def _samples(*parts: Any) -> Samples:
-    made = Samples()
-    made.times, made.microsteps, made.tokens, made.kind = parts
-    return made

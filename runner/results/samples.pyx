@@ -3,6 +3,8 @@
 
 from cpython cimport array
 
+from epicycle.actors.core.primitives cimport reduced
+
 from array import array as new_array
 
 
@@ -46,10 +48,4 @@ cdef class Samples:
             self.tokens, self.kind = Past(self.tokens), None
 
     def __reduce__(self):
-        return _samples, (self.times, self.microsteps, self.tokens, self.kind)
-
-
-def _samples(*parts):
-    made = Samples()
-    made.times, made.microsteps, made.tokens, made.kind = parts
-    return made
+        return reduced(self)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from epicycle.actors import EpicycleError, Tag, counted, did_you_mean, to_seconds
 
 from ..shown import short
-from ..tables import Table, as_html, as_text, pandas_module
+from ..tables import Table, Tabled, pandas_module
 from .encoding import field_names, leaves
 from .samples import Samples
 
@@ -26,7 +26,7 @@ class SignalError(EpicycleError):
     """A signal, or a field of its tokens, that is not there."""
 
 
-class Signal:
+class Signal(Tabled):
     """What one port sent: tags and tokens, in order.
 
     >>> state = results["main.state"]
@@ -122,20 +122,17 @@ class Signal:
         tokens = counted(len(self), "token")
         return f"<Signal {self.name}: {tokens} ({kind}) from {first:g} s to {last:g} s>"
 
-    def __str__(self) -> str:
-        return as_text(repr(self).strip("<>"), [self._table()])
+    def _caption(self) -> str:
+        return repr(self).strip("<>")
 
-    def _repr_html_(self) -> str:
-        return as_html(repr(self).strip("<>"), [self._table()])
-
-    def _table(self) -> Table:
+    def _tables(self) -> list[Table]:
         rows = [
             (f"{tag.seconds:.9g}", str(tag.microstep), short(token))
             for tag, token in zip(self.tags, self.tokens, strict=True)
         ]
         if len(rows) > 2 * _SHOWN:
             rows = [*rows[:_SHOWN], ("...", "", ""), *rows[-_SHOWN:]]
-        return Table(("time (s)", "microstep", "token"), rows)
+        return [Table(("time (s)", "microstep", "token"), rows)]
 
 
 def as_array(tokens: list[Any]) -> NDArray[Any]:

@@ -109,7 +109,7 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
             here = {**given, **({} if woven.model is None else woven.model.at(path))}
             parameters = ", ".join(f"{name}: {shown(value)}" for name, value in here.items())
             found.setdefault(path, []).append((woven.name, woven.kind, parameters))
-    places = dict.fromkeys((*model.graph.ports.nodes, *model.graph.actors, *found))  # the others come last
+    places = dict.fromkeys((*model.graph.ports, *model.graph.actors, *found))  # the others come last
     return {path: found[path] for path in places if path in found}
 
 

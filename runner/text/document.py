@@ -27,14 +27,12 @@ from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
 from .files import note_file
 from .problems import Position, Problems
+from .scalars import SCALAR_TAGS, TAG_PREFIX, Value, resolve, short
 
 MAX_BYTES = 10_000_000
 MAX_NODES = 200_000  # with each alias counted as often as it is used
-_MAX_DIGITS = 1_000
 
 _LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-
-Value: TypeAlias = str | int | float | bool | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,55 +142,12 @@ def _add_undecodable(data: bytes, offset: int, name: str, problems: Problems) ->
     problems.add(message, position, "save the file as UTF-8")
 
 
-# --- scalars: the core schema of YAML 1.2 -------------------------------------------------------------
-
-_NULLS = frozenset(("", "~", "null", "Null", "NULL"))
-_BOOLS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
-_SPECIAL_START = frozenset("+-.0123456789")  # most texts start otherwise and need no regular expression
-_INT = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
-_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
-_NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
-_BASES = {"0o": 8, "0x": 16}
-
-
-def _resolve(text: str) -> Value:
-    """Return what a plain scalar means; raise ValueError for a number that no computer number can hold."""
-    if text in _NULLS:
-        return None
-    if text[0] not in _SPECIAL_START:
-        return _BOOLS.get(text, text)
-    if _INT.fullmatch(text):
-        if len(text) > _MAX_DIGITS:
-            raise ValueError(f"a number of {len(text)} characters is too long")
-        return int(text[2:], _BASES[text[:2]]) if text[:2] in _BASES else int(text)
-    if _FLOAT.fullmatch(text):
-        value = float(text)
-        if value in (float("inf"), float("-inf")):
-            raise ValueError(f"the number {_short(text)} is too large for a float")
-        return value
-    if _NOT_FINITE.fullmatch(text):
-        return float(text.replace(".", ""))
-    return text
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 40 else text[:37] + "..."
-
-
-_TAG_PREFIX = "tag:yaml.org,2002:"
-_SCALAR_TAGS: dict[str, tuple[type, ...]] = {
-    "int": (int,),
-    "float": (float, int),
-    "bool": (bool,),
-    "null": (type(None),),
-}
-
-
 # --- the builder --------------------------------------------------------------------------------------
 
 # libyaml counts lines this way; ours must agree with its marks.
 _LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
-_UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_CONTROL = re.compile("[^\t\n\r\x20-\x7e]")  # of an ASCII text
+_UNPRINTABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
 _INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
 _ARROW = re.compile(r"\s*[-=]>")
 _PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
@@ -242,7 +197,8 @@ class _Builder:
         self._nodes = 0
 
     def build(self) -> Node | None:
-        if found := _UNPRINTABLE.search(self._text):
+        # Few texts need the second, which takes long to compile.
+        if found := (_CONTROL.search(self._text) if self._text.isascii() else re.search(_UNPRINTABLE, self._text)):
             before = _LINE_BREAK.split(self._text[: found.start()])
             at = self._at(len(before) - 1, len(before[-1]))
             message = f"YAML does not allow the character U+{ord(found[0]):04X}"
@@ -309,7 +265,7 @@ class _Builder:
         if len(self._stack) >= MAX_DEPTH:
             self._stop(f"nested deeper than {MAX_DEPTH} levels", position)
         expected, kind = ("map", "mapping") if is_mapping else ("seq", "list")
-        if event.tag is not None and event.tag != _TAG_PREFIX + expected:
+        if event.tag is not None and event.tag != TAG_PREFIX + expected:
             self._add_tag(event.tag, f"a {kind}", self._span(event, with_properties=True))
         if event.anchor is not None:
             self._anchors[event.anchor] = None
@@ -350,22 +306,22 @@ class _Builder:
             if event.tag is not None:
                 value = self._tagged(event.tag, text, self._span(event, with_properties=True))
             elif is_plain:
-                value = _resolve(text)
+                value = resolve(text)
         except ValueError as error:
             self._problems.add(str(error), position)
             position = dataclasses.replace(position, told=True)
         return Scalar(value, text, is_plain, position)
 
     def _tagged(self, tag: str, text: str, position: Position) -> Value:
-        kind = tag.removeprefix(_TAG_PREFIX)
-        if tag == _TAG_PREFIX + "str":
+        kind = tag.removeprefix(TAG_PREFIX)
+        if tag == TAG_PREFIX + "str":
             return text
-        if kind == tag or kind not in _SCALAR_TAGS:
+        if kind == tag or kind not in SCALAR_TAGS:
             self._add_tag(tag, "a single value", position)
             return text
-        value = _resolve(text)
-        if type(value) not in _SCALAR_TAGS[kind]:
-            raise ValueError(f"!!{kind} does not fit {_short(text)!r}")
+        value = resolve(text)
+        if type(value) not in SCALAR_TAGS[kind]:
+            raise ValueError(f"!!{kind} does not fit {short(text)!r}")
         return float(value) if kind == "float" and isinstance(value, int) else value
 
     def _checked_key(self, frame: _Frame, key: Node) -> Scalar | None:
@@ -376,7 +332,7 @@ class _Builder:
             hint = "quote a text that starts with '{' or '['"
             self._problems.add(f"a key must be text, this one is a {kind}", at, hint)
         elif not isinstance(key.value, str):
-            shown = _short(key.text)
+            shown = short(key.text)
             kind = f"{shown}, which is not text" if key.text else "empty"
             self._problems.add(f"a key must be text, this one is {kind}", at, f"quote it: '{shown}'")
         elif key.value == "<<" and key.plain:
@@ -384,7 +340,7 @@ class _Builder:
             self._problems.add("YAML 1.2 has no merge keys (<<)", at, hint)
         elif key.value in frame.entries:
             first = frame.entries[key.value].key.position.line
-            message = f"duplicate key {_short(key.value)!r}: first on line {first}, again on line {at.line}"
+            message = f"duplicate key {short(key.value)!r}: first on line {first}, again on line {at.line}"
             self._problems.add(message, at)
         else:
             return key
@@ -437,8 +393,8 @@ class _Builder:
         raise _StopError
 
     def _add_tag(self, tag: str, kind: str, position: Position) -> None:
-        shown = _short("!!" + tag.removeprefix(_TAG_PREFIX) if tag.startswith(_TAG_PREFIX) else tag)
-        known = shown.removeprefix("!!") in {"str", "map", "seq", *_SCALAR_TAGS} and shown.startswith("!!")
+        shown = short("!!" + tag.removeprefix(TAG_PREFIX) if tag.startswith(TAG_PREFIX) else tag)
+        known = shown.removeprefix("!!") in {"str", "map", "seq", *SCALAR_TAGS} and shown.startswith("!!")
         reason = f"does not fit {kind}" if known else "is not allowed"
         self._problems.add(f"the tag {shown} {reason}", position, "leave it out, or quote a text that starts with '!'")
 

@@ -6,7 +6,6 @@ import linecache
 import os
 import re
 import sys
-import sysconfig
 from collections.abc import Mapping as AnyMapping
 from pathlib import PurePath
 from traceback import FrameSummary, extract_tb, walk_tb
@@ -21,7 +20,6 @@ from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import ModelError, Position, Problem
 
 _OURS = re.compile(r"'epicycle\.[\w.]+\.(?=[A-Z]\w*' )")  # as Python calls classes in C
-_LIBRARIES = tuple(sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib"))
 
 
 def call_site() -> Position:
@@ -53,8 +51,11 @@ def _is_users(frame: FrameType) -> bool:
     """Whether code is neither ours nor a library's; a package's actor is as good as a user's."""
     if str(frame.f_globals.get("__name__")).startswith("epicycle."):
         return False
+    import sysconfig  # here, as it takes a while and this is for what went wrong
+
     file = frame.f_code.co_filename
-    is_of_library = file.startswith((*_LIBRARIES, "<frozen ")) or bool(
+    libraries = (sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib"))
+    is_of_library = file.startswith((*libraries, "<frozen ")) or bool(
         {"site-packages", "dist-packages"} & set(PurePath(file).parts)
     )
     return not is_of_library or isinstance(frame.f_locals.get("self"), Configurable)

@@ -145,7 +145,7 @@ def structure(model: Model) -> dict[str, Any]:
     graph = model.graph
     return {
         "actors": {path: (type(actor), repr(actor)) for path, actor in graph.actors.items()},
-        "ports": {path: (graph.direction(path), repr(port)) for path, port in graph.ports.nodes(data="port")},
+        "ports": {path: (graph.direction(path), repr(node.port)) for path, node in graph.ports.items()},
         "connections": [(hop.source, hop.destination, hop.delay) for hop in graph.hops],
         "composites": list(graph.composites),
         "members": graph.members,

@@ -70,12 +70,10 @@ def folder(tmp_path: Path) -> Path:
 def state(model: Model) -> Any:
     """All that a model consists of."""
     graph = model.graph
-    nodes = graph.ports.nodes.items()
     by_path = (graph.composites, graph.members, graph.priorities, graph.positions, graph.tags)
     scopes = [model, *map(model.__getitem__, graph.composites)]
     return {
-        "ports": [(path, sorted((key, str(value)) for key, value in node.items())) for path, node in nodes],
-        "edges": list(graph.ports.edges(keys=True)),
+        "ports": [(path, str(node)) for path, node in graph.ports.items()],
         "hops": [(str(hop), hop.order, hop.delay) for hop in graph.hops],
         "ways": [[str(hop) for hop in (*graph.incoming(port), *graph.outgoing(port))] for port in graph.ports],
         "actors": [(path, id(actor), actor.path, actor.is_part) for path, actor in graph.actors.items()],

@@ -197,3 +197,42 @@ def test_help_loads_nothing_heavy() -> None:
     )
     loaded = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert loaded.stdout.strip() == "[]"
+
+
+TINY = """\
+model: tiny
+actors: {clock: {type: Clock, period: 1 s}, scale: {type: Scale, factor: 2}}
+connections: [clock.output -> scale.input]
+run: {stop: 10 s, record: [scale.output]}
+"""
+
+
+def answer(script: str, folder: Path) -> list[str]:
+    """The last line of what a program prints, which runs a tiny model, in words."""
+    (folder / "tiny.yaml").write_text(TINY, encoding="utf-8")
+    done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()[-1].split()
+
+
+def test_a_small_run_imports_and_searches_only_what_it_needs(tmp_path: Path) -> None:
+    late = (
+        "networkx", "scipy", "matplotlib", "numba", "pandas", "filterpy", "rich.progress", "difflib",
+        "epicycle.actors.continuous", "epicycle.actors.robotics", "epicycle.runner.study",
+    )  # fmt: skip
+    script = (
+        "import sys, epicycle.runner.catalogue.types as types\n"
+        "from epicycle.runner.cli import main\n"
+        "types.entry_points = None\n"  # which search all installed packages
+        "assert main(['run', 'tiny.yaml']) == 0\n"
+        f"print('imported:', *({{*{late}}} & {{*sys.modules}}))"
+    )
+    assert answer(script, tmp_path) == ["imported:"]
+
+
+def test_what_a_program_imports_is_never_garbage(tmp_path: Path) -> None:
+    """A command that is called by a program of somebody else's leaves the garbage collector as it was."""
+    script = "import gc, sys\nfrom epicycle.runner.cli import main\nbefore = gc.get_threshold()\n"
+    told = "print(gc.get_freeze_count() > 10_000, gc.isenabled(), gc.get_threshold() == before)"
+    program = f"{script}sys.argv = ['epicycle', 'run', 'tiny.yaml']\nassert main() == 0\n{told}"
+    assert answer(program, tmp_path) == ["True", "True", "True"]
+    assert answer(f"{script}assert main(['run', 'tiny.yaml']) == 0\n{told}", tmp_path) == ["False", "True", "True"]

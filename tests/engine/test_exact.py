@@ -116,7 +116,7 @@ def run(ticks: int) -> Results:
 
 
 def test_a_long_signal_is_shown_in_short() -> None:
-    shown = [run(ticks)["t.output"]._table().rows for ticks in (1, 16, 17, 40)]
+    shown = [run(ticks)["t.output"]._tables()[0].rows for ticks in (1, 16, 17, 40)]
     lengths = [len(rows) for rows in shown]
     assert lengths[0] == 1
     assert lengths[1] == 16

@@ -106,11 +106,10 @@ def load(composites: str, type_name: str, tmp_path: Path) -> Model:
 def content(model: Model) -> dict[str, object]:
     """All that makes a model, but for positions and the order in which actors are declared."""
     graph = model.graph
-    hops = [data["hop"] for *_, data in graph.ports.edges(data=True)]
     return {
         "actors": sorted(f"{path} {actor!r}" for path, actor in graph.actors.items()),
-        "ports": sorted(graph.ports.nodes),
-        "hops": sorted((hop.source, hop.destination, hop.delay or 0) for hop in hops),
+        "ports": sorted(graph.ports),
+        "hops": sorted((hop.source, hop.destination, hop.delay or 0) for hop in graph.hops),
         "aspects": [(woven.name, repr(woven.aspect), sorted(woven.ports)) for woven in model.aspects],
         "channels": [
             [wire.source.path for wire in graph.wires_to(graph.actors[f"x[{i}].sum"].inputs["input"])] for i in (0, 1)

@@ -20,8 +20,7 @@ def hops(text: str, tmp_path: Path, *settings: str) -> list[str]:
     path = tmp_path / "m.yaml"
     path.write_text("model: m\n" + text, encoding="utf-8")
     graph = load_model(path, types=[*TYPES, Cell], set=settings).graph
-    found = sorted((data["hop"] for *_, data in graph.ports.edges(data=True)), key=lambda hop: hop.order)
-    return [str(hop).replace(".output", "").replace(".input", "") for hop in found]
+    return [str(hop).replace(".output", "").replace(".input", "") for hop in graph.hops]
 
 
 class Cell(Actor):

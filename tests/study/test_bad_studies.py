@@ -19,6 +19,7 @@ from epicycle.runner.catalogue import built_in, figure_types
 from epicycle.runner.cli import main
 from epicycle.runner.language import json_schema
 from epicycle.runner.show.report import check_figures, study_figure_types
+from epicycle.runner.study import open_study
 from epicycle.runner.text import Problems, parse, plain
 from tests import cases
 from tests.cases import Case
@@ -45,6 +46,25 @@ def message(case: Case) -> str:
 def test_message(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert message(case) == case.message
+
+
+def test_the_advice_for_the_end_of_runs_can_be_followed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A study has no --until: a parameter does."""
+    head = "model: m\nactors: {c: {type: Clock, period: 1 s}}\nmetrics: {ticks: {of: c.output, take: count}}\n"
+    (tmp_path / "m.yaml").write_text(head + "run: {stop: 5 s}\n", encoding="utf-8")
+    (tmp_path / "s.yaml").write_text("study: s\nmodel: ./m.yaml\nmetrics: [ticks]\n", encoding="utf-8")
+    run = ["study", str(tmp_path / "s.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    assert main([*run, "--set", "stop=2"]) == 2
+    assert capsys.readouterr().err == (
+        "command line:1:7: error: 'stop' sets no parameter\n"
+        "    1 | --set stop=2\n"
+        "      |       ^^^^^^\n"
+        "   help: a single run is ended by --until, or let the model have a parameter for it: 'stop: ${end}'\n"
+    )
+    text = head + 'parameters: {end: {value: 5 s, unit: s}}\nrun: {stop: "${end}"}\n'
+    (tmp_path / "m.yaml").write_text(text, encoding="utf-8")
+    assert main([*run, "--set", "end=2"]) == 0
+    assert open_study(tmp_path / "out").table()["ticks"].to_pylist() == [3]
 
 
 def test_names_of_the_other_kind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,8 +26,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, borrower, lent
+from .compiled import Array, borrower
 from .constraints import BOUND, ROUNDING, VALUE
+from .entry import entry
 from .horizon import HorizonProblem
 from .newton import newton_step
 from .task import (
@@ -229,15 +230,25 @@ def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solu
     hardest braking that f2 allows.  Never raises, and the controls are finite and keep f2 whatever is asked; where
     numbers of the problem are not finite, or too large to be squared, the violation may be inf.
     """
-    best, room = np.empty(starts.shape[1:]), room_for(problem, starts.shape[1])
-    # Field by field, as numba takes 4 us longer to look at a named tuple.
-    return Solution(best, *_solve(*problem, *rules, starts, best, room))
+    return Solution(*_solve(*problem, *rules, starts))  # field by field, as numba takes 4 us longer for a named tuple
 
 
-@lent
-def _solve(*fields: Any) -> tuple[float, float, int]:
-    """The fields of the problem and the rules; the starts, where the plan goes, and room to work in."""
-    problem, rules, (starts, best, room) = HorizonProblem(*fields[:-7]), Rules(*fields[-7:-3]), fields[-3:]
+@entry(
+    "Tuple((f8[:, ::1], f8, f8, i8))(f8, f8[::1], f8[::1], f8, f8, f8[:, ::1], f8[::1], f8, f8, f8[:, :, ::1], "
+    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8, f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, "
+    "f8, f8, i8, i8, f8[:, :, ::1])"
+)
+def _solve(*fields: Any) -> tuple[Array, float, float, int]:
+    """The fields of the problem and the rules, and the starts."""
+    problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
+    best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1]))
+    violation, objective, iterations = _search(problem, rules, starts, best, room)
+    return best, violation, objective, iterations
+
+
+@borrower
+def _search(problem: HorizonProblem, rules: Rules, starts: Array, best: Array, room: Array) -> tuple[float, float, int]:
+    """Write the best plan."""
     free = min(rules.free, starts.shape[1]) if rules.free > 0 else starts.shape[1]
     task = new_task(problem, starts.shape[1], free, ROUNDING, room)
     plan = task.plan

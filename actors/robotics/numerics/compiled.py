@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -15,46 +16,54 @@ from numpy.typing import NDArray
 from ...core import elementary
 from ...core.elementary.in_numba import register
 
+config: Any = numba.config
 Array = NDArray[np.float64]  # the one array type of the kernels
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
-def _compiled(function: Function, **options: bool) -> Function:
+def options(**others: bool) -> dict[str, Any]:
+    """How all is compiled, and ``others``; ``error_model="numpy"`` gives inf and NaN instead of exceptions."""
+    return {"error_model": "numpy", "fastmath": False, **others}
+
+
+def _compiled(function: Function, **others: bool) -> Function:
     """Strict, with ``_nrt`` (whether references to arrays are counted) given: numba takes its caller's for it else.
 
     A way in from C, which nobody takes, is a tenth of the time of compiling.
     """
     compiler: Any = numba.njit
-    return cast(Function, compiler(error_model="numpy", fastmath=False, no_cfunc_wrapper=True, **options)(function))
+    return cast(Function, compiler(**options(no_cfunc_wrapper=True, **others))(function))
 
 
-def kernel(function: Function, counts: bool = True) -> Function:
-    """Compile a pure function on arrays; ``error_model="numpy"`` gives inf and NaN instead of exceptions.
+def folder() -> Path:
+    """Where numba keeps compiled code; named after all sources of this package and of the elementary functions.
 
-    Compiled code lies in a folder named after all sources of this package and of the elementary functions.  By itself
-    numba looks only at the file of a kernel, and would keep using old code that it calls from others.
+    By itself numba looks only at the file of a kernel, and would keep using old code that it calls from others.
     """
-    config: Any = numba.config
-    before = config.CACHE_DIR
-    if before:  # the user's own, NUMBA_CACHE_DIR
-        folder = Path(before)
+    if _FOLDER:  # the user's own, NUMBA_CACHE_DIR
+        above = Path(_FOLDER)
     elif os.access(_HERE, os.W_OK):
-        folder = _HERE / "__pycache__"
+        above = _HERE / "__pycache__"
     else:
-        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "epicycle"
-    config.CACHE_DIR = str(folder / _SOURCES)
+        above = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "epicycle"
+    return above / _SOURCES
+
+
+@contextmanager
+def cached() -> Iterator[None]:
+    """What is declared meanwhile is cached in the ``folder``."""
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(folder())
     try:
-        return _compiled(function, cache=True, _nrt=counts)
+        yield
     finally:
         config.CACHE_DIR = before
 
 
-def lent(function: Function) -> Function:
-    """A ``kernel`` that is lent all arrays it works in and returns none, as a ``borrower``.
-
-    On the way in from Python, numba allocates something of its own for each array otherwise.
-    """
-    return kernel(function, counts=False)
+def kernel(function: Function, counts: bool = True) -> Function:
+    """Compile a pure function on arrays."""
+    with cached():
+        return _compiled(function, cache=True, _nrt=counts)
 
 
 def inner(function: Function) -> Function:
@@ -80,5 +89,6 @@ def inlined(function: Function) -> Function:
 
 _HERE = Path(__file__).parent
 _FILES = [path for folder in (_HERE, Path(elementary.__file__).parent) for path in sorted(folder.glob("*.py"))]
+_FOLDER = config.CACHE_DIR
 _SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
 register()

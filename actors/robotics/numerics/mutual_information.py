@@ -16,11 +16,12 @@ import math
 import numpy as np
 
 from ...core.elementary import exp, hypot, log
-from .compiled import Array, borrower, kernel
+from .compiled import Array, borrower
+from .entry import entry
 from .terms import Term
 
 
-@kernel
+@entry("f8[:, ::1](f8[:, ::1], f8[:, :, ::1], f8)")
 def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) -> Array:
     """``others_distance``: (M, M) from sigma points (M, 2) and the ends of the other robots' ways (n, N, 2)."""
     count, last = sigma_positions.shape[0], robots.shape[1] - 1

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .compiled import Array, inner, kernel
+from .entry import entry
 from .horizon import trajectory
 from .ukf import constant_velocity, mapped, predict, sigma_points, turned
 
@@ -20,7 +21,7 @@ def _age(elapsed: float, period: float, oldest: float) -> int:
     return round(min(max(elapsed / period, 0.0), oldest))
 
 
-@kernel
+@entry("Tuple((f8[:, ::1], f8[::1], f8[:, :, ::1]))(f8[::1], f8[::1], f8[:, ::1], f8, f8[::1], f8[::1], f8, f8, f8)")
 def standing_plan(
     position: Array, velocity: Array, controls: Array, elapsed: float, radius: Array, moving: Array, speed: float,
     max_acceleration: float, period: float,
@@ -53,7 +54,7 @@ def standing_plan(
     return centres, radii, guesses
 
 
-@kernel
+@entry("Tuple((f8[:, :, ::1], f8[:, ::1]))(f8[:, ::1], f8, f8, f8[::1], f8, f8, f8)")
 def peer_tubes(
     plans: Array, now: float, period: float, radius: Array, growth: float, safe_distance: float, margin: float
 ) -> tuple[Array, Array]:
@@ -122,7 +123,9 @@ def _after(mean: Array, covariance: Array, noise: Array, periods: float, period:
     return mean, covariance
 
 
-@kernel
+@entry(
+    "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8[:, ::1], b1, f8, f8, f8, i8)"
+)
 def expected_target(
     mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float, elapsed: float,
     steps: int,

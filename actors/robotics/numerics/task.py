@@ -6,8 +6,6 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
-
 from ...core.elementary import log
 from .compiled import Array, borrower, inlined
 from .constraints import BOUND, CONSTRAINT, MARGIN, VALUE, WHEN, X, Y, certainly_kept, circle, constraints_of, term
@@ -55,11 +53,12 @@ class Task(NamedTuple):
     points: Array  # of ``mutual_information``; none unless the objective is eq. (5) and there is an obstacle
 
 
-def room_for(problem: HorizonProblem, steps: int) -> Array:
-    """Room for the tables of a task."""
-    binding = (1 + len(problem.obstacle_mean) + len(problem.peer_mean)) * len(problem.tube_radius)
-    points = len(problem.sigma_weights)
-    return np.empty(steps * (_COLUMNS + STAGE) + binding * CONSTRAINT + points * (PAIRS + 2 * points))
+@inlined
+def room_for(problem: HorizonProblem, steps: int) -> int:
+    """How many numbers there are in the tables of a task."""
+    binding: int = (1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0]) * problem.tube_radius.shape[0]
+    points: int = problem.sigma_weights.shape[0]
+    return steps * (_COLUMNS + STAGE) + binding * CONSTRAINT + points * (PAIRS + 2 * points)
 
 
 @borrower

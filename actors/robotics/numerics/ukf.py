@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.elementary import hypot
 from .compiled import Array, borrower, inner, kernel
+from .entry import entry
 
 RELATIVE_POSITION = 0
 RANGE = 1
@@ -221,15 +222,6 @@ def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measure
 
 
 @borrower
-def _copy(mean: Array, covariance: Array, to: Array, spread: Array) -> None:
-    """In loops, as numba compiles half of its strings for what the assignment of an array says of other shapes."""
-    for i in range(mean.shape[0]):
-        to[i] = mean[i]
-        for j in range(mean.shape[0]):
-            spread[i, j] = covariance[i, j]
-
-
-@borrower
 def _finite(mean: Array, covariance: Array) -> bool:
     for i in range(mean.shape[0]):
         if not abs(mean[i]) < math.inf:
@@ -240,6 +232,7 @@ def _finite(mean: Array, covariance: Array) -> bool:
     return True
 
 
+@entry("Tuple((f8[::1], f8[:, ::1], b1))(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8[:, ::1], b1)")
 def predict_and_fuse(
     mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
     averaged: bool,
@@ -249,33 +242,19 @@ def predict_and_fuse(
     All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  Where
     the result would not be finite, the prediction stands.
     """
-    then, spread = np.empty(mean.shape), np.empty(covariance.shape)  # cheaper than what a kernel makes and returns
-    is_fused = _predict_and_fuse(
-        mean, covariance, transition, process_noise, kappa, measurements, averaged, then, spread
-    )
-    return then, spread, is_fused
-
-
-@kernel
-def _predict_and_fuse(
-    mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
-    averaged: bool, then: Array, spread: Array,
-) -> bool:  # fmt: skip
-    """Writes the state and its covariance ``then``; returns whether anything was fused."""
     mean, covariance = predict(mean, covariance, transition, process_noise)
-    _copy(mean, covariance, then, spread)
     if measurements.shape[0] == 0:
-        return False
+        return mean, covariance, False
     points, weights = sigma_points(mean, covariance, kappa)
     if averaged:
         noises = measurement_noise(points, weights, measurements)
     else:
         noises = measurement_noise(points[:1], np.ones(1), measurements)  # of the mean
+    then, spread = mean.copy(), covariance.copy()
     _fuse(then, spread, points, weights, measurements, noises)
     if not _finite(then, spread):
-        _copy(mean, covariance, then, spread)
-        return False
-    return True
+        return mean, covariance, False
+    return then, spread, True
 
 
 @inner

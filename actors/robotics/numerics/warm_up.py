@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import functools
+import gc
 import logging
+import os
+import subprocess
+import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
 from .barrier import solve
-from .horizon import HorizonProblem
+from .compiled import config, folder
+from .horizon import INFORM, HorizonProblem
+from .mutual_information import pairwise_distance
 from .reachability import expected_target, peer_tubes, standing_plan
 from .ukf import constant_velocity, predict_and_fuse
 
 _LOGGER = logging.getLogger("epicycle")
 _PATIENCE = 1.0  # s before the wait is explained; loading the cached kernels is quicker
+_STEPS = 3
 
 
 @functools.cache
@@ -25,23 +34,72 @@ def compile_kernels() -> None:
     notice.daemon = True
     notice.start()
     try:
-        _call_every_kernel()
+        with _without_collections():
+            _call_every_kernel()
     finally:
         notice.cancel()
 
 
 def _call_every_kernel() -> None:
-    steps, period = 3, 0.1
-    model = constant_velocity(period), np.eye(4)
-    mean, covariance, _ = predict_and_fuse(np.zeros(4), np.eye(4), *model, 0.0, np.zeros((1, 7)), True)
+    with _others_meanwhile():
+        _call_solver()
+    call_others()
+
+
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Numba makes millions of objects, and to look through them takes a sixth of the time."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+@contextmanager
+def _others_meanwhile() -> Iterator[None]:
+    """Where nothing is compiled yet, a second process compiles all but the solver, which takes longest.
+
+    Both write to the same cache, each the code of kernels that the other does not need.  If the second one cannot, all
+    is compiled here.
+    """
+    if config.DISABLE_JIT or (os.cpu_count() or 1) == 1 or any(folder().rglob("*.nbc")):
+        yield
+        return
+    program = f"from {__name__} import call_others; call_others()"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    null = subprocess.DEVNULL
+    try:
+        other = subprocess.Popen([sys.executable, "-c", program], env=environment, stdin=null, stdout=null, stderr=null)
+    except OSError:  # there may be no such program where Python is a part of another
+        yield
+        return
+    with other:  # and wait for it
+        yield
+
+
+def _call_solver() -> None:
+    zeros, steps = np.zeros, _STEPS
+    # Plans that solve it need no more than one Newton step, and compile as much.
+    problem = HorizonProblem(
+        0.1, zeros(2), zeros(2), 1.0, 1.0, zeros((steps, 2)), np.ones(steps), 1.0, 1.0, zeros((1, steps, 2)) + 100.0,
+        zeros((1, steps, 3)), zeros((1, steps, 2)) + 200.0, zeros((1, steps)), INFORM, zeros(2), zeros((9, 2)),
+        np.ones(9), zeros((9, 9)), 1.0, 1.0, 1.0,
+    )  # fmt: skip
+    solve(problem, zeros((2, steps, 2)))
+
+
+def call_others() -> None:
+    """All but the solver."""
+    period, zero, ones = 0.1, np.zeros(2), np.ones(_STEPS)
+    mean, covariance, _ = predict_and_fuse(
+        np.zeros(4), np.eye(4), constant_velocity(period), np.eye(4), 0.0, np.zeros((1, 7)), True
+    )
     for token in (mean, covariance):
         token.setflags(write=False)
-    means, covariances, sigma_positions, weights = expected_target(
-        mean, covariance, np.eye(4), False, 0.0, period, 0.0, steps
-    )
-    controls, zero, ones = np.zeros((steps, 2)), np.zeros(2), np.ones(steps)
-    centre, radius, starts = standing_plan(zero, zero, controls, 0.0, ones, zero, 0.0, 1.0, period)
-    peer_mean, peer_distance = peer_tubes(np.zeros((1, 6)), 0.0, period, ones, 0.4, 1.0, 1.0)
-    seen, heard = (means + 100.0, covariances), (peer_mean + 200.0, peer_distance)
-    posed = HorizonProblem(period, zero, zero, 1.0, 1.0, centre, radius, 1.0, 1.0, *seen, *heard)
-    solve(posed.to_inform(sigma_positions, weights, peer_mean, 1.0, 1.0, 1.0).to_reach(np.ones(2)), starts)
+    _, _, points, _ = expected_target(mean, covariance, np.eye(4), False, 0.0, period, 0.0, _STEPS)
+    standing_plan(zero, zero, np.zeros((_STEPS, 2)), 0.0, ones, zero, 0.0, 1.0, period)
+    peer_mean, _ = peer_tubes(np.zeros((1, 6)), 0.0, period, ones, 0.4, 1.0, 1.0)
+    pairwise_distance(points, peer_mean, 1.0)

@@ -128,9 +128,9 @@ class _Outliner:
                 self.standing.setdefault(path, []).append(woven.name)
         self.hops: dict[str, list[Hop]] = {}  # by the composite inside of which they lie
         self.outside: dict[str, list[Hop]] = {}  # by the box at which they end
-        for source, _, hop in self.graph.ports.edges(data="hop"):
-            owner = _owner(source)
-            scope = owner if self.graph.direction(source) == "input" else _owner(owner)
+        for hop in chain.from_iterable(map(self.graph.outgoing, self.graph.ports)):
+            owner = _owner(hop.source)
+            scope = owner if self.graph.direction(hop.source) == "input" else _owner(owner)
             self.hops.setdefault(scope, []).append(hop)
             for end in {_owner(hop.source), _owner(hop.destination)} - {scope}:
                 self.outside.setdefault(end, []).append(hop)
@@ -205,7 +205,7 @@ class _Outliner:
             box.kind += _clock(self.graph.clocks[path])
         for side, paths in zip((box.inputs, box.outputs), self._ports(path), strict=True):
             for port_path in paths:
-                port = self.graph.ports.nodes[port_path]["port"]
+                port = self.graph.ports[port_path].port
                 # That of a parameter need not be seen unless something is there.
                 is_parameter = port is not None and isinstance(
                     getattr(type(port.actor), port.name, None), PortParameter

@@ -35,6 +35,7 @@ SENT = (
     "installed there"
 )
 _CODE = ("epicycle.actors", "epicycle.aspects", "epicycle.runner")
+_SOURCES = (".py", ".pyx", ".pxd")  # of what is compiled, too
 _NO_MATTER = ("pyarrow",)  # workers write no files
 _OPTIONAL = ("casadi",)  # which takes part in runs, where it is installed
 _SOON = 0.05  # s
@@ -131,7 +132,8 @@ def _code() -> str:
     digest = hashlib.sha256()
     for package in _CODE:
         for folder in map(Path, import_module(package).__path__):
-            for path in sorted(folder.rglob("*.py"), key=lambda path: path.relative_to(folder).parts):
+            sources = [path for path in folder.rglob("*") if path.suffix in _SOURCES]
+            for path in sorted(sources, key=lambda path: path.relative_to(folder).parts):
                 digest.update(f"{package}/{path.relative_to(folder).as_posix()}\n".encode())
                 digest.update(path.read_bytes())
     return digest.hexdigest()

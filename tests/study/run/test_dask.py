@@ -14,6 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow.parquet as pq
 import pytest
@@ -21,6 +22,7 @@ import pytest
 from epicycle.runner.cli import main
 from epicycle.runner.language import read_study
 from epicycle.runner.study import Plan, open_study
+from epicycle.runner.study.run import parcel
 from epicycle.runner.study.run.backlog import Backlog
 from epicycle.runner.study.run.parcel import fitness, pack
 from epicycle.runner.study.run.runner import Runner
@@ -271,6 +273,22 @@ def test_what_cannot_be(
     with monkeypatch.context() as context:
         context.setitem(sys.modules, "distributed", None)
         assert error_of(tmp_path, capsys) == "2: error: this needs dask: pip install 'epicycle[dask]'\n"
+
+
+def test_the_code_that_has_to_be_the_same_is_all_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also what is compiled; not what is made of it, which differs between machines."""
+    monkeypatch.setattr(parcel, "import_module", lambda name: SimpleNamespace(__path__=[str(tmp_path)]))
+    (tmp_path / "core").mkdir()
+    seen = [parcel._code()]
+    for name in ("core/a.py", "core/a.pyx", "core/a.pxd"):
+        (tmp_path / name).write_text("x = 1\n", encoding="utf-8")
+        seen.append(parcel._code())
+        (tmp_path / name).write_text("x = 2\n", encoding="utf-8")
+        seen.append(parcel._code())
+    assert len({*seen}) == len(seen) == 7
+    for name in ("core/a.c", "core/a.so", "compiled.json"):
+        (tmp_path / name).write_text("", encoding="utf-8")
+    assert parcel._code() == seen[-1]
 
 
 @pytest.mark.slow

@@ -1,0 +1,59 @@
+"""Parameters of several values: arrays, lists of texts, mappings of names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .parameter import REQUIRED, Parameter, ParameterError
+
+
+def array_parameter(
+    shape: tuple[int | None, ...],
+    default: object = REQUIRED,
+    *,
+    unit: str = "",
+    min: float | None = None,
+    above: float | None = None,
+    max: float | None = None,
+    doc: str = "",
+) -> Parameter[NDArray[np.float64]]:
+    """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
+    given: Any = default
+    return Parameter(cast(Any, float), given, unit=unit, min=min, above=above, max=max, shape=shape, doc=doc)
+
+
+def texts_parameter(default: object = REQUIRED, *, doc: str = "") -> Parameter[tuple[str, ...]]:
+    """A parameter whose value is a list of texts; a single text counts as a list of one."""
+    given: Any = default
+    return Parameter(cast(Any, str), given, shape=(None,), doc=doc)
+
+
+class MappingParameter(Parameter[Any]):
+    """A parameter such as ``initial: {height: 10, speed: 0}``: names of the model's own, each with a value of ``item``.
+
+    Reads as a dict in the order in which the names are written.
+    """
+
+    def __init__(self, item: Parameter[Any], default: Any = REQUIRED, *, doc: str = "") -> None:
+        super().__init__(object, default, doc=doc)
+        self.item = item
+
+    def describe_type(self) -> str:
+        return f"mapping of names to {self.item.describe_type()}"
+
+    def convert(self, value: object) -> dict[str, Any] | None:
+        if value is None and self.optional:
+            return None
+        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+            raise ParameterError(f"{value!r} is not a {self.describe_type()}")
+        converted = {}
+        for name, each in value.items():
+            try:
+                converted[name] = self.item.convert(each)
+            except ParameterError as error:
+                raise ParameterError(f"{name}: {error}", (name, *error.keys), of_key=error.of_key) from None
+        return converted
