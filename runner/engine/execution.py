@@ -140,7 +140,13 @@ class Execution:
             refresh()
         turn, self._open = self._open, None
         start = perf_counter()
-        self._director.fire(self._turns[job.rank].of_actor)
+        own = self._turns[job.rank].of_actor
+        try:
+            self._director.fire(own)
+        except BaseException as error:
+            self._director.fail(own, error)
+        finally:
+            own.clear()  # the director clears the turn of the stand-in alone
         if job.watch is not None:
             job.watch(perf_counter() - start)
         self._open = turn
