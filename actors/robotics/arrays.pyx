@@ -9,6 +9,7 @@ from libc.stdint cimport int64_t, intptr_t
 from libc.string cimport memcpy
 
 import math
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,14 +114,8 @@ cpdef stacked(rows, Py_ssize_t columns):
     return table
 
 
-cdef extern from *:
-    """
-    static void fetch(const char *code, Py_ssize_t span) {
-        for (const char *end = code + span; code < end; code += 64) __builtin_prefetch(code, 0, 2);
-    }
-    """
-    void fetch(const char*, Py_ssize_t) noexcept
-DEF WORDS = 128  # more than any kernel takes
+cdef enum:
+    WORDS = 128  # more than any kernel takes
 ctypedef int64_t (*Code)(int64_t*) noexcept
 
 
@@ -131,13 +126,15 @@ cdef class Entry:
     cdef object owner  # of the code
     cdef object compiled
     cdef bytes takes, gives
-    cdef public Py_ssize_t span
     cdef readonly object jitted  # the same, as kernels call it
 
     def __init__(self, jitted, compiled, str takes, str gives):
         self.jitted, self.compiled = jitted, compiled
         self.takes, self.gives = takes.encode(), gives.encode()
         assert sum([1 + int(each) if each.isdigit() else 1 for each in takes]) < WORDS
+
+    def __reduce__(self):  # by name: an address is good in one process
+        return kernel_of, (self.jitted.__module__, self.jitted.__name__)
 
     def __call__(self, *arguments):
         cdef int64_t[WORDS] words
@@ -149,8 +146,6 @@ cdef class Entry:
         if self.code is NULL:
             self.owner = self.compiled()
             self.code = <Code><intptr_t>self.owner.address
-        if self.span:
-            fetch(<const char*>self.code, self.span)
         if len(arguments) != count:
             raise TypeError(f"a kernel of {count} arguments is given {len(arguments)}")
         for place in range(count):
@@ -194,9 +189,16 @@ cdef given(char kind, int64_t* word):
         return word[0]
     if kind == c"b":
         return word[0] != 0
+    if word[0] == 0:
+        raise MemoryError("a kernel's array cannot be made")
     made = <object><void*><intptr_t>word[0]
     Py_DECREF(made)
     return made
+
+
+def kernel_of(module, name):
+    """A kernel by its name."""
+    return getattr(import_module(module), name)
 
 
 def entered(jitted, compiled, takes, gives):

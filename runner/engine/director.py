@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from epicycle.actors import NEVER, InputPort, Moment, Process, Ranks, Tag, Times, Wake, Way, new_wake
 
@@ -280,10 +280,7 @@ class Director:
         except BaseException as error:  # whatever an actor raises, sys.exit() too, is its failure
             assert turn is not None
             turn.clear()
-            if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):  # of an aspect on the way of a token
-                raise
-            doing = "run()" if isinstance(turn.actor, Process) else "fire()"
-            raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
+            self.fail(turn, error)
         if self._next is None:
             self.present = None
 
@@ -321,6 +318,13 @@ class Director:
             turn.form.fire()
         else:
             turn.actor.fire()
+
+    def fail(self, turn: Turn, error: BaseException) -> NoReturn:
+        """Tell the error of an actor in its turn; one of an aspect on the way of a token, say, has been told."""
+        if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
+            raise error
+        doing = "run()" if isinstance(turn.actor, Process) else "fire()"
+        raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
 
     def interrupt(self) -> None:
         """Raise ``KeyboardInterrupt`` in the place of the next firing, or of the next instant."""

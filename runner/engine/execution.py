@@ -18,7 +18,7 @@ from epicycle.aspects import ActorPoint, Job
 from ..text import describe
 from .agenda import Turn
 from .director import Director
-from .errors import ActorError, LoopError
+from .errors import ActorError
 from .local_time import LocalDirector
 from .refinement import Refinement
 
@@ -144,23 +144,21 @@ class Execution:
             refresh()
         turn, self._open = self._open, None
         start = perf_counter()
+        own = self._turns[job.rank].of_actor
         try:
-            self._director.fire(self._turns[job.rank].of_actor)
-        except Exception as error:
-            if self.refinement is None or isinstance(error, LoopError):
+            try:
+                self._director.fire(own)
+            except BaseException as error:
+                self._director.fail(own, error)
+            finally:
+                own.clear()  # the director clears the turn of the stand-in alone
+        except ActorError as error:
+            if self.refinement is None:
                 raise
-            self.refinement.conductor.fail(self._failed(error))
+            self.refinement.conductor.fail(error)
         if job.watch is not None:
             job.watch(perf_counter() - start)
         self._open = turn
-
-    def _failed(self, error: Exception) -> ActorError:
-        """The error as the director tells it."""
-        if isinstance(error, ActorError):  # of an aspect on the way of a token
-            return error
-        found = ActorError(self.actor.path, self._director.last, "fire()", describe(error))
-        found.__cause__ = error
-        return found
 
     # -- what aspects do with the actor as a whole ----------------------------------------------------------------
 

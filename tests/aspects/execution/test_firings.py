@@ -234,3 +234,17 @@ def test_a_point_says_whose_firing_it_is() -> None:
     text = f"{composite}\nactors: {{c: {{type: C}}, p: {{type: Probe}}}}\nconnections: [c.out -> p.input]\n"
     _, results = simulate(text + "aspects: {it: {type: Named, at: c}}", types=[*TYPES, Named])
     assert [value for *_, value in acts(results)] == [("c.t", "c")]
+
+
+def test_what_an_actor_is_to_take_later_is_there_when_it_has_answered_a_wake_up() -> None:
+    """A ``TimeDelay`` sends what is due, and takes what comes, in two firings of one tag, also behind an aspect."""
+    text = """
+actors:
+  clock: {type: Clock, period: 1 s}
+  delay: {type: TimeDelay, delay: 1 s}
+connections: [clock.output -> delay.input]
+aspects: {skip: {type: SkipFiring, probability: 0, at: delay}}
+run: {stop: 6 s, record: [delay.output]}
+"""
+    signal = Simulation(load(text)).run().signals["delay.output"]
+    assert [signal.times.tolist(), signal.values.tolist()] == [[1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5]]
