@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -82,22 +82,31 @@ def _validate_study(options: argparse.Namespace) -> int:
         help="open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)",
     ),
     option("--expand", action="store_true", help="draw every instance of an array, also where they are alike"),
+    option("--machine", metavar="PATH", help="draw the modes of this machine or composite as a statechart"),
     imports=("build", "show.graph"),
 )
 def graph(options: argparse.Namespace) -> int:
     """Draw the model graph: actors, composites, ports, connections with their delays, and aspects."""
-    from ..show.graph import check_graph_path, mermaid, outline, write_graph
+    from ..show.graph import check_graph_path, mermaid, outline, statechart, write_graph
 
     if options.out is not None:
         check_graph_path(options.out)
+    if options.machine is not None:
+        chart = statechart(load(options), options.machine)
+        return _write(mermaid(chart), lambda path: write_graph(chart, path), options.out)
     drawn = outline(load(options), depth=options.depth, expand=options.expand)
-    if options.out is None:
-        tell(mermaid(drawn).rstrip("\n"))
-    else:
-        write_graph(drawn, options.out)
-        tell(f"wrote {options.out}")
+    _write(mermaid(drawn), lambda path: write_graph(drawn, path), options.out)
     if drawn.note and options.depth is None:
         complain(f"note: {drawn.note}")
+    return DONE
+
+
+def _write(text: str, write: Callable[[Path], None], path: Path | None) -> int:
+    if path is None:
+        tell(text.rstrip("\n"))
+    else:
+        write(path)
+        tell(f"wrote {path}")
     return DONE
 
 

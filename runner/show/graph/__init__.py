@@ -17,13 +17,14 @@ from pathlib import Path
 
 from epicycle.actors import EpicycleError
 
+from . import mermaid_text
 from .layout import draw
-from .mermaid_text import mermaid
 from .outlines import Outline, outline
+from .statechart import Statechart, chart_text, statechart, write_statechart
 
 PICTURES, TEXTS = (".svg", ".png", ".pdf"), (".mmd", ".md")
 
-__all__ = ["GraphError", "Outline", "check_graph_path", "mermaid", "outline", "write_graph"]
+__all__ = ["GraphError", "Outline", "Statechart", "check_graph_path", "mermaid", "outline", "statechart", "write_graph"]
 
 
 class GraphError(EpicycleError):
@@ -40,16 +41,23 @@ def check_graph_path(path: Path) -> None:
         raise GraphError(f"{path} cannot be written: there is no folder {path.parent}")
 
 
-def write_graph(outline: Outline, path: Path) -> None:
-    """Write an outline into a file, whose ending decides the format; raises ``GraphError``."""
+def mermaid(drawn: Outline | Statechart) -> str:
+    """An outline or a statechart as Mermaid text."""
+    return mermaid_text.mermaid(drawn) if isinstance(drawn, Outline) else chart_text(drawn)
+
+
+def write_graph(drawn: Outline | Statechart, path: Path) -> None:
+    """Write an outline or a statechart into a file, whose ending decides the format; raises ``GraphError``."""
     check_graph_path(path)
     try:
         if path.suffix.lower() in TEXTS:
-            text = mermaid(outline)
+            text = mermaid(drawn)
             path.write_text(f"```mermaid\n{text}```\n" if path.suffix.lower() == ".md" else text, encoding="utf-8")
-        else:
+        elif isinstance(drawn, Outline):
             from .picture import write_picture
 
-            write_picture(draw(outline), path)
+            write_picture(draw(drawn), path)
+        else:
+            write_statechart(drawn, path)
     except OSError as error:
         raise GraphError(f"{path} cannot be written: {error.strerror or error}") from error

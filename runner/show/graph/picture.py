@@ -44,7 +44,7 @@ def write_picture(drawing: Drawing, path: Path) -> None:
         sheet = canvas.add_axes((0, 0, 1, 1), xlim=(0, width), ylim=(height, 0))
         sheet.set_axis_off()
         colours = dict(zip(aspects, cycle(ASPECTS), strict=False))
-        _Painter(sheet, colours).paint(drawing, legend)
+        Painter(sheet, colours).paint(drawing, legend)
         save(canvas, path, dpi=next((dpi for dpi in DPI if dpi <= most), most), facecolor="white")
 
 
@@ -80,7 +80,7 @@ def _legend(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[Row
     return rows + [Row(sample, "", explanation) for sample, (explanation, is_seen) in signs.items() if is_seen]
 
 
-class _Painter:
+class Painter:
     """Paints on matplotlib axes."""
 
     def __init__(self, sheet: Any, colours: dict[str, str]) -> None:

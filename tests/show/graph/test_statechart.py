@@ -1,0 +1,72 @@
+"""Statecharts: what is drawn of a machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from epicycle.actors import EpicycleError
+from epicycle.runner import load_model
+from epicycle.runner.show.graph import mermaid, statechart, write_graph
+from tests.actors.feeding import load
+
+MODEL = """
+model: m
+composites:
+  Ticking:
+    outputs: [tick]
+    actors: {clock: {type: Clock, period: 1 s}}
+    connections: [clock.output -> tick]
+  It:
+    inputs: [go]
+    outputs: [tick, said]
+    variables: {n: 0}
+    modes:
+      on: {refinement: Ticking, flow: {n: 0.5}, exit: said = n}
+      off: {entry: n = 0}
+      gone: {final: true}
+    transitions:
+      - on -> off preemptive on go
+      - off -> on history priority 2 after 3 s when mode_time < 10 do said = 1; n = n + 1
+      - "* -> gone when n > 4"
+actors: {clock: {type: Clock, period: 1 s}, it: {type: It}}
+connections: [clock.output -> it.go]
+"""
+
+
+def test_text_of_a_machine() -> None:
+    assert mermaid(statechart(load(MODEL), "it")) == (
+        "---\ntitle: it\n---\nstateDiagram-v2\n    [*] --> on\n"
+        "    on: on ⏎ n' = 0.5 ⏎ exit / said = n ⏎ refinement Ticking\n    off: off ⏎ entry / n = 0\n"
+        "    gone --> [*]\n"
+        "    on --> off: preemptive go\n"
+        "    off --> on: history priority 2 after 3.0 s [mode_time < 10] / said = 1, n = n + 1\n"
+        "    on --> gone: [n > 4]\n    off --> gone: [n > 4]\n"
+    )
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
+def test_the_same_machine_gives_the_same_picture(tmp_path: Path, ending: str) -> None:
+    files = [tmp_path / f"{number}.{ending}" for number in range(2)]
+    for file in files:
+        write_graph(statechart(load(MODEL), "it"), file)
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert files[0].stat().st_size > 5_000
+
+
+def test_labels_and_modes_keep_clear_of_each_other(tmp_path: Path) -> None:
+    """No two modes of the packaged machines lie on each other."""
+    for name, path in (("bouncing_modes", "ball"), ("traffic_light", "cars"), ("thermostat", "room")):
+        chart = statechart(load_model(name), path)
+        write_graph(chart, tmp_path / "it.svg")
+        for place, one in enumerate(chart.states):
+            for other in chart.states[place + 1 :]:
+                apart = abs(one.x - other.x) > (one.width + other.width) / 2
+                assert apart or abs(one.y - other.y) > (one.height + other.height) / 2
+
+
+def test_what_has_no_modes_is_told() -> None:
+    with pytest.raises(EpicycleError) as caught:
+        statechart(load(MODEL), "itt")
+    assert str(caught.value) == "itt has no modes, did you mean 'it'?; machines: it"
