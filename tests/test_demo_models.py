@@ -238,3 +238,11 @@ def test_the_lights_are_never_green_for_both_and_pedestrians_wait_as_long_as_was
     greens = [time for time, mode in zip(cars.times, cars.values, strict=True) if mode == "green"]
     # With somebody always there: 30 s of green, 3 s of yellow, 12 s to walk, 4 s to clear, 2 s until it is told.
     assert min(np.diff(greens)) == pytest.approx(30 + 3 + 12 + 4 + 2, abs=1e-6)
+
+
+def test_the_robot_charges_for_what_its_tour_took() -> None:
+    modes = run("searching_robot").signals["robot.mode"]
+    spent = {mode: np.diff(modes.times)[modes.values[:-1] == mode] for mode in ("returning", "charging")}
+    assert len(spent["charging"]) >= 4
+    for back, charge in zip(spent["returning"], spent["charging"], strict=False):
+        assert charge == pytest.approx((0.99 - (0.2 - back / 200)) / 0.05, abs=1e-4)
