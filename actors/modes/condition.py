@@ -29,6 +29,7 @@ class Comparison:
     name: str  # what stands for it in the guard
     difference: Formula
     sign: type[ast.cmpop]
+    names: frozenset[str]  # that it asks for, beside times
     until: tuple[str, Formula, int] | None = None  # a time, when it is to be, and the side from then on
 
     @property
@@ -67,7 +68,8 @@ def condition_of(guard: Formula, moving: Collection[str], numbers: Collection[st
             difference = Formula(f"({written[place]}) - ({written[place + 1]})")
             text = source[parts[place].col_offset : parts[place + 1].end_col_offset]
             until = _until(parts[place], parts[place + 1], written[place : place + 2], moving)
-            stand_ins.append(Comparison(text, name, difference, type(sign), until))
+            asked = frozenset(difference.names) - {*TIMES}
+            stand_ins.append(Comparison(text, name, difference, type(sign), asked, until))
         else:
             found += stand_ins
             text = " and ".join(each.name for each in stand_ins)

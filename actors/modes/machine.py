@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Final, Protocol
 
 from ..core import (
     ABSENT,
-    NEVER,
     EpicycleError,
     InputPort,
     MappingParameter,
@@ -18,20 +17,17 @@ from ..core import (
     Tag,
     Wake,
     did_you_mean,
-    to_nanoseconds,
     to_seconds,
 )
 from ..expression import ExpressionError, Formula, evaluate, operand
 from ..integration import STEPPERS
-from ..solution import sign_of
-from ..trajectory import Trajectory, number_of
-from .condition import TIMES, Comparison, Condition, condition_of, type_of
+from ..trajectory import number_of
+from .borders import Borders
+from .condition import TIMES, Condition, condition_of, type_of
 from .modal import Chart, ModalActor, Rule
 from .text import Action, ModesParameter, TransitionsParameter
 
 _PRESENT: Final = "_is_present"
-_LONGEST: Final = 9e9  # s, of the times that there are
-_STILL: Final = "_still"  # a state that does not move, where guards wait for a time alone
 
 
 class Refinements(Protocol):
@@ -171,7 +167,6 @@ class StateMachine(ModalActor):
                 if rule.guard is not None:
                     found[rule] = condition_of(rule.guard, moving, numbers, taken)
                     taken += len(found[rule].comparisons)
-
         rules = [rule for leaving in self._chart.leaving.values() for rule in leaving]
         self.is_preemptive = any(rule.preemptive for rule in rules)
 
@@ -187,15 +182,14 @@ class StateMachine(ModalActor):
         self._queues: dict[str, deque[Any]] = {name: deque() for name in self._inputs}
         self._tokens: dict[str, Any] = {}  # of the present reaction
         self._entered = self.context.time
-        self._trajectory: Trajectory | None = None
-        self._comparisons: list[Comparison] = []  # for each guard of the trajectory
-        self._deadlines: dict[Comparison, int] = {}  # of those that wait for a time alone: when (ns)
-        self._seen = self.context.time  # when it has fired last
+        self._borders = Borders(
+            self._known,
+            method=self.method,
+            tolerance=(self.relative_tolerance, self.absolute_tolerance),
+            max_step=self.max_step,
+        )
+        self._has_changed = False  # whether a comparison changes now
         self._prepared: Tag | None = None
-        self._open: dict[Comparison, int] = {}  # those that a transition has put on their border: where they came from
-        self._passed: dict[Formula, int] = {}  # what crosses now, and to which side
-        self._before: dict[str, Any] = {}  # variables as they were there
-        self._truths: dict[str, float] = {}  # of the comparisons
         self._wake: Wake | None = None
 
     def preempt(self) -> bool:
@@ -209,15 +203,14 @@ class StateMachine(ModalActor):
         self._take_tokens()
         if self._prepared != self.tag:
             self._prepared = self.tag
-            self._go_on()
+            self._has_changed = self._borders.advance(self.context.time)
         self._hold_tokens()
 
     @property
     def _is_to_react(self) -> bool:
         """Whether there is a reason to: a token, a comparison that changes, a delay that is over, its refinement."""
-        if self._tokens or self._passed or self.is_asked or self.error is not None or self.is_called:
-            return True
-        return any(self._seen < time <= self.context.time for time in self._deadlines.values())
+        is_told = bool(self._tokens) or self.is_asked or self.error is not None
+        return is_told or self._has_changed or self.is_called
 
     def fire(self) -> None:
         self._prepare()
@@ -229,7 +222,7 @@ class StateMachine(ModalActor):
             for name in self.handed:
                 self.outputs[name].send(self._known[name])
         self.finish()
-        self._seen, self.is_asked = self.context.time, False
+        self.is_asked = False
         if self.trigger.present:
             self._tell()
         self._tokens = {}
@@ -237,10 +230,8 @@ class StateMachine(ModalActor):
             self.wake_in(0)
         if self._wake is not None and not self.is_due(self._wake):
             self._wake.cancel()
-        looks = [time for time in self._deadlines.values() if self.context.time < time < NEVER]
-        if self._trajectory is not None and self._comparisons:
-            looks.append(self._trajectory.next_look(self.context.time))
-        self._wake = self.context.wake(self, min(looks)) if looks else None
+        time = self._borders.next_time(self.context.time)
+        self._wake = None if time is None else self.context.wake(self, time)
 
     @property
     def next_time(self) -> int | None:
@@ -263,125 +254,11 @@ class StateMachine(ModalActor):
         }
         self._known |= changed
         if changed:
-            self._find_deadlines()
-            if self._trajectory is not None:
-                self._set_out(self._trajectory, self.context.time, 0.0)
+            self._borders.change(changed.keys(), self.context.time)
 
     def _tell(self) -> None:
         for name in self.variables:
             self.outputs[name].send(self._known[name])
-
-    # -- flows, and comparisons that are events -------------------------------------------------------------------
-
-    def _go_on(self) -> None:
-        """Bring variables and comparisons to the present, or to the crossing that is due."""
-        self._passed, trajectory = {}, self._trajectory
-        self._judge_times()
-        if trajectory is None:
-            return
-        solution, at = trajectory.solution, trajectory.elapsed(self.context.time)
-        if self._comparisons:
-            solution.search(at)
-            crossing = solution.crossing
-            if crossing is not None and trajectory.moment(crossing.time) <= self.context.time:
-                self._cross(trajectory, crossing.time, crossing.sides)
-                return
-        self._keep(trajectory, solution.at(at))
-        self._judge(trajectory, at)
-
-    def _cross(self, trajectory: Trajectory, at: float, sides: Mapping[int, int]) -> None:
-        state = trajectory.solution.at(at)
-        trajectory.solution.rewind(at)
-        self._keep(trajectory, state)
-        for number, side in sides.items():
-            guard, comparison = trajectory.guards[number], self._comparisons[number]
-            self._passed[comparison.difference] = side
-            self._open.pop(comparison, None)
-            guard.side = side
-        self._before = dict(self._known)
-        trajectory.begin_at(at, state)
-        self._judge(trajectory, 0.0)
-
-    def _keep(self, trajectory: Trajectory, state: list[float]) -> None:
-        """Know the variables as they are now."""
-        self._known.update(zip(trajectory.names, state, strict=True))
-
-    def _judge(self, trajectory: Trajectory, at: float) -> None:
-        """Know which comparisons hold."""
-        for comparison, guard in zip(self._comparisons, trajectory.guards, strict=True):
-            side = guard.side
-            if side == 0:
-                side = self._open.get(comparison) or sign_of(guard.value(at, trajectory.solution.at(at)))
-            elif self._open.pop(comparison, side) != side:
-                raise EpicycleError(
-                    f"in mode {self._current!r}, {comparison.source!r} is on its border again at once after a "
-                    "transition that took it off: it may go on so without end (Zeno); leave the mode before"
-                )
-            if comparison.difference in self._passed and comparison.is_equality:
-                side = 0  # which is where it crosses
-            self._truths[comparison.name] = float(comparison.holds(side))
-
-    def _find_deadlines(self) -> None:
-        """When the comparisons change that wait for a time."""
-        for each in self._conditions[self._current].values():
-            for comparison in each.comparisons:
-                if comparison.until is not None:
-                    clock, until, _ = comparison.until
-                    seconds = number_of(until, self._values(until), f"{comparison.source!r}")
-                    at = NEVER if seconds > _LONGEST else to_nanoseconds(seconds)
-                    self._deadlines[comparison] = at + (self._entered if clock == "mode_time" else 0)
-        self._judge_times()
-
-    def _judge_times(self) -> None:
-        now = self.context.time
-        for comparison, time in self._deadlines.items():
-            assert comparison.until is not None
-            side = comparison.until[2] if now >= time else -comparison.until[2]
-            self._truths[comparison.name] = float(
-                comparison.holds(0 if now == time and comparison.is_equality else side)
-            )
-
-    def _set_out(self, trajectory: Trajectory, time: int, fraction: float) -> None:
-        """Begin a solution from what the variables are now, and find the sides of its comparisons."""
-        start = [float(self._known[name]) for name in trajectory.names]
-        trajectory.begin(time, fraction, start)
-        is_moved = any(self._known[name] != self._before.get(name) for name in trajectory.names)
-        for comparison, guard in zip(self._comparisons, trajectory.guards, strict=True):
-            passed = self._passed.get(comparison.difference, 0)
-            guard.side = sign_of(guard.value(0.0, start))
-            if passed and not is_moved:
-                guard.side = passed  # by rounding it may be a hair before its border
-            elif passed and guard.side != -passed:
-                guard.side, self._open[comparison] = 0, -passed  # the solution will show
-        self._judge(trajectory, 0.0)
-
-    def enters(self, mode: str) -> None:
-        self._act(self.modes[mode].entry)
-        origin = self.context.time, 0.0
-        if self._trajectory is not None and self._passed:
-            origin = self._trajectory.time, self._trajectory.fraction
-        self._entered, self._trajectory = self.context.time, None
-        self._open, self._truths, self._deadlines = {}, {}, {}
-        comparisons = [each for one in self._conditions[mode].values() for each in one.comparisons]
-        self._comparisons = [each for each in comparisons if each.until is None]
-        self._find_deadlines()
-        flow = self.modes[mode].flow
-        if mode in self._chart.final or not (flow or self._comparisons):
-            return
-        if not flow:
-            flow = {_STILL: Formula("0")}
-            self._known[_STILL] = 0.0
-        self._trajectory = Trajectory(
-            flow,
-            self._known,
-            {"mode_time": self._entered},
-            method=self.method,
-            tolerance=(self.relative_tolerance, self.absolute_tolerance),
-            max_step=self.max_step,
-        )
-        for each in self._comparisons:
-            self._trajectory.watch(each.difference, f"mode {mode}")
-        self._set_out(self._trajectory, *origin)
 
     # -- guards and actions ---------------------------------------------------------------------------------------
 
@@ -391,6 +268,12 @@ class StateMachine(ModalActor):
     def moves(self, rule: Rule) -> None:
         if self.refinements is not None:
             self.refinements.go(rule.target, history=rule.history)
+
+    def enters(self, mode: str) -> None:
+        self._act(self.modes[mode].entry)
+        self._entered = self.context.time
+        comparisons = [each for one in self._conditions[mode].values() for each in one.comparisons]
+        self._borders.enter(mode, self.modes[mode].flow, comparisons, self._entered)
 
     def leaves(self, mode: str) -> None:
         self._act(self.modes[mode].exit)
@@ -452,8 +335,8 @@ class StateMachine(ModalActor):
             return operand(self._tokens[name])
         if name in self._known:
             return self._known[name]
-        if name in self._truths:
-            return self._truths[name]
+        if name in self._borders.truths:
+            return self._borders.truths[name]
         if name == "time":
             return self.now
         if name == "error" and self.catches:

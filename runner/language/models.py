@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from keyword import iskeyword, kwlist
 from typing import Any
 
@@ -50,6 +49,7 @@ from .fields import (
     schema_of,
 )
 from .fields import NAME as NAME_PATTERN
+from .modes import OF_MODES, machine_of
 from .places import CONNECTIONS, PATTERN_SCHEMA, PATTERNS, POINTCUTS
 
 # -- ports and parameters -----------------------------------------------------------------------------------------
@@ -237,27 +237,6 @@ def _base(reader: NodeReader, node: Node, what: str) -> Text:
     return Text(reader.name(node, what) or "", node.position)
 
 
-_VALUES: Schema = {"type": ["object", "string"]}
-_MODE: Schema = {"type": ["object", "null"], "properties": {"refinement": {"type": ["string", "object"]}}}
-# What a composite class says of its machine, if it has one: parameters of StateMachine, beside refinements.
-OF_MODES = {
-    "modes": Key(
-        node_as({"anyOf": [one_or_more(ref("name")), names_of(_MODE)]}),
-        "The modes of a composite that has no actors but these: a list of names, or 'name: {refinement, flow, entry, "
-        "exit, final}'.",
-    ),
-    "transitions": Key(
-        node_as({"type": "array", "items": {"type": ["string", "object"]}}),
-        "Its transitions, such as 'a -> b on port after 3 s when x > 2 do y = x; n = n + 1', or {from, to, when, ...}.",
-    ),
-    "initial": Key(node_as({"type": "string"}), "The mode in which it begins (default: the first)."),
-    "variables": Key(
-        node_as({"type": ["object", "string"]}), "What its guards and actions know: 'name: value at the start'."
-    ),
-    "held": Key(
-        node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: value before it'."
-    ),
-}
 COMPOSITE = Construct(
     "A composite class: a graph with ports of its own.",
     {
@@ -319,7 +298,7 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
     machine = {key: entries[key] for key in OF_MODES if said.pop(key, None) is not None and key in entries}
     if machine:
         said.setdefault("outputs", {}).setdefault("mode", PortText("mode", position, doc="the mode it has come to"))
-        said |= _machine(reader, name, machine, entries, position)
+        said |= machine_of(reader, name, machine, entries, position)
     inputs, outputs = said.get("inputs", {}), said.get("outputs", {})
     for port in outputs.values():
         if port.name in inputs:
@@ -340,47 +319,6 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
         is_wired=None not in written,
         spoilt=len(problems) > before or (derived and not said["extends"].text),
     )
-
-
-def _machine(
-    reader: NodeReader, name: str, machine: dict[str, Entry], entries: dict[str, Entry], position: Position
-) -> dict[str, Any]:
-    """The machine of a composite with modes, and their refinements."""
-    for key in ("actors", "connections"):
-        if key in entries:
-            hint = "put them into the refinement of a mode, or into a composite around this one"
-            reader.problems.add(f"{name} has modes, and no {key} beside them", entries[key].key.position, hint)
-    refinements: dict[str, PartText] = {}
-    modes = machine.get("modes")
-    if modes is not None and isinstance(modes.value, Mapping):
-        left = {}
-        for mode, entry in modes.value.entries.items():
-            left[mode] = entry
-            if isinstance(entry.value, Mapping):
-                valid = (*declared_parameters(_mode()), "refinement")
-                inner = dict(reader.entries(entry.value, f"mode {mode!r}", valid) or {})
-                said = inner.pop("refinement", None)
-                refinement = None if said is None else _refinement(reader, mode, said)
-                if refinement is not None:
-                    refinements[mode] = refinement
-                left[mode] = replace(entry, value=replace(entry.value, entries=inner))
-        machine["modes"] = replace(modes, value=replace(modes.value, entries=left))
-    kind = Text("StateMachine", position)
-    return {"machine": PartText("machine", position, kind, machine), "refinements": refinements}
-
-
-def _mode() -> type:
-    from epicycle.actors import Mode  # with all that solves differential equations, which takes a while
-
-    return Mode
-
-
-def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | None:
-    """A composite class by its name, or as an actor's entry with its parameters."""
-    if isinstance(entry.value, Mapping):
-        return part(reader, mode, entry, "actor")
-    kind = reader.name(entry.value, f"the refinement of {mode}")
-    return None if kind is None else PartText(mode, entry.key.position, Text(kind, entry.value.position))
 
 
 COMPOSITES = Key(named(ref("composite"), _composite), "Composite classes, for the types of actors.")

@@ -1,0 +1,78 @@
+"""Composites with modes: what they say of their machine, and of the refinements of its modes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from epicycle.actors import declared_parameters
+
+from ..text import Entry, Mapping, NodeReader, Position, Text
+from .declarations import PartText
+from .fields import AT, Key, Schema, names_of, node_as, one_or_more, ref
+
+_VALUES: Schema = {"type": ["object", "string"]}
+_MODE: Schema = {"type": ["object", "null"], "properties": {"refinement": {"type": ["string", "object"]}}}
+# What a composite class says of its machine, if it has one: parameters of StateMachine, beside refinements.
+OF_MODES = {
+    "modes": Key(
+        node_as({"anyOf": [one_or_more(ref("name")), names_of(_MODE)]}),
+        "The modes of a composite that has no actors but these: a list of names, or 'name: {refinement, flow, entry, "
+        "exit, final}'.",
+    ),
+    "transitions": Key(
+        node_as({"type": "array", "items": {"type": ["string", "object"]}}),
+        "Its transitions, such as 'a -> b on port after 3 s when x > 2 do y = x; n = n + 1', or {from, to, when, ...}.",
+    ),
+    "initial": Key(node_as({"type": "string"}), "The mode in which it begins (default: the first)."),
+    "variables": Key(
+        node_as({"type": ["object", "string"]}), "What its guards and actions know: 'name: value at the start'."
+    ),
+    "held": Key(
+        node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: value before it'."
+    ),
+}
+
+
+def machine_of(
+    reader: NodeReader, name: str, machine: dict[str, Entry], entries: dict[str, Entry], position: Position
+) -> dict[str, Any]:
+    """The machine of a composite with modes, and their refinements."""
+    for key in ("actors", "connections"):
+        if key in entries:
+            hint = "put them into the refinement of a mode, or into a composite around this one"
+            reader.problems.add(f"{name} has modes, and no {key} beside them", entries[key].key.position, hint)
+    refinements: dict[str, PartText] = {}
+    modes = machine.get("modes")
+    if modes is not None and isinstance(modes.value, Mapping):
+        left = {}
+        for mode, entry in modes.value.entries.items():
+            left[mode] = entry
+            if isinstance(entry.value, Mapping):
+                valid = (*declared_parameters(_mode()), "refinement")
+                inner = dict(reader.entries(entry.value, f"mode {mode!r}", valid) or {})
+                said = inner.pop("refinement", None)
+                refinement = None if said is None else _refinement(reader, mode, said)
+                if refinement is not None:
+                    refinements[mode] = refinement
+                left[mode] = replace(entry, value=replace(entry.value, entries=inner))
+        machine["modes"] = replace(modes, value=replace(modes.value, entries=left))
+    kind = Text("StateMachine", position)
+    return {"machine": PartText("machine", position, kind, machine), "refinements": refinements}
+
+
+def _mode() -> type:
+    from epicycle.actors import Mode  # with all that solves differential equations, which takes a while
+
+    return Mode
+
+
+def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | None:
+    """A composite class by its name, or as ``{type: ..., <parameter>: ...}``."""
+    values = dict(entry.value.entries) if isinstance(entry.value, Mapping) else {}
+    said = values.pop("type", None) if isinstance(entry.value, Mapping) else entry
+    if said is None:
+        reader.problems.add(f"the refinement of {mode!r} has no type", entry.key.position, "add 'type: ...'")
+        return None
+    kind: Text | None = AT.read(reader, said.value, f"the refinement of {mode!r}")
+    return None if kind is None else PartText(mode, entry.key.position, kind, values)
