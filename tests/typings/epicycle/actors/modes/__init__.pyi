@@ -1,0 +1,1 @@
+from actors.modes import *
