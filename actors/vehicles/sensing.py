@@ -13,6 +13,7 @@ from ..robotics import BodyState
 from .pose import Pose
 
 _TURN: Final = 2.0 * math.pi
+_EDGE: Final = 1e-9  # of a wall's length, so that no beam slips through where two walls meet
 
 
 class RangeBearingSensor(Actor):
@@ -145,7 +146,7 @@ def _to_wall(dx: float, dy: float, ax: float, ay: float, ex: float, ey: float) -
         return math.inf
     distance = (ax * ey - ay * ex) / across
     share = (ax * dy - ay * dx) / across
-    return distance if distance >= 0.0 and 0.0 <= share <= 1.0 else math.inf
+    return distance if distance >= 0.0 and -_EDGE <= share <= 1.0 + _EDGE else math.inf
 
 
 def _to_disc(dx: float, dy: float, cx: float, cy: float, radius: float) -> float:
