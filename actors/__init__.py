@@ -46,7 +46,7 @@ from .sinks import Display, Histogram, Recorder, Stop, Test
 from .sources import Clock, Const, CurrentMicrostep, CurrentTime, PoissonClock, Ramp, Random, Sequence, SingleEvent
 from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
-from .vehicles import Ackermann, InertialSensor, Lidar, Pose, RangeBearingSensor, Unicycle, WaypointFollower
+from .vehicles import Ackermann, InertialSensor, Pose, RangeBearingSensor, RangeScanner, Unicycle, WaypointFollower
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",
@@ -56,20 +56,20 @@ __all__ = [
     "DeadZone", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter",
     "EpicycleError", "Estimate", "Exponential", "Expression", "FilterDesign", "FilterError", "FilterPyEstimator",
     "FirstOrder", "Function", "Gamma", "GoalMonitor", "Histogram", "InertialSensor", "Inform", "InputPort",
-    "Integrator", "Latest", "Lidar", "Limiter", "Line", "LogNormal", "LogicGate", "LookupTable", "Machine",
-    "MappingParameter", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent",
-    "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort", "Parameter",
-    "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter", "Pose", "Process", "Quantity",
-    "Quantizer", "Queue", "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "Ranks", "ReachGoal", "Recorder",
-    "Relay", "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale",
-    "Select", "Sensor", "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "StateMachine",
-    "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer",
-    "Times", "TransferFunction", "Triangular", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Vehicle",
-    "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
-    "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
-    "elementary", "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
-    "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
-    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
-    "visible_character", "visible_lines",
+    "Integrator", "Latest", "Limiter", "Line", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter",
+    "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent", "MovingAverage",
+    "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort", "Parameter", "ParameterError", "Pending",
+    "Plan", "PoissonClock", "PortError", "PortParameter", "Pose", "Process", "Quantity", "Quantizer", "Queue", "Ramp",
+    "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "Recorder", "Relay",
+    "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select",
+    "Sensor", "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "StateMachine", "StateSpace",
+    "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times",
+    "TransferFunction", "Triangular", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Vehicle", "Wake",
+    "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert",
+    "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "has_own_ports", "irregular", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share",
+    "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular",
+    "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds",
+    "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
+    "visible_lines",
 ]  # fmt: skip

@@ -166,11 +166,11 @@ class StateSpace(_LinearSystem):
         size = len(a)
         _check_shape("a", a, (size, size), "it is square")
         width = len(b[0]) if b else 0
-        _check_shape("b", b, (size, max(width, 1)), f"it has a row for each of {counted(size, 'state')}")
+        _check_shape("b", b, (size, max(width, 1)), f"a row for each of {counted(size, 'state')}")
         c = [[float(i == j) for j in range(size)] for i in range(size)] if self.c is None else _rows("c", self.c)
-        _check_shape("c", c, (max(len(c), 1), size), f"it has a column for each of {counted(size, 'state')}")
+        _check_shape("c", c, (max(len(c), 1), size), f"a column for each of {counted(size, 'state')}")
         d = [[0.0] * width for _ in c] if self.d is None else _rows("d", self.d)
-        _check_shape("d", d, (len(c), width), "it has a row for each output and a column for each input")
+        _check_shape("d", d, (len(c), width), "a row for each output and a column for each input")
         return a, b, c, d
 
     def _start(self) -> tuple[Vector, Vector]:
@@ -248,7 +248,7 @@ def _rows(name: str, values: Any) -> Matrix:
 def _check_shape(name: str, rows: Matrix, shape: tuple[int, int], wanted: str) -> None:
     lengths = {len(row) for row in rows} or {0}
     if len(rows) != shape[0] or lengths != {shape[1]}:
-        raise ParameterError(f"{name}: it is {len(rows)} x {max(lengths)}, where {wanted}: {shape[0]} x {shape[1]}")
+        raise ParameterError(f"{name}: {len(rows)} x {max(lengths)}, expected {shape[0]} x {shape[1]}: {wanted}")
 
 
 def _vector(name: str, values: Any, length: int, noun: str) -> Vector:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
 
 from ..core import (
     Actor,
@@ -16,6 +17,20 @@ from ..core import (
 )
 from ..core.elementary import exp, expm1
 from ..readings import finite_number
+
+
+# What the gains are called elsewhere.
+_REFUSED = {
+    symbol: f"PID has no parameter {symbol!r}: {where}"
+    for symbols, where in {
+        ("kp", "Kp", "p", "P", "gain"): "the gain is 'proportional'",
+        ("ki", "Ki", "i", "I"): "the gain of the integral part is 'integral'",
+        ("kd", "Kd", "d", "D"): "the gain of the derivative part is 'derivative'",
+        ("ti", "Ti"): "give 'integral', which is proportional / Ti",
+        ("td", "Td"): "give 'derivative', which is proportional * Td",
+    }.items()
+    for symbol in symbols
+}
 
 
 class _Sample(NamedTuple):
@@ -46,6 +61,8 @@ class PID(Actor):
     Source: K. J. Åström and T. Hägglund, Advanced PID Control, 2006, chapters 3 and 13; K. J. Åström and B. Wittenmark,
     Computer-Controlled Systems, 3rd ed., table 8.1.  Ptolemy: ``PID``.
     """
+
+    refused: ClassVar[Mapping[str, str]] = _REFUSED
 
     measurement = InputPort(float, doc="y; an output is sent for each")
     feedforward = InputPort(float, required=False, triggers=False, doc="added to the output from the next one on")

@@ -3,6 +3,6 @@
 from .following import WaypointFollower
 from .motion import Ackermann, Unicycle
 from .pose import Pose
-from .sensing import InertialSensor, Lidar, RangeBearingSensor
+from .sensing import InertialSensor, RangeBearingSensor, RangeScanner
 
-__all__ = ["Ackermann", "InertialSensor", "Lidar", "Pose", "RangeBearingSensor", "Unicycle", "WaypointFollower"]
+__all__ = ["Ackermann", "InertialSensor", "Pose", "RangeBearingSensor", "RangeScanner", "Unicycle", "WaypointFollower"]

@@ -1,4 +1,4 @@
-"""What vehicles measure: RangeBearingSensor, Lidar and InertialSensor."""
+"""What vehicles measure: RangeBearingSensor, RangeScanner and InertialSensor."""
 
 from __future__ import annotations
 
@@ -68,11 +68,12 @@ def wrapped(angle: float) -> float:
     return angle - _TURN * math.floor((angle + math.pi) / _TURN)
 
 
-class Lidar(Actor):
-    """Measures how far it is to what stands around, along beams from the vehicle's position, with normal noise.
+class RangeScanner(Actor):
+    """A lidar in the plane: how far it is to what stands around, along beams from the vehicle's position, with noise.
 
     The beams are evenly spread over the field of view, from the right to the left; over a full turn, the first one
-    points backwards.  A beam ends at the nearest wall, disc or body, or at ``max_range``, which it then tells.
+    points backwards.  A beam ends at the nearest wall, disc or body, or at ``max_range``, which it then tells.  The
+    noise is normal, and independent from beam to beam.
     Source: S. Thrun, W. Burgard and D. Fox, Probabilistic Robotics, 2005, section 6.3.
     """
 

@@ -270,14 +270,14 @@ def test_a_step_takes_the_input_of_its_own_time() -> None:
 @pytest.mark.parametrize(
     ("kind", "parameters", "message"),
     [
-        (StateSpace, {"a": [[1, 2]], "b": [[1]]}, "a: it is 1 x 2, where it is square: 1 x 1"),
+        (StateSpace, {"a": [[1, 2]], "b": [[1]]}, "a: 1 x 2, expected 1 x 1: it is square"),
         (StateSpace, {"a": [[1, 2], [3]], "b": [[1]]},
          "it: StateSpace.a: [[1, 2], [3]] is no matrix: its rows are not equally long"),
-        (StateSpace, {"a": [[0]], "b": [[1], [1]]}, "b: it is 2 x 1, where it has a row for each of 1 state: 1 x 1"),
+        (StateSpace, {"a": [[0]], "b": [[1], [1]]}, "b: 2 x 1, expected 1 x 1: a row for each of 1 state"),
         (StateSpace, {"a": [[0]], "b": [[1]], "c": [[1, 2]]},
-         "c: it is 1 x 2, where it has a column for each of 1 state: 1 x 1"),
+         "c: 1 x 2, expected 1 x 1: a column for each of 1 state"),
         (StateSpace, {"a": [[0]], "b": [[1]], "d": [[1], [2]]},
-         "d: it is 2 x 1, where it has a row for each output and a column for each input: 1 x 1"),
+         "d: 2 x 1, expected 1 x 1: a row for each output and a column for each input"),
         (StateSpace, {"a": [[0]], "b": [[1]], "initial": [1, 2]}, "initial: 2 numbers for 1 state"),
         (StateSpace, {"a": [[0]], "b": [[1]], "held": [1, 2]}, "held: 2 numbers for 1 input"),
         (StateSpace, {"a": [[math.inf]], "b": [[1]]}, "a: [inf] are not all finite"),

@@ -39,13 +39,13 @@ actors:
   car: {type: Ackermann}
   robot: {type: Unicycle, start: [0, 5], speed: 1, turn_rate: 0.3}
   guide: {type: WaypointFollower, waypoints: [[8, 0], [8, 8], [0, 8], [0, 0]], closed: true, wheelbase: 2.5}
-  lidar: {type: Lidar, beams: 8, deviation: 0.1, walls: [[-9, -9, 9, -9]]}
+  scanner: {type: RangeScanner, beams: 8, deviation: 0.1, walls: [[-9, -9, 9, -9]]}
   bearing: {type: RangeBearingSensor, bearing_deviation: 0.1, range_deviation: 0.1}
   imu: {type: InertialSensor, turn_rate_noise: 0.01, turn_rate_walk: 0.01, acceleration_walk: 0.1}
 connections:
   - clock.output -> car.trigger, robot.trigger
-  - car.pose -> guide.pose, lidar.pose, bearing.pose, imu.pose
-  - robot.pose -> lidar.bodies, bearing.target
+  - car.pose -> guide.pose, scanner.pose, bearing.pose, imu.pose
+  - robot.pose -> scanner.bodies, bearing.target
   - guide.speed -> car.speed
   - guide.steering -> car.steering
 run: {stop: 20 s, record: ["**"]}

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.actors import BodyState, InertialSensor, Lidar, ParameterError, RangeBearingSensor
+from epicycle.actors import BodyState, InertialSensor, ParameterError, RangeBearingSensor, RangeScanner
 from epicycle.actors.testing import Harness
 from epicycle.runner import ActorError
 from epicycle.runner.engine import Simulation
@@ -100,7 +100,7 @@ ROOM = [[-5, -3, 5, -3], [5, -3, 5, 3], [5, 3, -5, 3], [-5, 3, -5, -3]]
 @settings(deadline=None, max_examples=50)
 @given(st.floats(-4.5, 4.5), st.floats(-2.5, 2.5), st.floats(-7, 7))
 def test_beams_in_a_room_end_at_its_walls(x: float, y: float, heading: float) -> None:
-    harness = Harness(Lidar("it", beams=24, walls=ROOM, max_range=20))
+    harness = Harness(RangeScanner("it", beams=24, walls=ROOM, max_range=20))
     harness.fire(0.0, pose=pose(x, y, heading))
     found = harness.last("ranges")
     angles = heading - math.pi + 2 * math.pi * np.arange(24) / 24
@@ -116,7 +116,7 @@ def test_beams_in_a_room_end_at_its_walls(x: float, y: float, heading: float) ->
 @given(st.floats(-8, 8), st.floats(-8, 8), st.floats(0.1, 3))
 def test_beams_end_at_discs(cx: float, cy: float, radius: float) -> None:
     """By steps along the beam: the first place within the disc."""
-    harness = Harness(Lidar("it", beams=13, field_of_view="180 deg", discs=[[cx, cy, radius]], max_range=10))
+    harness = Harness(RangeScanner("it", beams=13, field_of_view="180 deg", discs=[[cx, cy, radius]], max_range=10))
     harness.fire(0.0, pose=pose(0.0, 0.0, 0.3))
     along = np.linspace(0, 10, 20_001)
     for found, angle in zip(harness.last("ranges"), 0.3 + np.linspace(-math.pi / 2, math.pi / 2, 13), strict=True):
@@ -128,7 +128,7 @@ def test_beams_end_at_discs(cx: float, cy: float, radius: float) -> None:
 
 
 def test_bodies_move_and_hide_what_is_behind() -> None:
-    harness = Harness(Lidar("it", beams=1, walls=[[9, -1, 9, 1]], body_radius=1), widths={"bodies": 2})
+    harness = Harness(RangeScanner("it", beams=1, walls=[[9, -1, 9, 1]], body_radius=1), widths={"bodies": 2})
     harness.fire(0.0, pose=pose(0, 0))
     harness.fire(1.0, pose=pose(0, 0), bodies=[body(5, 0), None])
     harness.fire(2.0, pose=pose(0, 0), bodies=[None, body(3, 0)])
@@ -137,13 +137,13 @@ def test_bodies_move_and_hide_what_is_behind() -> None:
 
 
 def test_beams_have_independent_noise_and_nothing_beyond_the_range() -> None:
-    harness = Harness(Lidar("it", beams=2, field_of_view=0.2, walls=[[5, -9, 5, 9]], deviation=0.1, max_range=6))
+    harness = Harness(RangeScanner("it", beams=2, field_of_view=0.2, walls=[[5, -9, 5, 9]], deviation=0.1, max_range=6))
     for k in range(3000):
         harness.fire(float(k), pose=pose(0, 0))
     found = np.array(harness.tokens("ranges")) - 5 / math.cos(0.1)
     assert found.std(axis=0) == pytest.approx([0.1, 0.1], rel=4 / math.sqrt(6000))
     assert abs(np.corrcoef(found.T)[0, 1]) < 4 / math.sqrt(3000)
-    far = Harness(Lidar("it", beams=3, deviation=1.0, max_range=6))
+    far = Harness(RangeScanner("it", beams=3, deviation=1.0, max_range=6))
     far.fire(0.0, pose=pose(0, 0))
     assert far.last("ranges").tolist() == [6.0, 6.0, 6.0]
 
@@ -153,12 +153,12 @@ def test_beams_have_independent_noise_and_nothing_beyond_the_range() -> None:
     [
         ({"max_range": math.inf}, "max_range: it is infinite, and a beam that ends nowhere would be, too"),
         ({"discs": [[0, 0, -1]]}, "discs: a radius is negative"),
-        ({"walls": [[0, 0, 1]]}, "it: Lidar.walls: [[0, 0, 1]] is not a list of n x 4 numbers in m"),
+        ({"walls": [[0, 0, 1]]}, "it: RangeScanner.walls: [[0, 0, 1]] is not a list of n x 4 numbers in m"),
     ],
 )
 def test_scanners_that_are_none(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        Lidar("it", **parameters)
+        RangeScanner("it", **parameters)
     assert str(caught.value) == message
 
 
