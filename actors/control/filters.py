@@ -77,7 +77,7 @@ class DiscreteFilter(Actor):
     ``a0 y[k] = b0 u[k] + b1 u[k-1] + ... - a1 y[k-1] - ...`` with ``numerator`` b and ``denominator`` a, as in
     ``scipy.signal.lfilter``.  Without a denominator it is a FIR filter: ``numerator: [0.25, 0.5, 0.25]``.  In place of
     them, a ``design`` says what the filter is to do: ``{type: Butterworth, cutoff: 5 Hz, period: 10 ms}``.  Direct form
-    II transposed (Oppenheim and Schafer, section 6.3).  Ptolemy: ``IIR``, ``FIR``, ``RecursiveFilter``.
+    II transposed (Oppenheim and Schafer, section 6.3).  Ptolemy: ``IIR``, ``FIR``.
     """
 
     input = InputPort(float, doc="the samples")

@@ -18,7 +18,6 @@ from ..core import (
 from ..core.elementary import exp, expm1
 from ..readings import finite_number
 
-
 # What the gains are called elsewhere.
 _REFUSED = {
     symbol: f"PID has no parameter {symbol!r}: {where}"
@@ -47,8 +46,8 @@ class PID(Actor):
     ``u = P + I + D + feedforward``, cut off at ``low`` and ``high``, with ``P = Kp (b r - y)``, ``dI/dt = Ki (r - y)``
     and ``D = Kd d(c r - y)/dt`` behind a lag of ``filter_time``; r is the setpoint, y the measurement.  From a gain K
     and times Ti and Td: ``proportional: K``, ``integral: K / Ti``, ``derivative: K * Td``.  Measurements may come at
-    any times: the error holds from one to the next for I, and the signal runs straight from one to the next for D
-    (ramp equivalence), which is right for any lag, none included.
+    any times: the error holds from one to the next for I, unless ``integration`` says ``trapezoid``, and the signal runs
+    straight from one to the next for D (ramp equivalence), which is right for any lag, none included.
 
     Anti-windup: with ``clamping`` I stands still while it drives the output further beyond a limit; with
     ``back_calculation`` it is drawn back with ``tracking_time``, so that the output returns to the limit.  What the
@@ -71,10 +70,14 @@ class PID(Actor):
     manual = InputPort(
         float, required=False, triggers=False, doc="the output while it does not; the last one until a token comes"
     )
+    reset = InputPort(
+        required=False, triggers=False, doc="sets I back and forgets the slope, before the measurement of the tag"
+    )
     output = OutputPort(
         float,
         depends_on=(
-            "measurement", "setpoint", "feedforward", "automatic", "manual", "proportional", "integral", "derivative",
+            "measurement", "setpoint", "feedforward", "automatic", "manual", "reset",
+            "proportional", "integral", "derivative",
         ),
         doc="u, for each measurement",
     )  # fmt: skip
@@ -84,6 +87,9 @@ class PID(Actor):
     proportional = PortParameter(float, 1.0, doc="Kp")
     integral = PortParameter(float, 0.0, doc="Ki, in 1/s times the unit of Kp")
     derivative = PortParameter(float, 0.0, doc="Kd, in s times the unit of Kp")
+    integration = Parameter(
+        str, "hold", choices=("hold", "trapezoid"), doc="what the error does between two measurements, for I"
+    )
     filter_time = Parameter(float, 0.0, unit="s", min=0, doc="time constant of the lag behind the derivative")
     setpoint_weight = Parameter(float, 1.0, unit="1", doc="b, the share of the setpoint in the proportional part")
     derivative_weight = Parameter(float, 0.0, unit="1", doc="c, the share of the setpoint in the derivative part")
@@ -97,7 +103,7 @@ class PID(Actor):
         float, None, unit="s", min=0,
         doc="time constant of back_calculation; sqrt(Kd / Ki) if left out, or Kp / Ki without Kd",
     )  # fmt: skip
-    initial = Parameter(float, 0.0, doc="I at the start")
+    initial = Parameter(float, 0.0, doc="I at the start and after a reset")
 
     def check(self) -> None:
         if self.low > self.high:
@@ -106,7 +112,6 @@ class PID(Actor):
             raise ParameterError(f"tracking_time: it goes with anti_windup: back_calculation, not {self.anti_windup}")
 
     def initialize(self) -> None:
-        self._sum = self.initial  # I
         self._gains = self._present_gains()
         self._measured = self._error = 0.0
         self._weighted = 0.0  # b r - y, of the latest measurement
@@ -115,7 +120,12 @@ class PID(Actor):
         self._done: float | None = None  # what the actuator does
         self._given: float | None = None  # by hand
         self._is_automatic = True
+        self._forget()
+
+    def _forget(self) -> None:
+        self._sum = self.initial  # I
         self._since: int | None = None  # up to when the error has been added up
+        self._weight = 0.0  # of the next error in I, less that of the one before, if it runs straight between them
         self._latest: _Sample | None = None
         self._before: _Sample | None = None  # the latest one of an earlier time
 
@@ -123,6 +133,8 @@ class PID(Actor):
         return self.proportional, self.integral, self.derivative
 
     def fire(self) -> None:
+        if self.reset.present:
+            self._forget()
         self._add_up()
         if self.feedforward.present:
             self._added = finite_number(self.feedforward, self.feedforward.value)
@@ -152,6 +164,8 @@ class PID(Actor):
         if self.anti_windup == "clamping" and excess * growth > 0.0:
             return
         self._sum += growth * elapsed
+        if self.integration == "trapezoid":
+            self._weight += 0.5 * self._gains[1] * elapsed
         if self.anti_windup == "back_calculation" and excess != 0.0:
             lag = self._tracking_time()
             self._sum -= excess * (1.0 if lag == 0.0 else -expm1(-elapsed / lag))
@@ -166,8 +180,9 @@ class PID(Actor):
 
     def _control(self, measured: float) -> None:
         setpoint = self.setpoint
-        self._measured = measured
-        self._error = setpoint - measured
+        error = setpoint - measured
+        self._sum += self._weight * (error - self._error)
+        self._measured, self._error, self._weight = measured, error, 0.0
         self._weighted = self.setpoint_weight * setpoint - measured
         rest = self._gains[0] * self._weighted + self._derived(self.derivative_weight * setpoint - measured)
         rest += self._added

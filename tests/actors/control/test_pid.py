@@ -54,6 +54,26 @@ def test_each_part_is_what_the_signal_makes_of_it(irregular: bool) -> None:
     assert found.tokens("error") == pytest.approx(errors.tolist(), abs=0)
 
 
+def test_the_error_may_run_straight_from_sample_to_sample() -> None:
+    """As in Ptolemy, where the input is the error: Kp e + Ki (sum of trapezoids) + Kd (difference quotient)."""
+    measured = samples(40, seed=2)
+    found = control(
+        inputs={"measurement": measured},
+        proportional=-2, integral=-0.5, derivative=-0.3, setpoint=0, integration="trapezoid",
+    )  # fmt: skip
+    times, errors = np.array([t for t, _ in measured]), np.array([x for _, x in measured])
+    steps = np.diff(times)
+    total = np.concatenate([[0.0], np.cumsum((errors[1:] + errors[:-1]) / 2 * steps)])
+    slope = np.concatenate([[0.0], np.diff(errors) / steps])
+    assert found.tokens("output") == pytest.approx((2 * errors + 0.5 * total + 0.3 * slope).tolist(), abs=1e-12)
+
+
+def test_a_reset_sets_it_back_before_the_measurement() -> None:
+    inputs = {"measurement": [(float(k), 0.0) for k in range(6)], "reset": [(2.5, 0), (4.0, 0)]}
+    found = control(inputs=inputs, setpoint=1, proportional=0, integral=1, initial=10)
+    assert found.tokens("output") == [10.0, 11.0, 12.0, 10.0, 10.0, 11.0]
+
+
 def test_without_a_lag_the_derivative_is_the_slope() -> None:
     found = control(inputs={"measurement": [(0.0, 0.0), (0.5, 1.0), (2.0, -2.0)]}, proportional=0, derivative=3)
     assert found.tokens("output") == [0.0, -6.0, 6.0]
