@@ -28,6 +28,7 @@ from ..core.elementary import total
 from ..readings import finite_numbers
 from .matrices import Exponential, Matrix, Vector, applied
 
+_LARGEST: Final = 100  # states and inputs of one system, whose exponential takes a second then
 _KEPT: Final = 64  # solutions for times between events, which are mostly the same few
 
 
@@ -63,6 +64,11 @@ class _LinearSystem(Actor):
         if not self.sampled:
             # C. F. Van Loan, Computing Integrals Involving the Matrix Exponential, IEEE Trans. Automat. Contr. 23
             # (1978): the exponential of [A B; 0 0] also holds what a constant input does.
+            if len(self._a) + self._width > _LARGEST:
+                raise ParameterError(
+                    f"{counted(len(self._a), 'state')} and {counted(self._width, 'input')} are more than {_LARGEST} "
+                    "together: their exponentials would take long; give several systems, or 'sampled' ones"
+                )
             whole = [[*row, *more] for row, more in zip(self._a, self._b, strict=True)]
             self._growth = Exponential([*whole, *([[0.0] * (len(whole) + self._width)] * self._width)])
 
@@ -86,7 +92,7 @@ class _LinearSystem(Actor):
             given = self._used if self.sampled else self._held
             direct = applied(self._d, given)
             found = [one + two for one, two in zip(applied(self._c, state), direct, strict=True)]
-            self.output.send(found[0] if len(found) == 1 else np.array(found))
+            self.output.send(found[0] if len(found) == 1 else _read_only(found))
 
     def _take(self, given: Vector, now: int) -> None:
         """Let an input act from now on."""
@@ -118,6 +124,12 @@ class _LinearSystem(Actor):
         if all(map(math.isfinite, state)):
             return state
         raise EpicycleError("the state has grown beyond all numbers: the system is unstable, end the run before")
+
+
+def _read_only(numbers: Vector) -> Any:
+    array = np.array(numbers)
+    array.setflags(write=False)
+    return array
 
 
 def _type(width: int) -> Any:

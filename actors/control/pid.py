@@ -46,8 +46,8 @@ class PID(Actor):
     ``u = P + I + D + feedforward``, cut off at ``low`` and ``high``, with ``P = Kp (b r - y)``, ``dI/dt = Ki (r - y)``
     and ``D = Kd d(c r - y)/dt`` behind a lag of ``filter_time``; r is the setpoint, y the measurement.  From a gain K
     and times Ti and Td: ``proportional: K``, ``integral: K / Ti``, ``derivative: K * Td``.  Measurements may come at
-    any times: the error holds from one to the next for I, unless ``integration`` says ``trapezoid``, and the signal runs
-    straight from one to the next for D (ramp equivalence), which is right for any lag, none included.
+    any times: from one to the next the error holds for I, unless ``integration`` says ``trapezoid``, and the signal
+    runs straight for D (ramp equivalence), which is right for any lag, none included.
 
     Anti-windup: with ``clamping`` I stands still while it drives the output further beyond a limit; with
     ``back_calculation`` it is drawn back with ``tracking_time``, so that the output returns to the limit.  What the

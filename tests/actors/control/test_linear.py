@@ -288,6 +288,9 @@ def test_a_step_takes_the_input_of_its_own_time() -> None:
          "denominator: its first coefficient, that of the highest power, may not be 0 or missing"),
         (TransferFunction, {"denominator": []},
          "denominator: its first coefficient, that of the highest power, may not be 0 or missing"),
+        (TransferFunction, {"denominator": [1.0] * 101},
+         ("100 states and 1 input are more than 100 together: their exponentials would take long; "
+          "give several systems, or 'sampled' ones")),
         (TransferFunction, {"denominator": [1, 1], "initial": [1, 2]}, "initial: 2 values for a system of order 1"),
     ],
 )  # fmt: skip
@@ -319,4 +322,5 @@ def test_one_number_goes_in_and_out_bare_and_several_as_arrays() -> None:
     )
     (state,) = tokens(sent)
     assert state.tolist() == [1.0, 2.0]
+    assert not state.flags.writeable
     assert StateSpace("s", a=[[0]], b=[[1]]).output.type is float

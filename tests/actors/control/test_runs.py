@@ -131,3 +131,17 @@ def test_packaged_loops_may_be_interrupted(name: str) -> None:
     simulation.advance(3.0)
     other = simulation.fork()
     assert simulation.run().digest == other.run().digest == Simulation(model).run().digest
+
+
+def test_aspects_alter_poses_as_they_do_other_tokens() -> None:
+    aspects = """
+aspects:
+  compass: {type: Bias, by: 0.25, fields: heading, at: car.pose}
+  rain: {type: Noise, deviation: 0.5, at: robot.pose}
+  stuck: {type: StuckAt, p: 0.2, r: 0.2, at: robot.pose}
+"""
+    clean, wrong = (Simulation(load(VEHICLES + each), seed=2).run() for each in ("", aspects))
+    before, after = (each.signals["car.pose"].tokens[0] for each in (clean, wrong))
+    assert (after.heading, after.position.tolist()) == (before.heading + 0.25, before.position.tolist())
+    assert [each.time for each in wrong.signals["robot.pose"].tokens] == [k / 10 for k in range(201)]
+    assert wrong.aspects["stuck"]["replaced"] > 50
