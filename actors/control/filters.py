@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..core import Actor, Configurable, InputPort, OutputPort, Parameter, ParameterError, array_parameter
+from ..core import Actor, Configurable, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, array_parameter
 from ..core.elementary import expm1, sin, tan, total
 from ..readings import finite_number
 from .linear import polynomials
@@ -124,6 +124,8 @@ class DiscreteFilter(Actor):
                 self._memories = self._first(sample)
             for (above, below), memory in zip(self._sections, self._memories, strict=True):
                 sample = _filtered(sample, above, below, memory)
+            if not math.isfinite(sample):
+                raise EpicycleError("what comes out has grown beyond all numbers: the filter is unstable")
             self.output.send(sample)
 
     def _first(self, sample: float) -> list[Vector]:

@@ -11,7 +11,7 @@ import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.actors import Butterworth, DiscreteFilter, FirstOrder, ParameterError
+from epicycle.actors import Butterworth, DiscreteFilter, EpicycleError, FirstOrder, ParameterError
 from epicycle.actors.testing import Harness
 
 SAMPLES = np.random.default_rng(0).normal(size=200).cumsum().tolist()
@@ -94,6 +94,12 @@ def test_a_reset_begins_anew_and_tokens_of_one_tag_are_taken_in_turn() -> None:
     harness = Harness(DiscreteFilter("it", numerator=[1], denominator=[1, -1]))
     harness.run(5.0, input=[(0.0, 1), (0.0, 2), (1.0, 3), (2.0, 4)], reset=[(1.0, 0), (3.0, 0)])
     assert harness.sent["output"] == [(0.0, 1.0), (0.0, 3.0), (1.0, 3.0), (2.0, 7.0)]
+
+
+def test_what_is_unstable_grows_until_it_cannot() -> None:
+    assert filtered([1.0] * 11, denominator=[1, -(2.0**100)])[-1] == pytest.approx(2.0**1000)
+    with pytest.raises(EpicycleError, match=r"^what comes out has grown beyond all numbers: the filter is unstable$"):
+        filtered([1.0] * 12, denominator=[1, -(2.0**100)])
 
 
 @pytest.mark.parametrize(
