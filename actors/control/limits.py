@@ -1,4 +1,4 @@
-"""What signals go through that is not linear: Limiter, Quantizer, DeadZone and Relay."""
+"""What signals go through that is not linear: Limiter, Quantizer, DeadZone and Hysteresis."""
 
 from __future__ import annotations
 
@@ -102,10 +102,10 @@ class DeadZone(Actor):
             self.output.send(value - min(max(value, self.low), self.high))
 
 
-class Relay(Actor):
-    """Switches on when a signal reaches one value, and off when it falls to another: hysteresis, a Schmitt trigger.
+class Hysteresis(Actor):
+    """Switches on when a signal reaches one value, and off when it falls to another: a relay, a Schmitt trigger.
 
-    A thermostat that heats when it is cold: ``{type: Relay, upper: 21, lower: 19, on: 0, off: 1000}``.
+    A thermostat that heats when it is cold: ``{type: Hysteresis, upper: 21, lower: 19, on: 0, off: 1000}``.
     Source: J.-J. Slotine and W. Li, Applied Nonlinear Control, 1991, section 5.2.
     """
 

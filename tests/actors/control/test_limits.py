@@ -1,4 +1,4 @@
-"""Limiter, Quantizer, DeadZone and Relay."""
+"""Limiter, Quantizer, DeadZone and Hysteresis."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.actors import DeadZone, Limiter, ParameterError, Quantizer, Relay
+from epicycle.actors import DeadZone, Hysteresis, Limiter, ParameterError, Quantizer
 from epicycle.actors.testing import Harness
 
 signals = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30)
@@ -58,11 +58,11 @@ def test_quantizers_round_as_numpy_does(samples: list[float], step: float, offse
 
 
 def test_a_relay_stays_between_its_borders_as_it_is() -> None:
-    harness = Harness(Relay("it", upper=1, lower=-1, on=10, off=-10))
+    harness = Harness(Hysteresis("it", upper=1, lower=-1, on=10, off=-10))
     harness.run(99.0, input=list(enumerate([0.0, 0.9, 1.0, 0.0, -0.9, -1.0, 0.5, 2.0])))
     assert harness.tokens("output") == [-10, -10, 10, 10, 10, -10, -10, 10]
     assert harness.sent["switched"] == [(2.0, True), (5.0, False), (7.0, True)]
-    assert passed(Relay("it", upper=1, lower=-1, initial=True), [0.0]) == [1.0]
+    assert passed(Hysteresis("it", upper=1, lower=-1, initial=True), [0.0]) == [1.0]
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_relay_stays_between_its_borders_as_it_is() -> None:
         (Limiter, {"low": 2, "high": 1}, "low is 2 and high is 1: low may not be above high"),
         (Limiter, {"high": 1, "initial": 2}, "initial: 2 is not within -inf and 1"),
         (DeadZone, {"low": 2, "high": 1}, "low is 2 and high is 1: low may not be above high"),
-        (Relay, {"lower": 1, "upper": 1}, "lower is 1 and upper is 1: lower must be below upper"),
+        (Hysteresis, {"lower": 1, "upper": 1}, "lower is 1 and upper is 1: lower must be below upper"),
         (Quantizer, {"step": 0}, "it: Quantizer.step: 0 is out of bounds, expected a number > 0"),
     ],
 )

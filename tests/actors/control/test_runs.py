@@ -20,7 +20,7 @@ actors:
   pid: {type: PID, setpoint: 1, proportional: 2, integral: 3, derivative: 0.1, filter_time: 50 ms, low: -5, high: 5}
   valve: {type: Limiter, rising: 8, falling: 8, initial: 0}
   steps: {type: Quantizer, step: 0.01}
-  alarm: {type: Relay, upper: 1.1, lower: 0.9}
+  alarm: {type: Hysteresis, upper: 1.1, lower: 0.9}
   zone: {type: DeadZone, low: -0.01, high: 0.01}
 connections:
   - clock.output -> plant.trigger
