@@ -36,41 +36,57 @@ from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
 
 if TYPE_CHECKING:
     from .continuous import ODE
+    from .control import *
     from .modes import *
     from .robotics import *
+    from .vehicles import *
 
 __all__ = [
-    "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "REQUIRED",
-    "Accumulator", "Actor", "AddSubtract", "Barrier", "Bernoulli", "BodyState", "BooleanSwitch", "BroadcastChannel",
-    "Casadi", "ChannelError", "Choice", "CircularMotion", "Clock", "Comparator", "Configurable", "Const", "Constant",
-    "Context", "Counter", "CurrentMicrostep", "CurrentTime", "Difference", "Display", "DistanceMonitor", "Distribution",
-    "Emitter", "EpicycleError", "Estimate", "Exponential", "Expression", "FilterError", "FilterPyEstimator", "Function",
-    "Gamma", "GoalMonitor", "Histogram", "Inform", "InputPort", "Integrator", "Latest", "Line", "LogNormal",
-    "LogicGate", "LookupTable", "Machine", "MappingParameter", "MathFunction", "Measurement", "Merge", "ModalActor",
-    "Mode", "Moment", "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective",
-    "OutputPort", "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter",
-    "Process", "Quantity", "Queue", "Ramp", "Random", "RandomInteger", "Ranks", "ReachGoal", "Recorder", "Repeat",
-    "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor",
-    "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "StateMachine", "Station", "Stop", "Stream",
-    "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer", "Times", "Triangular", "Uniform",
-    "UnitError", "UnscentedEstimator", "Vehicle", "Wake", "Way", "When", "abridged", "accepts", "array_parameter",
-    "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
-    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest",
-    "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit",
-    "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
-    "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
-    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
+    "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",
+    "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "Barrier", "Bernoulli", "BodyState",
+    "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "ChannelError", "Choice", "CircularMotion", "Clock",
+    "Comparator", "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime",
+    "DeadZone", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter",
+    "EpicycleError", "Estimate", "Exponential", "Expression", "FilterDesign", "FilterError", "FilterPyEstimator",
+    "FirstOrder", "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor", "Inform",
+    "InputPort", "Integrator", "Latest", "Limiter", "Line", "LogNormal", "LogicGate", "LookupTable", "Machine",
+    "MappingParameter", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent",
+    "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort", "Parameter",
+    "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter", "Pose", "Process", "Quantity",
+    "Quantizer", "Queue", "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal",
+    "Recorder", "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale",
+    "Select", "Sensor", "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "StateMachine",
+    "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer",
+    "Times", "TransferFunction", "Triangular", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Vehicle",
+    "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
+    "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
+    "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",
+    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
+    "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
+    "visible_character", "visible_lines",
 ]  # fmt: skip
 
 
-_OF_MODES = ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition")
+# Where those of __all__ are that are imported when they are asked for: robots, and what solves differential equations,
+# take as long as all else.
+_LATER = {
+    ".continuous": ("ODE",),
+    ".control": (
+        "PID", "Butterworth", "DeadZone", "DiscreteFilter", "FilterDesign", "FirstOrder", "Hysteresis", "Limiter",
+        "Quantizer", "StateSpace", "TransferFunction",
+    ),
+    ".modes": ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"),
+    ".vehicles": (
+        "Ackermann", "InertialSensor", "Pose", "RangeBearingSensor", "RangeScanner", "Unicycle", "WaypointFollower",
+    ),
+}  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    # What of __all__ is not here yet: robots, and what solves differential equations, take as long as all else.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = ".continuous" if name == "ODE" else ".modes" if name in _OF_MODES else ".robotics"
+    module = next((module for module, names in _LATER.items() if name in names), ".robotics")
     found = globals()[name] = getattr(import_module(module, __name__), name)
     return found
 

@@ -183,10 +183,10 @@ class Sampler(_ByChannel):
 
 
 class MostRecent(_ByChannel):
-    """Sends the latest token of each channel whenever it is triggered, as often as that happens.
+    """Sends the latest token of each channel whenever it is triggered, as often as that happens: a zero-order hold.
 
     A channel on which no token has come yet sends ``initial``, or nothing if that is not given.
-    Ptolemy: ``MostRecent``.
+      Ptolemy: ``MostRecent``, ``ZeroOrderHold``.
     """
 
     trigger = InputPort(doc="when to send")

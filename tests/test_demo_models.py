@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy.signal
 import scipy.stats
 import simpy
 
@@ -246,3 +248,93 @@ def test_the_robot_charges_for_what_its_tour_took() -> None:
     assert len(spent["charging"]) >= 4
     for back, charge in zip(spent["returning"], spent["charging"], strict=False):
         assert charge == pytest.approx((0.99 - (0.2 - back / 200)) / 0.05, abs=1e-4)
+
+
+# -- control and vehicles -------------------------------------------------------------------------------------------
+
+
+def pid_loop_by_scipy(anti_windup: bool) -> tuple[Any, Any]:
+    """The loop of the model, written down once more: times and positions every 5 ms, and the forces every 50 ms."""
+    period, high, gains = 0.05, 4.5, (10.0, 10.0, 5.0)
+    plant = scipy.signal.cont2discrete(tuple(map(np.array, ([[0, 1], [-4, -0.8]], [[0], [1]], [[1, 0]], [[0]]))), 0.005)
+    a, b = plant[0], plant[1][:, 0]
+    state, total, slope, before, error, driven = np.zeros(2), 0.0, 0.0, None, 0.0, False
+    positions, forces, force = [], [], 0.0
+    for k in range(4001):
+        positions.append(state[0])
+        if k % 10 == 0:
+            y = state[0]
+            if not (anti_windup and driven and k):
+                total += gains[1] * period * error
+            if before is not None:  # a lag of one period behind the derivative, which ramps from sample to sample
+                q = math.exp(-1)
+                slope = q * slope + gains[2] * (1 - q) * (before - y) / period
+            before, error = y, 1 - y
+            wanted = gains[0] * error + total + slope
+            force = min(max(wanted, -high), high)
+            driven = (wanted - force) * error > 0
+            forces.append(force)
+        state = a @ state + b * (force + (1.0 if k >= 2000 else 0.0))
+    return np.array(positions), np.array(forces)
+
+
+@pytest.mark.parametrize("anti_windup", ["clamping", "none"])
+def test_pid_loop_moves_as_the_same_loop_written_with_scipy(anti_windup: str) -> None:
+    results = run("pid_loop", **{"pid.anti_windup": anti_windup})
+    positions, forces = pid_loop_by_scipy(anti_windup == "clamping")
+    assert results.signals["load.output"].values == pytest.approx(positions, abs=1e-10)
+    assert results.signals["pid.output"].values == pytest.approx(forces, abs=1e-8)
+    times = np.arange(4001) * 0.005
+    early = positions[times < 10]
+    assert results.metrics["overshoot"] == pytest.approx(100 * max(early.max() - 1, 0), abs=1e-8)
+    assert results.metrics["settled"] == times[: len(early)][np.abs(early - 1) > 0.02].max()
+    assert abs(results.metrics["error"]) < 1e-6  # the integral part leaves none, whatever pushes
+    assert results.signals["pid.output"].values[-1] == pytest.approx(4.0 - 1.0, abs=1e-6)
+
+
+def test_anti_windup_takes_the_overshoot_away() -> None:
+    clamped, wound = (run("pid_loop", **{"pid.anti_windup": each}).metrics for each in ("clamping", "none"))
+    assert clamped["overshoot"] < 1
+    assert wound["overshoot"] > 9
+    assert clamped["settled"] < wound["settled"]
+
+
+def test_without_limits_the_overshoot_is_that_of_the_damping_ratio() -> None:
+    """A proportional controller makes 1 / (s^2 + 0.8 s + 4 + Kp) of the plant: exp(-pi d / sqrt(1 - d^2))."""
+    settings = {"force": "1000 N", "proportional": "96 N/m", "integral": 0, "derivative": 0, "period": "5 ms"}
+    position = run("pid_loop", until=9.0, push=0, **settings).signals["load.output"].values
+    settled = 96 / 100
+    damping = 0.4 / 10
+    overshoot = math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
+    # Holding for 5 ms delays by 2.5 ms, which takes 10 * 0.0025 * 0.96 of the damping, and so much the overshoot grows.
+    damping_held = (0.8 - 96 * 0.0025) / 20
+    assert position.max() / settled - 1 > overshoot
+    wanted = math.exp(-math.pi * damping_held / math.sqrt(1 - damping_held**2))
+    assert position.max() / settled - 1 == pytest.approx(wanted, rel=0.01)
+
+
+def test_the_car_stays_near_its_lines_and_arrives() -> None:
+    results = run("waypoints")
+    poses = results.signals["car.pose"].tokens
+    assert np.hypot(*(poses[-1].position - [25, 30])) < 0.25
+    assert results.signals["follower.passed"].values.tolist() == [0, 1, 2, 3, 4]
+    # It steers no further than it can: nowhere is its path sharper than the wheels allow.
+    turned = np.abs(np.diff([each.heading for each in poses]))
+    driven = np.array([each.speed * 0.05 for each in poses[:-1]])
+    assert (turned <= np.array([3 * 0.05, *driven[1:]]) * math.tan(math.radians(35)) / 2.5 + 1e-9).all()
+    chords = [np.hypot(*(b.position - a.position)) for a, b in itertools.pairwise(poses)]
+    assert results.metrics["travelled"] == pytest.approx(sum(chords), rel=1e-12)
+    assert 20 + 15 + 20 + 15 + 25 - 6 < results.metrics["travelled"] < 95
+    near, far = (run("waypoints", lookahead=f"{each} m").metrics for each in (4, 7))
+    assert max(near["left"], -near["right"]) < 2.1 < max(far["left"], -far["right"])
+
+
+def test_the_scanner_tells_how_near_the_car_comes() -> None:
+    results = run("waypoints")
+    pylons = np.array([[16, 6, 0.3], [4, 20, 0.3], [10, 28, 0.3]])
+    for pose, told in zip(results.signals["car.pose"].tokens, results.signals["scanner.nearest"].values, strict=True):
+        true = (np.hypot(*(pylons[:, :2] - pose.position).T) - pylons[:, 2]).min()
+        # A beam every 5 degrees may miss the nearest pylon far away, and hits one near by a little further.
+        assert told >= true - 1e-9
+        if true < 2:
+            assert told < true + 0.1

@@ -1,0 +1,11 @@
+"""Control: linear systems, filters and controllers that are driven by tokens, and what limits them."""
+
+from .filters import Butterworth, DiscreteFilter, FilterDesign, FirstOrder
+from .limits import DeadZone, Hysteresis, Limiter, Quantizer
+from .linear import StateSpace, TransferFunction
+from .pid import PID
+
+__all__ = [
+    "PID", "Butterworth", "DeadZone", "DiscreteFilter", "FilterDesign", "FirstOrder", "Hysteresis", "Limiter",
+    "Quantizer", "StateSpace", "TransferFunction",
+]  # fmt: skip

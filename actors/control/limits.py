@@ -1,0 +1,135 @@
+"""What signals go through that is not linear: Limiter, Quantizer, DeadZone and Hysteresis."""
+
+from __future__ import annotations
+
+import math
+
+from ..core import Actor, InputPort, OutputPort, Parameter, ParameterError, to_seconds
+from ..readings import finite_number
+
+
+class Limiter(Actor):
+    """Cuts a signal off at its limits, and lets it change no faster than its rates: an actuator's saturation and slew.
+
+    Each token gives the value that is nearest to it within the limits and within reach of what was sent before, as far
+    as the time since then allows.  While the output is still on its way, a ``trigger`` sends how far it has come.
+    Without ``initial`` the first token is within reach wherever it is.  Ptolemy: ``Limiter``.
+    """
+
+    input = InputPort(float, doc="the signal, held from token to token")
+    trigger = InputPort(required=False, doc="asks for the output at other times")
+    output = OutputPort(float, doc="the limited signal")
+
+    low = Parameter(float, -math.inf, doc="the lowest value")
+    high = Parameter(float, math.inf, doc="the highest value")
+    rising: Parameter[float | None] = Parameter(float, None, min=0, doc="fastest rise, per s; any if left out")
+    falling: Parameter[float | None] = Parameter(
+        float, None, min=0, doc="fastest fall, per s and without a sign; any if left out"
+    )
+    initial: Parameter[float | None] = Parameter(float, None, doc="the output before the first token")
+
+    def check(self) -> None:
+        if self.low > self.high:
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+        if self.initial is not None and not self.low <= self.initial <= self.high:
+            raise ParameterError(f"initial: {self.initial:g} is not within {self.low:g} and {self.high:g}")
+
+    def initialize(self) -> None:
+        self._wanted = self._reached = self.initial
+        self._since = self.tag.time
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self._wanted = min(max(finite_number(self.input, token), self.low), self.high)
+            self._send()
+        if self.trigger.present and not self.input.present and self._wanted is not None:
+            self._send()
+
+    def _send(self) -> None:
+        value, elapsed = self._wanted, to_seconds(self.tag.time - self._since)
+        assert value is not None
+        if self._reached is not None and self.rising is not None:
+            value = min(value, self._reached + self.rising * elapsed)
+        if self._reached is not None and self.falling is not None:
+            value = max(value, self._reached - self.falling * elapsed)
+        self._reached, self._since = value, self.tag.time
+        self.output.send(value)
+
+
+class Quantizer(Actor):
+    """Rounds a signal to steps, as a converter from analog to digital does.
+
+    Of two steps that are equally near, the even one counts.  As a disturbance of what is there: the aspect
+    ``Quantise``.  Ptolemy: ``Quantizer``.
+    """
+
+    input = InputPort(float, doc="the signal")
+    output = OutputPort(float, doc="the step that it is rounded to")
+
+    step = Parameter(float, above=0, doc="size of a step")
+    offset = Parameter(float, 0.0, doc="where one of the steps lies")
+    rounding = Parameter(str, "nearest", choices=("nearest", "down", "up"), doc="which step is taken")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            place = (finite_number(self.input, token) - self.offset) / self.step
+            if self.rounding == "nearest":
+                number = round(place)
+            else:
+                number = math.floor(place) if self.rounding == "down" else math.ceil(place)
+            self.output.send(self.offset + number * self.step)
+
+
+class DeadZone(Actor):
+    """Lets nothing through between two values, and beyond them what exceeds them: play, or a valve that overlaps.
+
+    Source: J.-J. Slotine and W. Li, Applied Nonlinear Control, 1991, section 5.2.
+    """
+
+    input = InputPort(float, doc="the signal")
+    output = OutputPort(float, doc="0 within the zone, the distance from it beyond")
+
+    low = Parameter(float, doc="lower end of the zone")
+    high = Parameter(float, doc="upper end of the zone")
+
+    def check(self) -> None:
+        if self.low > self.high:
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            value = finite_number(self.input, token)
+            self.output.send(value - min(max(value, self.low), self.high))
+
+
+class Hysteresis(Actor):
+    """Switches on when a signal reaches one value, and off when it falls to another: a relay, a Schmitt trigger.
+
+    A thermostat that heats when it is cold: ``{type: Hysteresis, upper: 21, lower: 19, on: 0, off: 1000}``.
+    Source: J.-J. Slotine and W. Li, Applied Nonlinear Control, 1991, section 5.2.
+    """
+
+    input = InputPort(float, doc="the signal")
+    output = OutputPort(float, doc="'on' or 'off', for each token")
+    switched = OutputPort(bool, doc="whether it is on, when that changes")
+
+    upper = Parameter(float, doc="at or above this it switches on")
+    lower = Parameter(float, doc="at or below this it switches off")
+    on = Parameter(float, 1.0, doc="what is sent while it is on")
+    off = Parameter(float, 0.0, doc="what is sent while it is off")
+    initial = Parameter(bool, False, doc="whether it is on at the start")
+
+    def check(self) -> None:
+        if self.lower >= self.upper:
+            raise ParameterError(f"lower is {self.lower:g} and upper is {self.upper:g}: lower must be below upper")
+
+    def initialize(self) -> None:
+        self._is_on = self.initial
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            value, was_on = finite_number(self.input, token), self._is_on
+            self._is_on = value > self.lower if was_on else value >= self.upper
+            if self._is_on != was_on:
+                self.switched.send(self._is_on)
+            self.output.send(self.on if self._is_on else self.off)

@@ -1,0 +1,93 @@
+"""Vehicles that roll without slipping: Unicycle and Ackermann."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+
+from ..core import Actor, InputPort, OutputPort, Parameter, PortParameter, array_parameter, to_seconds
+from ..core.elementary import cos, sin, tan
+from .pose import Pose
+
+
+class _RollingVehicle(Actor):
+    """What they share: between two tokens speed and turn rate hold, so the path is an arc, and exact."""
+
+    trigger = InputPort(doc="asks for the pose")
+    pose = OutputPort(Pose, depends_on=("trigger",), doc="where it is and how it moves, at the time of each trigger")
+
+    start = array_parameter((2,), (0.0, 0.0), unit="m", doc="position at the start")
+    heading = Parameter(float, 0.0, unit="rad", doc="direction at the start, from the x axis to the left")
+    speed = PortParameter(float, 0.0, unit="m/s", doc="speed along the heading; negative is backwards")
+    max_speed = Parameter(float, math.inf, unit="m/s", min=0, doc="a faster speed is cut off to this")
+
+    @abstractmethod
+    def _turn_rate(self, speed: float) -> float:
+        """How fast it turns at a speed, rad/s."""
+
+    def initialize(self) -> None:
+        x, y = self.start.tolist()
+        self._place = x, y, self.heading  # where the present arc began, and when
+        self._since = self.tag.time
+        self._motion = self._present_motion()
+
+    def _present_motion(self) -> tuple[float, float]:
+        speed = within(self.speed, self.max_speed)
+        return speed, self._turn_rate(speed)
+
+    def fire(self) -> None:
+        if any(port.present for port in self.inputs.values() if port is not self.trigger):
+            motion = self._present_motion()
+            if motion != self._motion:
+                self._place, self._since, self._motion = self._now_at(), self.tag.time, motion
+        if self.trigger.present:
+            x, y, heading = self._now_at()
+            speed = self._motion[0]
+            self.pose.send(Pose((x, y), (speed * cos(heading), speed * sin(heading)), self.now, heading))
+
+    def _now_at(self) -> tuple[float, float, float]:
+        (x, y, heading), (speed, turn_rate) = self._place, self._motion
+        elapsed = to_seconds(self.tag.time - self._since)
+        half = 0.5 * turn_rate * elapsed
+        chord = speed * elapsed * (sin(half) / half if half else 1.0)
+        return x + chord * cos(heading + half), y + chord * sin(heading + half), heading + 2.0 * half
+
+
+def within(value: float, limit: float) -> float:
+    """A number, cut off at a limit to both sides."""
+    return min(max(value, -limit), limit)
+
+
+class Unicycle(_RollingVehicle):
+    """A vehicle that is told how fast to go and how fast to turn: one wheel, or two that are driven apart.
+
+    ``dx/dt = v cos h``, ``dy/dt = v sin h``, ``dh/dt = w``.  Speed and turn rate hold from token to token, so it goes
+    along arcs, which are computed as such: the pose is exact, and does not depend on when it is asked for.  With a
+    constant ``speed`` and ``turn_rate`` it goes round by itself.
+    Source: B. Siciliano et al., Robotics: Modelling, Planning and Control, 2009, section 11.2.
+    """
+
+    turn_rate = PortParameter(float, 0.0, unit="rad/s", doc="how fast it turns; positive is to the left")
+    max_turn_rate = Parameter(float, math.inf, unit="rad/s", min=0, doc="a faster turn is cut off to this")
+
+    def _turn_rate(self, speed: float) -> float:
+        return within(self.turn_rate, self.max_turn_rate)
+
+
+class Ackermann(_RollingVehicle):
+    """A car: it is told how fast to go and how far to steer.
+
+    The kinematic bicycle, ``dh/dt = v tan(steering) / wheelbase``; its position is the middle of the rear axle.  Speed
+    and steering hold from token to token, so it goes along arcs, which are computed as such: the pose is exact, and
+    does not depend on when it is asked for.  How fast an actuator follows is the matter of a ``Limiter`` before it.
+    Source: B. Siciliano et al., Robotics: Modelling, Planning and Control, 2009, section 11.2.
+    """
+
+    steering = PortParameter(float, 0.0, unit="rad", doc="angle of the front wheels; positive is to the left")
+    wheelbase = Parameter(float, 2.5, unit="m", above=0, doc="from axle to axle")
+    max_steering = Parameter(
+        float, 0.6, unit="rad", min=0, max=1.5, doc="a larger angle is cut off to this"
+    )  # tan has its pole at 1.57
+
+    def _turn_rate(self, speed: float) -> float:
+        return speed * tan(within(self.steering, self.max_steering)) / self.wheelbase

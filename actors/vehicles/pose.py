@@ -1,0 +1,37 @@
+"""Pose: where a vehicle is, how it moves, and where it heads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from ..core.elementary import cos, sin
+from ..robotics import BodyState
+
+_set = object.__setattr__  # in a frozen token
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Pose(BodyState):
+    """Where a vehicle was at ``time``, how it moved, and where it headed.  It is a ``BodyState``, too."""
+
+    heading: float  # rad from the x axis to the left; whole turns count
+
+    def __init__(self, position: ArrayLike, velocity: ArrayLike, time: float, heading: float) -> None:
+        BodyState.__init__(self, position, velocity, time)
+        _set(self, "heading", heading)
+
+    @property
+    def speed(self) -> float:
+        """Speed along the heading, m/s; negative when it goes backwards."""
+        vx, vy = self.velocity.tolist()
+        return float(vx * cos(self.heading) + vy * sin(self.heading))
+
+    def seen(self, point: Sequence[float]) -> tuple[float, float]:
+        """A point as the vehicle sees it: how far ahead and how far to the left, m."""
+        x, y = self.position.tolist()
+        dx, dy = point[0] - x, point[1] - y
+        along, across = cos(self.heading), sin(self.heading)
+        return along * dx + across * dy, along * dy - across * dx
