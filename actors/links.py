@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import insort
 from collections import deque
 from typing import Any
 
@@ -207,57 +208,80 @@ class ArqSender(Actor):
     timeout: PortParameter[float] = PortParameter(
         float, unit="s", above=0, doc="how long to wait for an acknowledgement"
     )
+    spacing = Parameter(float, 0.0, unit="s", min=0, doc="time from one frame to the next at least: what a link takes")
     repeat = Parameter(str, "all", choices=("all", "one"), doc="what is sent again: all that are out, or what is late")
 
     def initialize(self) -> None:
         self._queue: deque[Any] = deque()
         self._acks: list[int] = []
-        self._out: dict[int, tuple[Any, Wake]] = {}  # by number, the oldest first
-        self._next = 0
-        self._wake: Wake | None = None  # to deal with what has come
+        self._out: dict[int, Any] = {}  # tokens by number, the oldest first
+        self._late: dict[int, Wake] = {}  # of those that have been sent: when they are late
+        self._ahead: list[int] = []  # those that are to be sent, the oldest first
+        self._next = 0  # number
+        self._sent = -1  # the last that was sent for the first time
+        self._free = 0  # when (ns) the next may be sent
+        self._wake: Wake | None = None
         self._count = 0
 
     def fire(self) -> None:
+        self._find_late()
         if self._wake is not None and self._wake.due:
             self._wake = None
             self._acknowledge()
-            self._go_on()
-        self._repeat()
+            self._open()
+            self._send()
         self._queue.extend(self.input.tokens)
         self._acks.extend(self.ack.tokens)
-        if self._wake is None and (self.input.present or self.ack.present):
-            self._wake = self.wake_in(0)
+        if self.input.present or self.ack.present:
+            self._ask(self.context.time)
+
+    def _ask(self, time: int) -> None:
+        """See to it that it goes on at a time (ns), or before."""
+        if self._wake is None or self._wake.time > time:
+            if self._wake is not None:
+                self._wake.cancel()
+            self._wake = self.context.wake(self, time)
+
+    def _find_late(self) -> None:
+        late = [number for number, wake in self._late.items() if wake.due]
+        for number in list(self._late) if late and self.repeat == "all" else late:
+            self._late.pop(number).cancel()
+            insort(self._ahead, number)
+        if late:
+            self._send()
 
     def _acknowledge(self) -> None:
         for number in self._acks:
             is_meant = number.__ge__ if self.repeat == "all" else number.__eq__
             for each in [each for each in self._out if is_meant(each)]:
-                token, late = self._out.pop(each)
-                late.cancel()
-                self.acknowledged.send(token)
+                self.acknowledged.send(self._out.pop(each))
+                if each in self._late:
+                    self._late.pop(each).cancel()
+                else:
+                    self._ahead.remove(each)
         self._acks = []
 
-    def _go_on(self) -> None:
-        """Send what the window lets out."""
+    def _open(self) -> None:
+        """Let in what the window has place for."""
         while self._queue and self._next - next(iter(self._out), self._next) < self.window:
-            self._send(self._next, self._queue.popleft())
+            self._out[self._next] = self._queue.popleft()
+            self._ahead.append(self._next)
             self._next += 1
         if len(self._queue) != self._count:
             self._count = len(self._queue)
             self.waiting.send(self._count)
 
-    def _repeat(self) -> None:
-        """Send again what is late."""
-        late = [number for number, (_, wake) in self._out.items() if wake.due]
-        for number in list(self._out) if late and self.repeat == "all" else late:
-            token, wake = self._out[number]
-            wake.cancel()
-            self._send(number, token)
-            self.repeated.send(number)
-
-    def _send(self, number: int, token: Any) -> None:
-        self._out[number] = token, self.wake_in(self.timeout)
-        self.output.send({"number": number, "data": token})
+    def _send(self) -> None:
+        while self._ahead and self._free <= self.context.time:
+            number = self._ahead.pop(0)
+            self._late[number] = self.wake_in(self.timeout)
+            self._free = self.context.time + to_nanoseconds(self.spacing)
+            self.output.send({"number": number, "data": self._out[number]})
+            if number <= self._sent:
+                self.repeated.send(number)
+            self._sent = max(self._sent, number)
+        if self._ahead:
+            self._ask(self._free)
 
 
 class ArqReceiver(Actor):

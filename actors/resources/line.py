@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
+from typing import Any, ClassVar
 
 from ..core import EpicycleError, InputPort, OutputPort, Parameter
 from ..expression import FormulaParameter, number_of_token
@@ -21,6 +21,8 @@ class WaitingLine(WaitingActor):
     G/G/2 with that discipline.  ``Queue`` is the plain one.  Sources: Gross and others, Fundamentals of Queueing
     Theory; SimPy's ``Store`` and ``PriorityStore``.
     """
+
+    entrance: ClassVar[str] = "input"
 
     input = InputPort(multi=True, doc="what comes in")
     trigger = InputPort(multi=True, required=False, doc="lets the next token go")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from ..core import EpicycleError, InputPort, OutputPort, Parameter, PortError, PortParameter, brief, counted
 from ..expression import FormulaParameter, number_of_token, of_token
@@ -33,6 +33,8 @@ class Pool(WaitingActor):
     next microstep, so the actor may stand in a loop.  Sources: SimPy's ``PreemptiveResource``; Pegden and others,
     Introduction to Simulation Using SIMAN (seize and release); Ptolemy: ``ResourcePool``.
     """
+
+    entrance: ClassVar[str] = "acquire"
 
     acquire = InputPort(multi=True, doc="asks for units")
     release = InputPort(multi=True, doc="returns them, or withdraws the request")

@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left, insort
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from ..core import Actor, EpicycleError, Parameter, ParameterError, Pending, PortError, Wake
 from ..distributions import Distribution
@@ -77,6 +77,8 @@ class WaitingActor(Actor):
     has the outputs ``rejected``, ``balked``, ``reneged`` and ``waiting``.
     """
 
+    entrance: ClassVar[str]  # the input by which tokens come
+
     discipline = Parameter(
         str, FIFO, choices=(FIFO, LIFO, RANDOM), doc="of equals: who came first, who came last, or one at random"
     )
@@ -106,7 +108,8 @@ class WaitingActor(Actor):
 
     def _tell_of(self, port: str, waiter: Waiter) -> None:
         output = self.outputs[port]
-        self._tell(port, waiter.token, waiter.channel if output.multi and output.width > 1 else None)
+        is_answer = output.multi and output.width == self.inputs[self.entrance].width
+        self._tell(port, waiter.token, waiter.channel if is_answer else None)
 
     def _tell_count(self, port: str, count: int) -> None:
         if self._counts.get(port, 0) != count:
