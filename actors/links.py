@@ -52,45 +52,46 @@ class _Transmitting(Actor):
         self._came = 0
         self._count = 0
 
+    def _finish(self) -> list[tuple[int, Any]]:
+        """The frames that have been sent by now, each with its channel."""
+        found = []
+        for channel, transmitter in enumerate(self._transmitters):
+            if transmitter.wake is not None and transmitter.wake.due:
+                found.append((channel, transmitter.sent))
+                transmitter.sent = transmitter.wake = None
+        return found
+
     def _enqueue(self, token: Any, channel: int) -> bool:
         """Let a frame wait for its channel; whether there is room for it."""
         transmitter = self._transmitters[channel]
         size = number_of_token(self.size, "a size", token, time=self.now)
         if size < 0:
             raise EpicycleError(f"{self.size} gives {size:g} for {brief(token)}, but a size is >= 0")
-        waiting = transmitter.waiting
-        if transmitter.wake is not None and self.buffer is not None:
-            sizes = [size, *(each.size for each in waiting)]
-            if math.fsum(sizes) > self.buffer:
-                return False
         order = number_of_token(self.order, "an order", token, time=self.now)
-        waiting.add(Waiter(token, channel, order, float(self._came), size, self._came))
+        frame = Waiter(token, channel, order, float(self._came), size, self._came)
         self._came += 1
-        if transmitter.wake is None:
-            self._transmit(transmitter)
+        transmitter.waiting.add(frame)
+        if self.buffer is not None:
+            sizes = [each.size for each in transmitter.waiting]
+            if math.fsum(sizes if transmitter.wake is not None else sizes[1:]) > self.buffer:
+                transmitter.waiting.remove(frame)
+                return False
         return True
 
-    def _transmit(self, transmitter: _Transmitter) -> None:
-        """Begin with the next frame, if one waits."""
-        transmitter.sent = transmitter.wake = None
-        if not len(transmitter.waiting):
-            transmitter.rest = 0.0
-            return
-        frame = transmitter.waiting.first
-        transmitter.waiting.remove(frame)
-        assert self.rate is not None
-        time = frame.size / self.rate + transmitter.rest
-        transmitter.rest = time - to_seconds(to_nanoseconds(time))
-        transmitter.sent, transmitter.wake = frame.token, self.wake_in(time)
-
-    def _ready(self) -> list[tuple[int, Any]]:
-        """The frames that are sent now, each with its channel; the next ones follow."""
-        found = []
-        for channel, transmitter in enumerate(self._transmitters):
-            if transmitter.wake is not None and transmitter.wake.due:
-                found.append((channel, transmitter.sent))
-                self._transmit(transmitter)
-        return found
+    def _begin(self) -> None:
+        """Let those transmitters go on that are free."""
+        for transmitter in self._transmitters:
+            if transmitter.wake is not None:
+                continue
+            if not len(transmitter.waiting):
+                transmitter.rest = 0.0
+                continue
+            frame = transmitter.waiting.first
+            transmitter.waiting.remove(frame)
+            assert self.rate is not None
+            time = frame.size / self.rate + transmitter.rest
+            transmitter.rest = time - to_seconds(to_nanoseconds(time))
+            transmitter.sent, transmitter.wake = frame.token, self.wake_in(time)
 
     def _tell_waiting(self) -> None:
         count = sum(len(each.waiting) for each in self._transmitters)
@@ -129,13 +130,14 @@ class Link(_Transmitting):
     def fire(self) -> None:
         for is_lost, token in self._travelling.due():
             (self.lost if is_lost else self.output).send(token)
-        for _, token in self._ready():
+        for _, token in self._finish():
             self._travel(token)
         for token in self.input.tokens:
             if self.rate is None:
                 self._travel(token)
             elif not self._enqueue(token, 0):
                 self.rejected.send(token)
+        self._begin()
         self._tell_waiting()
 
     def _travel(self, token: Any) -> None:
@@ -166,7 +168,7 @@ class NetworkSwitch(_Transmitting):
 
     def fire(self) -> None:
         width = self.output.width
-        for channel, token in self._ready():
+        for channel, token in self._finish():
             self.output.send(token, channel if width > 1 else None)
         for token in self._looked_at.due():
             channel = of_token(self.port, token, time=self.now)
@@ -179,6 +181,7 @@ class NetworkSwitch(_Transmitting):
                 self.output.send(token, channel if width > 1 else None)
             elif not self._enqueue(token, channel):
                 self.rejected.send(token)
+        self._begin()
         for token in self.input.tokens:
             self._looked_at.put(token, self.latency)
         self._tell_waiting()
