@@ -100,8 +100,8 @@ class RecordDisassembler(Actor):
                 if not isinstance(known, Mapping) or name not in known:
                     names = list(known) if isinstance(known, Mapping) else []
                     raise EpicycleError(
-                        f"the token {brief(known)} has no field {name!r}{did_you_mean(name, names)}; it has "
-                        f"{', '.join(names) or 'none'}"
+                        f"the token {brief(known)} has no field {name!r}"
+                        f"{did_you_mean(name, names) or ';'} it has {', '.join(names) or 'none'}"
                     )
                 self.outputs[name].send(known[name])
 

@@ -318,9 +318,9 @@ def test_the_cell_does_what_plain_simpy_does(favour: str) -> None:
                     yield environment.timeout(50)
                 if step == "load":
                     yield environment.timeout(work[kind, part["number"]])
-            # A lathe and the mill may ask at one instant: the mill goes first by its rank, or else the lathe by its channel.
+            # A lathe and the mill may ask at one instant: the mill goes first by rank, or else the lathe by channel.
             if kind == "lathe" and favour == "true":
-                buffer.put(part)
+                yield buffer.put(part)
             next_part = before.get()
             if kind == "lathe" and favour == "false":
                 buffer.put(part)

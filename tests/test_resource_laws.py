@@ -121,15 +121,17 @@ metrics:
   usual: {{of: "wait[1].output", take: mean, after: 400 s, interval: 0.99}}
   all: {{of: "wait[*].output", take: mean, after: 400 s}}
 """
+WIRES = """- job.output -> {entrance}
+  - {exit} -> work.input, split.input, server.input
+  - work.work -> server.service_time
+  - server.output -> {back}"""
 BY_POOL = (
     "desk: {type: Pool, order: rank}\n  server: {type: Server, servers: null}",
-    "- job.output -> desk.acquire\n  - desk.granted -> work.input, split.input, server.input\n"
-    "  - work.work -> server.service_time\n  - server.output -> desk.release",
+    WIRES.format(entrance="desk.acquire", exit="desk.granted", back="desk.release"),
 )
 BY_LINE = (
     "line: {type: WaitingLine, order: ORDER, credits: 1}\n  server: {type: Server}",
-    "- job.output -> line.input\n  - line.output -> work.input, split.input, server.input\n"
-    "  - work.work -> server.service_time\n  - server.output -> line.trigger",
+    WIRES.format(entrance="line.input", exit="line.output", back="line.trigger"),
 )
 
 

@@ -33,8 +33,8 @@ def of_token(formula: Formula, token: Any, /, **known: Any) -> Any:
             what = f"it has {', '.join(fields)}" if fields else "it has none"
             also = ", ".join(names)
             raise EpicycleError(
-                f"{formula}: the token {brief(seen)} has no field {name!r}{did_you_mean(name, [*fields, *names])}; "
-                f"{what}, and {also} {'are' if len(names) > 1 else 'is'} known"
+                f"{formula}: the token {brief(seen)} has no field {name!r}"
+                f"{did_you_mean(name, [*fields, *names]) or ';'} {what}, and {also} {'are' if len(names) > 1 else 'is'} known"
             )
     return formula(values)
 
