@@ -89,7 +89,7 @@ class Router(Actor):
             try:
                 self._sums = cumulated(self.weights.tolist())
             except ValueError as error:
-                raise ParameterError(f"weights: {error}") from None
+                raise ParameterError(str(error)) from None
 
     def initialize(self) -> None:
         self._next = 0

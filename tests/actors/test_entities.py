@@ -14,7 +14,7 @@ from tests.actors.library_parts import Feeds, behave, problem, tokens
     ("actor", "feeds", "expected"),
     [
         # One after the other, over what came and what was set before.
-        ("SetFields, set: {b: a + 1, c: b * time, a: token['a'] * 10, left: 0}, remove: left",
+        ("SetFields, set: {b: a + 1, c: b * time, a: 10 * a, left: 0}, remove: left",
          [("input", [[2, {"a": 1}]])], [(2, 1, "output", {"a": 10, "b": 2, "c": 4.0})]),
         ("SetFields, set: {number: token}", [("input", [[0, 7]])], [(0, 1, "output", {"number": 7})]),
         ("SetFields, draw: {work: {type: Constant, value: 2 min}}", [("input", [[0, {"a": 1}]])],
