@@ -22,7 +22,7 @@ from .core import (
     to_seconds,
 )
 from .expression import FormulaParameter, number_of_token, of_token
-from .resources.waiting import Waiter, Waiters
+from .resources import Waiter, Waiters
 
 
 class _Transmitter:

@@ -30,11 +30,11 @@ def of_token(formula: Formula, token: Any, /, **known: Any) -> Any:
             values[name] = fields[name]
         else:
             names = dict.fromkeys(["token", *known])
-            what = f"it has {', '.join(fields)}" if fields else "it has none"
-            also = ", ".join(names)
+            near = did_you_mean(name, [*fields, *names]) or ";"
+            what = f"it has {', '.join(fields) or 'none'}, and {', '.join(names)}"
             raise EpicycleError(
-                f"{formula}: the token {brief(seen)} has no field {name!r}"
-                f"{did_you_mean(name, [*fields, *names]) or ';'} {what}, and {also} {'are' if len(names) > 1 else 'is'} known"
+                f"{formula}: the token {brief(seen)} has no field {name!r}{near} {what} "
+                f"{'are' if len(names) > 1 else 'is'} known"
             )
     return formula(values)
 

@@ -3,5 +3,6 @@
 from .line import WaitingLine
 from .pool import Pool
 from .stations import Machine, Station
+from .waiting import Waiter, Waiters
 
-__all__ = ["Machine", "Pool", "Station", "WaitingLine"]
+__all__ = ["Machine", "Pool", "Station", "Waiter", "Waiters", "WaitingLine"]

@@ -121,14 +121,14 @@ class Pool(WaitingActor):
     def _serve(self) -> None:
         """Grant as far as there are units."""
         if self.preemptive:
-            self._take_back(self._last_of(self._held, self._in_use - self.capacity))
+            self._take_back(self._last_of(self._held, self._in_use - self.capacity)[0])
         while len(self._waiting):
             first = self._waiting.first
             lacking = first.amount - (self.capacity - self._in_use)
             if lacking > 0:
                 later = [each for each in self._held if each.order > first.order] if self.preemptive else []
-                losers = self._last_of(later, lacking)
-                if sum(each.amount for each in losers) < lacking:
+                losers, missing = self._last_of(later, lacking)
+                if missing > 0:
                     return
                 self._take_back(losers)
             self._waiting.remove(first)
@@ -136,15 +136,15 @@ class Pool(WaitingActor):
             self._in_use += first.amount
             self._tell_of("granted", first)
 
-    def _last_of(self, holders: list[Waiter], amount: int) -> list[Waiter]:
-        """Those who would go last and hold so many units in all, or all."""
+    def _last_of(self, holders: list[Waiter], amount: int) -> tuple[list[Waiter], int]:
+        """Those who would go last and hold so many units in all, and how many are missing even so."""
         found: list[Waiter] = []
         for each in sorted(holders, key=lambda each: each.key, reverse=True):
             if amount <= 0:
                 break
             found.append(each)
             amount -= each.amount
-        return found
+        return found, amount
 
     def _take_back(self, losers: list[Waiter]) -> None:
         for each in losers:

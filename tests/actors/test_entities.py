@@ -30,7 +30,8 @@ from tests.actors.library_parts import Feeds, behave, problem, tokens
         # What is late leaves before what comes at the same tag.
         ("Batch, after: 2 s, key: kind", [("input", [[0, {"kind": 1}], [1, {"kind": 2}], [2, {"kind": 1}]])],
          [(0, 1, "waiting", 1), (1, 1, "waiting", 2), (2, 1, "output", [{"kind": 1}]),
-          (3, 1, "output", [{"kind": 2}]), (3, 1, "waiting", 1), (4, 1, "output", [{"kind": 1}]), (4, 1, "waiting", 0)]),
+          (3, 1, "output", [{"kind": 2}]), (3, 1, "waiting", 1), (4, 1, "output", [{"kind": 1}]),
+          (4, 1, "waiting", 0)]),
         ("Batch", [("input", [[0, 3], [1, 3]]), ("trigger", [[1, 0], [2, 0]])],
          [(0, 1, "waiting", 1), (1, 1, "output", [3, 3]), (1, 1, "waiting", 0)]),
         ("Unbatch", [("input", [[0, [3, [1]]], [1, []]])], [(0, 1, "output", 3), (0, 1, "output", [1])]),
@@ -63,8 +64,8 @@ def test_a_token_is_not_changed_for_others() -> None:
     ("actor", "feeds", "message"),
     [
         ("SetFields, set: {b: cost}", [("input", [[0, {"cots": 1}]])],
-         "'cost': the token {'cots': 1} has no field 'cost', did you mean 'cots'? it has cots, and token, time are "
-         "known"),
+         ("'cost': the token {'cots': 1} has no field 'cost', did you mean 'cots'? it has cots, and token, time are "
+          "known")),
         ("RecordDisassembler, fields: [cost]", [("input", [[0, {"cots": 1}]])],
          "the token {'cots': 1} has no field 'cost', did you mean 'cots'? it has cots"),
         ("RecordDisassembler, fields: [cost]", [("input", [[0, 5]])], "the token 5 has no field 'cost'; it has none"),

@@ -41,7 +41,8 @@ from tests.actors.library_parts import Feeds, behave
                                     [2, {"number": 1, "data": "b"}]])], 1,
          [(0, 1, "output", "a"), (0, 1, "ack", 0), (1, 1, "ack", 0), (2, 1, "output", "b"), (2, 1, "ack", 1)]),
         ("ArqReceiver, repeat: one",
-         [("input", [[1, {"number": 1, "data": "b"}], [2, {"number": 0, "data": "a"}], [3, {"number": 0, "data": "a"}]])],
+         [("input", [[1, {"number": 1, "data": "b"}], [2, {"number": 0, "data": "a"}],
+                     [3, {"number": 0, "data": "a"}]])],
          1, [(1, 1, "ack", 1), (2, 1, "output", "a"), (2, 1, "output", "b"), (2, 1, "ack", 0), (3, 1, "ack", 0)]),
     ],
 )  # fmt: skip
@@ -73,8 +74,8 @@ def test_a_sender_sends_anew_what_is_late() -> None:
     ("actor", "feeds", "message"),
     [
         ("Link, rate: 1 bit/s, size: length", [("input", [[0, {"lenght": 1}]])],
-         "'length': the token {'lenght': 1} has no field 'length', did you mean 'lenght'? it has lenght, and token, "
-         "time are known"),
+         ("'length': the token {'lenght': 1} has no field 'length', did you mean 'lenght'? it has lenght, and token, "
+          "time are known")),
         ("Link, rate: 1 bit/s, size: token", [("input", [[0, -1]])], "'token' gives -1 for -1, but a size is >= 0"),
         ("NetworkSwitch, port: token", [("input", [[0, 2]])],
          "'token' gives 2 for 2, but it.output has 2 channels, counted from 0"),

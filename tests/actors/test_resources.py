@@ -135,8 +135,8 @@ def test_who_asks_a_line_gets_it() -> None:
         ("Pool, amount: token", [("acquire", [[0, 0.5]]), ("release", [])],
          "'token' gives 0.5, but an amount is a whole number of units, 1 or more"),
         ("Pool, order: rank", [("acquire", [[0, {"rnk": 2}]]), ("release", [])],
-         "'rank': the token {'rnk': 2} has no field 'rank', did you mean 'rnk'? it has rnk, and token, time, channel "
-         "are known"),
+         ("'rank': the token {'rnk': 2} has no field 'rank', did you mean 'rnk'? it has rnk, and token, time, channel "
+          "are known")),
         ("Pool, order: token", [("acquire", [[0, "first"]]), ("release", [])],
          "'token' gives 'first', but an order is a finite number"),
         ("Pool, balking: waiting + 2", [("acquire", [[0, 0], [0, 1]]), ("release", [])],
@@ -160,8 +160,8 @@ def test_channels_that_do_not_belong_together() -> None:
     with pytest.raises(ActorError) as caught:
         behave("{type: WaitingLine}", [("input", []), ("trigger", []), ("trigger", [])], outputs=3)
     assert caught.value.reason == (
-        "it.trigger has 2 channels and it.output has 3; they must have equally many, for what is asked for on a channel "
-        "is sent on it"
+        "it.trigger has 2 channels and it.output has 3; they must have equally many, for what is asked for on a "
+        "channel is sent on it"
     )
     assert problem("{type: Pool, patience: {type: Bernoulli}}", ASKS[:1]) == (
         "it: patience: Bernoulli does not give numbers alone"
