@@ -28,7 +28,6 @@ from .functions import Expression, Function, LookupTable
 from .logic import Comparator, LogicGate
 from .queues import Queue, Server
 from .replay import Replay, ReplayError
-from .resources import Machine, Station
 from .sinks import Display, Histogram, Recorder, Stop, Test
 from .sources import Clock, Const, CurrentMicrostep, CurrentTime, PoissonClock, Ramp, Random, Sequence, SingleEvent
 from .statistics import MovingAverage, MovingStatistics
@@ -37,46 +36,53 @@ from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
 if TYPE_CHECKING:
     from .continuous import ODE
     from .control import *
+    from .entities import Batch, Match, RecordAssembler, RecordDisassembler, SetFields, Unbatch
+    from .links import ArqReceiver, ArqSender, Link, NetworkSwitch
     from .modes import *
+    from .resources import Machine, Pool, Station, WaitingLine
     from .robotics import *
     from .vehicles import *
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",
-    "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "Barrier", "Bernoulli", "BodyState",
-    "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "ChannelError", "Choice", "CircularMotion", "Clock",
-    "Comparator", "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime",
-    "DeadZone", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter",
-    "EpicycleError", "Estimate", "Exponential", "Expression", "FilterDesign", "FilterError", "FilterPyEstimator",
-    "FirstOrder", "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor", "Inform",
-    "InputPort", "Integrator", "Latest", "Limiter", "Line", "LogNormal", "LogicGate", "LookupTable", "Machine",
-    "MappingParameter", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent",
-    "MovingAverage", "MovingStatistics", "MultiplyDivide", "Normal", "Objective", "OutputPort", "Parameter",
-    "ParameterError", "Pending", "Plan", "PoissonClock", "PortError", "PortParameter", "Pose", "Process", "Quantity",
-    "Quantizer", "Queue", "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal",
-    "Recorder", "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale",
-    "Select", "Sensor", "SeparationMonitor", "Sequence", "Server", "SingleEvent", "Solver", "StateMachine",
+    "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier", "Batch",
+    "Bernoulli", "BodyState", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "ChannelError", "Choice",
+    "CircularMotion", "Clock", "Comparator", "Configurable", "Const", "Constant", "Context", "Counter",
+    "CurrentMicrostep", "CurrentTime", "DeadZone", "Difference", "DiscreteFilter", "Display", "DistanceMonitor",
+    "Distribution", "Emitter", "EpicycleError", "Estimate", "Exponential", "Expression", "FilterDesign", "FilterError",
+    "FilterPyEstimator", "FirstOrder", "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor",
+    "Inform", "InputPort", "Integrator", "Latest", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable",
+    "Machine", "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment",
+    "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "NetworkSwitch", "Normal", "Objective",
+    "OutputPort", "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "Pool", "PortError",
+    "PortParameter", "Pose", "Process", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger",
+    "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder",
+    "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select",
+    "Sensor", "SeparationMonitor", "Sequence", "Server", "SetFields", "SingleEvent", "Solver", "StateMachine",
     "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer",
-    "Times", "TransferFunction", "Triangular", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Vehicle",
-    "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
-    "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
-    "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
-    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",
-    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
-    "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
-    "visible_character", "visible_lines",
+    "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator",
+    "Vehicle", "WaitingLine", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter",
+    "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
+    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest",
+    "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit",
+    "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
+    "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
+    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip
 
 
-# Where those of __all__ are that are imported when they are asked for: robots, and what solves differential equations,
-# take as long as all else.
+# Where those of __all__ are that are imported when they are asked for: few models need them, and with robots and what
+# solves differential equations they take as long as all else.
 _LATER = {
     ".continuous": ("ODE",),
     ".control": (
         "PID", "Butterworth", "DeadZone", "DiscreteFilter", "FilterDesign", "FirstOrder", "Hysteresis", "Limiter",
         "Quantizer", "StateSpace", "TransferFunction",
     ),
+    ".entities": ("Batch", "Match", "RecordAssembler", "RecordDisassembler", "SetFields", "Unbatch"),
+    ".links": ("ArqReceiver", "ArqSender", "Link", "NetworkSwitch"),
     ".modes": ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"),
+    ".resources": ("Machine", "Pool", "Station", "WaitingLine"),
     ".vehicles": (
         "Ackermann", "InertialSensor", "Pose", "RangeBearingSensor", "RangeScanner", "Unicycle", "WaypointFollower",
     ),

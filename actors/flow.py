@@ -5,7 +5,21 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, PortError, PortParameter, counted
+from .core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    PortError,
+    PortParameter,
+    array_parameter,
+    brief,
+    counted,
+)
+from .core.choices import cumulated, weighted
+from .expression import FormulaParameter, of_token
 
 
 class Merge(Actor):
@@ -38,33 +52,90 @@ class Merge(Actor):
 
 
 class Router(Actor):
-    """Sends each token to one channel of its output: round robin, or at random.
+    """Sends each token to one channel of its output: in turn, at random, to the least loaded, or as the token says.
 
-    Ptolemy: ``Distributor``.
+    For ``shortest queue``, ``load`` takes what each channel leads to tells of itself, such as the ``size`` of a
+    ``Server``, in the order of the output's channels; it counts as 0 until then, and one more for each token that is
+    sent there before it tells anew.  Among equals one is drawn.  ``channel: number % 3`` is what ``expression`` goes
+    by, over the token's fields.  Ptolemy: ``Distributor``.
     """
 
     input = InputPort(doc="what is handed on")
-    output = OutputPort(multi=True, doc="a channel for each connection, in their order")
+    load = InputPort(float, multi=True, required=False, doc="how much waits behind each channel of the output")
+    output = OutputPort(multi=True, depends_on=("input",), doc="a channel for each connection, in their order")
 
     policy = Parameter(
         str,
         "round robin",
-        choices=("round robin", "random"),
+        choices=("round robin", "random", "shortest queue", "expression"),
         renamed={"in turn": "round robin"},
         doc="how the channel is chosen",
     )
+    weights: Parameter[Any] = array_parameter(
+        (None,), None, unit="1", min=0, doc="how likely each channel is with 'random'; all alike if left out"
+    )
+    channel: Parameter[Any] = FormulaParameter(
+        None, doc="the channel for 'expression', from 0; of the token's fields, token, time, channels (how many)"
+    )
+
+    def check(self) -> None:
+        for name, policy in (("weights", "random"), ("channel", "expression")):
+            if getattr(self, name) is not None and self.policy != policy:
+                raise ParameterError(f"{name}: it is for the policy {policy!r}, and the policy is {self.policy!r}")
+        if self.policy == "expression" and self.channel is None:
+            raise ParameterError("policy: 'expression' needs 'channel', which says which channel a token goes to")
+        self._sums: list[float] | None = None
+        if self.weights is not None:
+            try:
+                self._sums = cumulated(self.weights.tolist())
+            except ValueError as error:
+                raise ParameterError(str(error)) from None
 
     def initialize(self) -> None:
         self._next = 0
+        width = self.output.width
+        if self.policy == "shortest queue" and self.load.width != width:
+            raise PortError(
+                f"{self.output.path} has {counted(width, 'channel')} and {self.load.path} has {self.load.width}; "
+                "'shortest queue' needs to be told of each"
+            )
+        if self._sums is not None and len(self._sums) != width:
+            raise PortError(
+                f"{self.output.path} has {counted(width, 'channel')}, and there are {len(self._sums)} weights"
+            )
+        self._loads = [0.0] * width
 
     def fire(self) -> None:
         if not self.output.width:
             return
+        if self.load.present:
+            for place, loads in enumerate(self.load.by_channel()):
+                if loads:
+                    self._loads[place] = loads[-1]
         for token in self.input.tokens:
-            if self.policy == "random":
-                self._next = self.random.below(self.output.width)
+            self._next = self._chosen(token)
             self.output.send(token, self._next)
             self._next = (self._next + 1) % self.output.width
+
+    def _chosen(self, token: Any) -> int:
+        if self.policy == "round robin":
+            return self._next
+        width = self.output.width
+        if self.policy == "random":
+            return self.random.below(width) if self._sums is None else weighted(self.random, self._sums)
+        if self.policy == "expression":
+            number = of_token(self.channel, token, time=self.now, channels=width)
+            if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < width:
+                raise EpicycleError(
+                    f"{self.channel} gives {number!r} for {brief(token)}, but {self.output.path} has "
+                    f"{counted(width, 'channel')}, counted from 0"
+                )
+            return number
+        least = min(self._loads)
+        places = [place for place, load in enumerate(self._loads) if load == least]
+        place = places[self.random.below(len(places))] if len(places) > 1 else places[0]
+        self._loads[place] += 1.0
+        return place
 
 
 class Switch(Actor):

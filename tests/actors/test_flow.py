@@ -21,6 +21,12 @@ from tests.actors.library_parts import Feeds, behave, problem, tokens
         ("Router", [("input", [[0, 1], [0, 2], [1, 3], [2, 4]])], 3,
          [(0, 1, "output/0", 1), (0, 1, "output/1", 2), (1, 1, "output/2", 3), (2, 1, "output/0", 4)]),
         ("Router", [("input", [[0, 1]])], 0, []),
+        ("Router, policy: expression, channel: kind", [("input", [[0, {"kind": 1}], [1, {"kind": 0}]])], 2,
+         [(0, 1, "output/1", {"kind": 1}), (1, 1, "output/0", {"kind": 0})]),
+        # What a channel is told to have counts until it tells anew, and so does what is sent there.
+        ("Router, policy: shortest queue",
+         [("load", [[0, 2]]), ("load", [[0, 3]]), ("load", [[0, 4], [2, 0]]), ("input", [[1, 1], [2, 2], [2, 3]])], 3,
+         [(1, 1, "output/0", 1), (2, 1, "output/2", 2), (2, 1, "output/2", 3)]),
         ("Switch", [("input", [[0, 1], [1, 2], [1, 3], [2, 4]]), ("control", [[1, 1], [2, 0]])], 2,
          [(0, 1, "output/0", 1), (1, 1, "output/1", 2), (1, 1, "output/1", 3), (2, 1, "output/0", 4)]),
         ("BooleanSwitch", [("input", [[0, 1], [1, 2], [2, 3]]), ("control", [[1, True]])], 0,
@@ -54,6 +60,49 @@ def test_a_random_router_uses_every_channel_alike() -> None:
     # Binomial with mean 1000 and standard deviation 26.
     assert sum(counts) == 3000
     assert all(abs(count - 1000) < 110 for count in counts)
+
+
+def test_a_router_goes_by_weights() -> None:
+    router = "{type: Router, policy: random, weights: [3, 0, 1]}"
+    sends = behave(router, [("input", [[0, 0]] * 3000)], outputs=3)
+    counts = [len(tokens(sends, f"output/{channel}")) for channel in range(3)]
+    assert counts[1] == 0
+    assert abs(counts[0] - 2250) < 100  # binomial with standard deviation 24
+
+
+def test_among_the_shortest_queues_one_is_drawn() -> None:
+    feeds: Feeds = [("load", [[time, 0] for time in range(99)])] * 2 + [("input", [[time, 0] for time in range(99)])]
+    sends = behave("{type: Router, policy: shortest queue}", feeds, outputs=2)
+    assert 30 < len(tokens(sends, "output/0")) < 70
+
+
+@pytest.mark.parametrize(
+    ("router", "message"),
+    [
+        ("weights: [1, 2]", "weights: it is for the policy 'random', and the policy is 'round robin'"),
+        ("policy: random, channel: token", "channel: it is for the policy 'expression', and the policy is 'random'"),
+        ("policy: expression", "policy: 'expression' needs 'channel', which says which channel a token goes to"),
+        ("policy: random, weights: [0]", "weights [0.0] are not all 0 or more with a finite sum above 0"),
+    ],
+)
+def test_wrong_routers(router: str, message: str) -> None:
+    assert problem(f"{{type: Router, {router}}}", [("input", [])]) == f"it: {message}"
+
+
+@pytest.mark.parametrize(
+    ("router", "message"),
+    [
+        ("policy: shortest queue",
+         "it.output has 2 channels and it.load has 0; 'shortest queue' needs to be told of each"),
+        ("policy: random, weights: [1, 2, 3]", "it.output has 2 channels, and there are 3 weights"),
+        ("policy: expression, channel: token + channels",
+         "'token + channels' gives 3 for 1, but it.output has 2 channels, counted from 0"),
+    ],
+)  # fmt: skip
+def test_routers_at_work(router: str, message: str) -> None:
+    with pytest.raises(ActorError) as caught:
+        behave(f"{{type: Router, {router}}}", [("input", [[0, 1]])], outputs=2)
+    assert caught.value.reason == message
 
 
 ALIKE = "they must have equally many, for each channel of the input leads to one of the output"

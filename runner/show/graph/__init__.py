@@ -18,9 +18,9 @@ from pathlib import Path
 from epicycle.actors import EpicycleError
 
 from . import mermaid_text
+from .chart import Statechart, chart_text, statechart, write_statechart
 from .layout import draw
 from .outlines import Outline, outline
-from .statechart import Statechart, chart_text, statechart, write_statechart
 
 PICTURES, TEXTS = (".svg", ".png", ".pdf"), (".mmd", ".md")
 

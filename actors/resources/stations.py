@@ -8,8 +8,8 @@ from typing import Any
 import simpy
 from simpy.events import Event
 
-from .core import InputPort, OutputPort, Parameter, Process
-from .distributions import Distribution
+from ..core import InputPort, OutputPort, Parameter, Process
+from ..distributions import Distribution
 
 
 class Station(Process):

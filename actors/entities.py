@@ -1,0 +1,254 @@
+"""Entities, which are tokens with fields: SetFields, RecordAssembler, RecordDisassembler, Batch, Unbatch, Match."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+from .core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    MappingParameter,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    Wake,
+    brief,
+    did_you_mean,
+    texts_parameter,
+)
+from .distributions import Distribution
+from .expression import FormulaParameter, number_of_token, of_token, operand
+
+
+class SetFields(Actor):
+    """Sets fields of tokens: a token with fields is a mapping, as YAML writes it and expressions read it.
+
+    ``draw: {work: {type: Exponential, mean: 5 s}}`` draws fields, then ``set: {due: came + 2 * work}`` computes some,
+    one after the other, over the token's fields, ``token`` (as it came) and ``time`` (s).  What comes without fields,
+    such as a number, becomes a token that has just these.  The token that came is left as it is: others may have it.
+    Ptolemy: ``RecordUpdater``.
+    """
+
+    input = InputPort(doc="the tokens")
+    output: OutputPort[Any] = OutputPort(dict, doc="each with its fields set")
+
+    draw: Parameter[dict[str, Distribution]] = MappingParameter(
+        Parameter(Distribution), {}, doc="what fields are drawn from; times in s"
+    )
+    set: Parameter[dict[str, Any]] = MappingParameter(FormulaParameter(), {}, doc="expressions for fields, in order")
+    remove = texts_parameter((), doc="fields that are taken away, at last")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            seen = operand(token)
+            fields = dict(seen) if isinstance(seen, Mapping) else {}
+            for name, distribution in self.draw.items():
+                fields[name] = distribution.draw(self.random_stream(name))
+            for name, formula in self.set.items():
+                fields[name] = of_token(formula, fields, token=seen, time=self.now)
+            for name in self.remove:
+                fields.pop(name, None)
+            self.output.send(fields)
+
+
+class RecordAssembler(Actor):
+    """Makes one token with fields of the tokens of several inputs, which are called like the fields.
+
+    It waits until there is one at each input; others wait in the order of their arrival.
+    Ptolemy: ``RecordAssembler``.
+    """
+
+    output: OutputPort[Any] = OutputPort(dict, doc="a token with these fields")
+
+    fields = texts_parameter(doc="names of the fields, which are the inputs")
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        _check_names(self.fields)
+        return {name: InputPort(doc="a field") for name in self.fields}
+
+    def initialize(self) -> None:
+        self._waiting: dict[str, deque[Any]] = {name: deque() for name in self.fields}
+
+    def fire(self) -> None:
+        for name, queue in self._waiting.items():
+            queue.extend(self.inputs[name].tokens)
+        while all(self._waiting.values()):
+            self.output.send({name: queue.popleft() for name, queue in self._waiting.items()})
+
+
+class RecordDisassembler(Actor):
+    """Sends fields of each token by outputs that are called like the fields.
+
+    Ptolemy: ``RecordDisassembler``.
+    """
+
+    input = InputPort(doc="tokens with fields")
+
+    fields = texts_parameter(doc="names of the fields, which are the outputs")
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        _check_names(self.fields)
+        return {name: OutputPort(doc="a field") for name in self.fields}
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            for name in self.fields:
+                known = token if isinstance(token, Mapping) else operand(token)
+                if not isinstance(known, Mapping) or name not in known:
+                    names = list(known) if isinstance(known, Mapping) else []
+                    raise EpicycleError(
+                        f"the token {brief(known)} has no field {name!r}"
+                        f"{did_you_mean(name, names) or ';'} it has {', '.join(names) or 'none'}"
+                    )
+                self.outputs[name].send(known[name])
+
+
+def _check_names(fields: tuple[str, ...]) -> None:
+    if not fields:
+        raise ParameterError("fields: the list is empty")
+    for name in fields:
+        if fields.count(name) > 1:
+            raise ParameterError(f"fields: {name!r} is named twice")
+
+
+class Batch(Actor):
+    """Collects tokens into lists: as many as ``number``, or as fit into ``size``, or what has come after ``after``.
+
+    Tokens with different values of ``key`` go into different batches.  A batch is full when it has ``number`` tokens,
+    or when the sizes of its tokens (``weight``) come to ``size``; a token that would exceed it begins the next.
+    ``trigger`` sends all batches as they are.  Sources: Pegden and others, Introduction to Simulation Using SIMAN
+    (group); Ptolemy: ``SequenceToArray``.
+    """
+
+    input = InputPort(doc="what is collected")
+    trigger = InputPort(required=False, doc="sends what is there")
+    output: OutputPort[Any] = OutputPort(list, doc="a batch, in the order in which its tokens came")
+    waiting = OutputPort(int, doc="how many tokens wait for the rest of their batch, whenever that changes")
+
+    number: Parameter[int | None] = Parameter(int, None, min=1, doc="how many tokens are a batch")
+    size: Parameter[float | None] = Parameter(float, None, above=0, doc="how large a batch may be")
+    weight = FormulaParameter("1", doc="size of a token; of its fields, token, time")
+    after: Parameter[float | None] = Parameter(
+        float, None, unit="s", min=0, doc="how long the first of a batch waits at most"
+    )
+    key: Parameter[Any] = FormulaParameter(
+        None, doc="what tokens of a batch have in common; of their fields, and token"
+    )
+
+    def initialize(self) -> None:
+        if self.number is None and self.size is None and self.after is None and not self.trigger.width:
+            raise ParameterError(f"{self.path} never sends: give 'number', 'size' or 'after', or connect 'trigger'")
+        self._batches: dict[Any, _Open] = {}
+        self._count = 0
+
+    def fire(self) -> None:
+        for key in [key for key, batch in self._batches.items() if batch.wake is not None and batch.wake.due]:
+            self._close(key)
+        for token in self.input.tokens:
+            self._collect(token)
+        if self.trigger.present:
+            for key in list(self._batches):
+                self._close(key)
+        count = sum(len(batch.tokens) for batch in self._batches.values())
+        if count != self._count:
+            self._count = count
+            self.waiting.send(count)
+
+    def _collect(self, token: Any) -> None:
+        key = _hashable(None if self.key is None else of_token(self.key, token))
+        weight = 0.0
+        if self.size is not None:
+            weight = number_of_token(self.weight, "a weight", token, time=self.now)
+            if key in self._batches and self._batches[key].size + weight > self.size:
+                self._close(key)
+        batch = self._batches.get(key)
+        if batch is None:
+            wake = None if self.after is None else self.wake_in(self.after)
+            batch = self._batches[key] = _Open(wake)
+        batch.tokens.append(token)
+        batch.size += weight
+        is_full = self.number is not None and len(batch.tokens) >= self.number
+        if is_full or (self.size is not None and batch.size >= self.size):
+            self._close(key)
+
+    def _close(self, key: Hashable) -> None:
+        batch = self._batches.pop(key)
+        if batch.wake is not None:
+            batch.wake.cancel()
+        self.output.send(batch.tokens)
+
+
+class _Open:
+    """A batch that is not full."""
+
+    def __init__(self, wake: Wake | None) -> None:
+        self.wake = wake
+        self.tokens: list[Any] = []
+        self.size = 0.0
+
+
+class Unbatch(Actor):
+    """Sends what is in a list, one by one, at the same tag.
+
+    Ptolemy: ``ArrayToSequence``.
+    """
+
+    input = InputPort(doc="lists")
+    output = OutputPort(doc="what is in them")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            items = operand(token)
+            if not isinstance(items, list):
+                raise EpicycleError(f"{brief(items)} is not a list")
+            for item in token:
+                self.output.send(item)
+
+
+class Match(Actor):
+    """Waits until there is a token with an equal ``key`` on every channel, and sends them as a list: a join.
+
+    The fork before it is an output with several connections.  Tokens of one channel with equal keys wait in the order
+    of their arrival; without ``key``, all are equal.  Sources: Pegden and others, Introduction to Simulation Using
+    SIMAN (match); Ptolemy: ``Synchronizer``, for tokens without a key.
+    """
+
+    input = InputPort(multi=True, doc="the parts")
+    output: OutputPort[Any] = OutputPort(list, doc="a token of each channel, in the order of the channels")
+    waiting = OutputPort(int, doc="how many tokens wait for others, whenever that changes")
+
+    key: Parameter[Any] = FormulaParameter(None, doc="what belongs together; of a token's fields, and token")
+
+    def initialize(self) -> None:
+        self._parts: dict[Any, list[deque[Any]]] = {}
+        self._count = 0
+
+    def fire(self) -> None:
+        count = self._count
+        for channel, tokens in enumerate(self.input.by_channel()):
+            for token in tokens:
+                key = _hashable(None if self.key is None else of_token(self.key, token))
+                if key not in self._parts:
+                    self._parts[key] = [deque() for _ in range(self.input.width)]
+                parts = self._parts[key]
+                parts[channel].append(token)
+                count += 1
+                if all(parts):
+                    self.output.send([part.popleft() for part in parts])
+                    count -= len(parts)
+                    if not any(parts):
+                        del self._parts[key]
+        if count != self._count:
+            self._count = count
+            self.waiting.send(count)
+
+
+def _hashable(key: Any) -> Hashable:
+    if isinstance(key, list):
+        return tuple(map(_hashable, key))
+    if isinstance(key, Mapping):
+        return tuple((name, _hashable(value)) for name, value in key.items())
+    return key  # type: ignore[no-any-return]

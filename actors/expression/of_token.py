@@ -1,0 +1,47 @@
+"""Expressions over the fields of a token."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..core import EpicycleError, brief, did_you_mean
+from .formula import Formula, operand
+
+
+def of_token(formula: Formula, token: Any, /, **known: Any) -> Any:
+    """What an expression gives whose names are fields of a token.
+
+    ``token`` is all of it, and ``known`` are further names, which go before fields.  Raises ``EpicycleError`` for a
+    name that is neither.
+    """
+    if not formula.names:
+        return formula({})
+    seen = operand(token)
+    fields: Mapping[str, Any] = seen if isinstance(seen, Mapping) else {}
+    values = {}
+    for name in formula.names:
+        if name in known:
+            values[name] = known[name]
+        elif name == "token":
+            values[name] = seen
+        elif name in fields:
+            values[name] = fields[name]
+        else:
+            names = dict.fromkeys(["token", *known])
+            near = did_you_mean(name, [*fields, *names]) or ";"
+            what = f"it has {', '.join(fields) or 'none'}, and {', '.join(names)}"
+            raise EpicycleError(
+                f"{formula}: the token {brief(seen)} has no field {name!r}{near} {what} "
+                f"{'are' if len(names) > 1 else 'is'} known"
+            )
+    return formula(values)
+
+
+def number_of_token(formula: Formula, what: str, token: Any, /, **known: Any) -> float:
+    """The same, where it has to be a finite number; ``what`` says which one."""
+    value = of_token(formula, token, **known)
+    if isinstance(value, (int, float)) and math.isfinite(value):
+        return value
+    raise EpicycleError(f"{formula} gives {value!r}, but {what} is a finite number")

@@ -1,0 +1,318 @@
+"""Networks: Link, NetworkSwitch, and both ends of an ARQ protocol, ArqSender and ArqReceiver."""
+
+from __future__ import annotations
+
+import math
+from bisect import insort
+from collections import deque
+from typing import Any
+
+from .core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    Pending,
+    PortParameter,
+    Wake,
+    brief,
+    counted,
+    to_nanoseconds,
+    to_seconds,
+)
+from .expression import FormulaParameter, number_of_token, of_token
+from .resources import Waiter, Waiters
+
+
+class _Transmitter:
+    """What stands before a wire: frames that wait, in their order, and the one that is being sent."""
+
+    def __init__(self) -> None:
+        self.waiting = Waiters()
+        self.sent: Any = None
+        self.wake: Wake | None = None  # when it is sent; none if nothing is
+        self.rest = 0.0  # s that whole nanoseconds have left over while it was busy
+
+
+class _Transmitting(Actor):
+    """What a link and a switch share: a transmitter for each channel of the output."""
+
+    rate: PortParameter[float | None] = PortParameter(
+        float, None, unit="bit/s", above=0, doc="how fast frames are sent; at once if left out"
+    )
+    size = FormulaParameter("1", doc="length of a frame in bits; of its fields, token, time")
+    order = FormulaParameter("0", doc="of those that wait, the least is sent first; of the same")
+    buffer: Parameter[float | None] = Parameter(
+        float, None, unit="bit", min=0, doc="how much may wait, the frame that is being sent not counted"
+    )
+
+    def initialize(self) -> None:
+        self._transmitters = [_Transmitter() for _ in range(max(self.outputs["output"].width, 1))]
+        self._came = 0
+        self._count = 0
+
+    def _finish(self) -> list[tuple[int, Any]]:
+        """The frames that have been sent by now, each with its channel."""
+        found = []
+        for channel, transmitter in enumerate(self._transmitters):
+            if transmitter.wake is not None and transmitter.wake.due:
+                found.append((channel, transmitter.sent))
+                transmitter.sent = transmitter.wake = None
+        return found
+
+    def _enqueue(self, token: Any, channel: int) -> bool:
+        """Let a frame wait for its channel; whether there is room for it."""
+        transmitter = self._transmitters[channel]
+        size = number_of_token(self.size, "a size", token, time=self.now)
+        if size < 0:
+            raise EpicycleError(f"{self.size} gives {size:g} for {brief(token)}, but a size is >= 0")
+        order = number_of_token(self.order, "an order", token, time=self.now)
+        frame = Waiter(token, channel, order, float(self._came), size, self._came)
+        self._came += 1
+        transmitter.waiting.add(frame)
+        if self.buffer is not None:
+            sizes = [each.size for each in transmitter.waiting]
+            if math.fsum(sizes if transmitter.wake is not None else sizes[1:]) > self.buffer:
+                transmitter.waiting.remove(frame)
+                return False
+        return True
+
+    def _begin(self) -> None:
+        """Let those transmitters go on that are free."""
+        for transmitter in self._transmitters:
+            if transmitter.wake is not None:
+                continue
+            if not len(transmitter.waiting):
+                transmitter.rest = 0.0
+                continue
+            frame = transmitter.waiting.first
+            transmitter.waiting.remove(frame)
+            assert self.rate is not None
+            time = frame.size / self.rate + transmitter.rest
+            transmitter.rest = time - to_seconds(to_nanoseconds(time))
+            transmitter.sent, transmitter.wake = frame.token, self.wake_in(time)
+
+    def _tell_waiting(self) -> None:
+        count = sum(len(each.waiting) for each in self._transmitters)
+        if count != self._count:
+            self._count = count
+            self.outputs["waiting"].send(count)
+
+
+class Link(_Transmitting):
+    """A link in one direction: frames wait, are sent one by one at ``rate``, and arrive after ``delay``.
+
+    A frame takes ``size / rate`` to be sent; then it is lost with the probability ``loss``, or travels for ``delay``,
+    whatever comes behind it.  With Poisson arrivals and frames of one length the wait is that of M/D/1.  At one tag
+    what is sent makes place for what comes.  The output does not depend on the input at once: the actor may stand in a
+    loop. Source: Bertsekas and Gallager, Data Networks.
+    """
+
+    input = InputPort(multi=True, doc="frames")
+    output = OutputPort(depends_on=(), doc="each frame at the other end")
+    lost = OutputPort(depends_on=(), doc="the frames that are lost on the way, when they have been sent")
+    rejected = OutputPort(doc="the frames that found the buffer full")
+    waiting = OutputPort(int, doc="how many frames wait, whenever that changes")
+
+    delay: PortParameter[float] = PortParameter(
+        float, 0.0, unit="s", min=0, doc="propagation: how long a frame travels"
+    )
+    loss: PortParameter[float] = PortParameter(
+        float, 0.0, unit="1", min=0, max=1, doc="probability that a frame is lost"
+    )
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._transmitters = self._transmitters[:1]
+        self._travelling: Pending[tuple[bool, Any]] = Pending(self)
+
+    def fire(self) -> None:
+        for is_lost, token in self._travelling.due():
+            (self.lost if is_lost else self.output).send(token)
+        for _, token in self._finish():
+            self._travel(token)
+        for token in self.input.tokens:
+            if self.rate is None:
+                self._travel(token)
+            elif not self._enqueue(token, 0):
+                self.rejected.send(token)
+        self._begin()
+        self._tell_waiting()
+
+    def _travel(self, token: Any) -> None:
+        is_lost = self.loss > 0 and self.random.random() < self.loss
+        self._travelling.put((is_lost, token), 0.0 if is_lost else self.delay)
+
+
+class NetworkSwitch(_Transmitting):
+    """A store-and-forward switch: each frame goes to the channel of the output that ``port`` says, and waits there.
+
+    ``port: destination`` takes the channel from a field; ``port: "[0, 0, 1][destination]"`` is a table.  Each channel
+    of the output sends its frames one by one at ``rate``, in the order of ``order`` (``order: -priority``), and has a
+    ``buffer`` of its own.  ``latency`` is how long the switch takes to find the channel.  The output does not depend on
+    the input at once: the actor may stand in a loop.  Source: IEEE 802.1Q, strict priority.
+    """
+
+    input = InputPort(multi=True, doc="frames, of all channels alike")
+    output = OutputPort(multi=True, depends_on=(), doc="the frames, on the channel of their port")
+    rejected = OutputPort(depends_on=(), doc="the frames that found the buffer of their channel full")
+    waiting = OutputPort(int, depends_on=(), doc="how many frames wait in all, whenever that changes")
+
+    port = FormulaParameter(doc="the channel of the output, from 0; of the frame's fields, token, time")
+    latency = Parameter(float, 0.0, unit="s", min=0, doc="how long a frame is looked at; 0 is a microstep")
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._looked_at: Pending[Any] = Pending(self)
+
+    def fire(self) -> None:
+        width = self.output.width
+        for channel, token in self._finish():
+            self.output.send(token, channel if width > 1 else None)
+        for token in self._looked_at.due():
+            channel = of_token(self.port, token, time=self.now)
+            if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < max(width, 1):
+                raise EpicycleError(
+                    f"{self.port} gives {channel!r} for {brief(token)}, but {self.output.path} has "
+                    f"{counted(width, 'channel')}, counted from 0"
+                )
+            if self.rate is None:
+                self.output.send(token, channel if width > 1 else None)
+            elif not self._enqueue(token, channel):
+                self.rejected.send(token)
+        self._begin()
+        for token in self.input.tokens:
+            self._looked_at.put(token, self.latency)
+        self._tell_waiting()
+
+
+class ArqSender(Actor):
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them anew.
+
+    A frame is ``{number, data}``, with the token that came as its data.  ``window: 1`` is stop-and-wait.  Otherwise,
+    when the oldest frame has not been acknowledged for ``timeout``, ``repeat: all`` sends all that are out anew (go
+    back N), and ``repeat: one`` each whose own time is over (selective repeat).  An acknowledgement is the number of a
+    frame: with ``all`` it acknowledges all up to this one, with ``one`` this one alone.  Frames go through a ``Link``
+    with loss to an ``ArqReceiver``, whose acknowledgements come back by another.  The output does not depend on ``ack``
+    at once.
+
+    Sources: Bertsekas and Gallager, Data Networks, 2.4; Tanenbaum, Computer Networks, 3.4.
+    """
+
+    input = InputPort(doc="what is to be delivered")
+    ack = InputPort(int, doc="numbers of frames that have arrived")
+    output: OutputPort[Any] = OutputPort(dict, depends_on=(), doc="frames: {number, data}")
+    acknowledged = OutputPort(depends_on=(), doc="what came in, when it is known to have arrived")
+    repeated = OutputPort(int, depends_on=(), doc="the number of each frame that is sent again")
+    waiting = OutputPort(int, depends_on=(), doc="how many wait for the window to move, whenever that changes")
+
+    window = Parameter(int, 1, min=1, doc="how many frames may be out")
+    timeout: PortParameter[float] = PortParameter(
+        float, unit="s", above=0, doc="how long to wait for an acknowledgement"
+    )
+    spacing = Parameter(float, 0.0, unit="s", min=0, doc="time from one frame to the next at least: what a link takes")
+    repeat = Parameter(str, "all", choices=("all", "one"), doc="what is sent again: all that are out, or what is late")
+
+    def initialize(self) -> None:
+        self._queue: deque[Any] = deque()
+        self._acks: list[int] = []
+        self._out: dict[int, Any] = {}  # tokens by number, the oldest first
+        self._late: dict[int, Wake] = {}  # of those that have been sent: when they are late
+        self._ahead: list[int] = []  # those that are to be sent, the oldest first
+        self._next = 0  # number
+        self._sent = -1  # the last that was sent for the first time
+        self._free = 0  # when (ns) the next may be sent
+        self._wake: Wake | None = None
+        self._count = 0
+
+    def fire(self) -> None:
+        self._find_late()
+        if self._wake is not None and self._wake.due:
+            self._wake = None
+            self._acknowledge()
+            self._open()
+            self._send()
+        self._queue.extend(self.input.tokens)
+        self._acks.extend(self.ack.tokens)
+        if self.input.present or self.ack.present:
+            self._ask(self.context.time)
+
+    def _ask(self, time: int) -> None:
+        """See to it that it goes on at a time (ns), or before."""
+        if self._wake is None or self._wake.time > time:
+            if self._wake is not None:
+                self._wake.cancel()
+            self._wake = self.context.wake(self, time)
+
+    def _find_late(self) -> None:
+        late = [number for number, wake in self._late.items() if wake.due]
+        for number in list(self._late) if late and self.repeat == "all" else late:
+            self._late.pop(number).cancel()
+            insort(self._ahead, number)
+        if late:
+            self._send()
+
+    def _acknowledge(self) -> None:
+        for number in self._acks:
+            is_meant = number.__ge__ if self.repeat == "all" else number.__eq__
+            for each in [each for each in self._out if is_meant(each)]:
+                self.acknowledged.send(self._out.pop(each))
+                if each in self._late:
+                    self._late.pop(each).cancel()
+                else:
+                    self._ahead.remove(each)
+        self._acks = []
+
+    def _open(self) -> None:
+        """Let in what the window has place for."""
+        while self._queue and self._next - next(iter(self._out), self._next) < self.window:
+            self._out[self._next] = self._queue.popleft()
+            self._ahead.append(self._next)
+            self._next += 1
+        if len(self._queue) != self._count:
+            self._count = len(self._queue)
+            self.waiting.send(self._count)
+
+    def _send(self) -> None:
+        while self._ahead and self._free <= self.context.time:
+            number = self._ahead.pop(0)
+            self._late[number] = self.wake_in(self.timeout)
+            self._free = self.context.time + to_nanoseconds(self.spacing)
+            self.output.send({"number": number, "data": self._out[number]})
+            if number <= self._sent:
+                self.repeated.send(number)
+            self._sent = max(self._sent, number)
+        if self._ahead:
+            self._ask(self._free)
+
+
+class ArqReceiver(Actor):
+    """The receiving end of an automatic repeat request: hands on what comes by an ``ArqSender``, once and in order.
+
+    With ``repeat: all`` a frame that is not the next one is thrown away, and the last one in order is acknowledged;
+    with ``one`` it is kept until its turn, and each frame is acknowledged by itself.  Sources: see ``ArqSender``.
+    """
+
+    input: InputPort[Any] = InputPort(dict, doc="frames: {number, data}")
+    output = OutputPort(doc="their data, in order")
+    ack = OutputPort(int, doc="numbers of frames, for the sender")
+
+    repeat = Parameter(str, "all", choices=("all", "one"), doc="as of the sender")
+
+    def initialize(self) -> None:
+        self._expected = 0
+        self._kept: dict[int, Any] = {}
+
+    def fire(self) -> None:
+        for frame in self.input.tokens:
+            number = frame["number"]
+            if number == self._expected or (number > self._expected and self.repeat == "one"):
+                self._kept[number] = frame["data"]
+            while self._expected in self._kept:
+                self.output.send(self._kept.pop(self._expected))
+                self._expected += 1
+            if self.repeat == "one":
+                self.ack.send(number)
+            elif self._expected:
+                self.ack.send(self._expected - 1)

@@ -1,0 +1,8 @@
+"""Resources and those that wait for them: pools, waiting lines, stations."""
+
+from .line import WaitingLine
+from .pool import Pool
+from .stations import Machine, Station
+from .waiting import Waiter, Waiters
+
+__all__ = ["Machine", "Pool", "Station", "Waiter", "Waiters", "WaitingLine"]
