@@ -1,4 +1,4 @@
-"""What tests of the packaged demo models share."""
+"""What tests of the packaged models share."""
 
 from __future__ import annotations
 
@@ -6,6 +6,15 @@ from typing import Any
 
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.engine import Results
+
+# How long tests of all packaged models let those run in which much happens (s).
+DURATIONS = {
+    "collision_avoidance": 0.5,
+    "lift_group": 600.0,
+    "machine_shop": 40_000.0,
+    "switched_network": 2.0,
+    "warehouse": 3600.0,
+}
 
 
 def run(name: str, seed: int = 1, until: float | None = None, keep_log: bool = False, **settings: Any) -> Results:

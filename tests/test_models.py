@@ -8,6 +8,7 @@ import pytest
 
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.catalogue import packaged_models
+from tests.demo_models import DURATIONS
 
 
 @pytest.mark.parametrize("name", sorted(packaged_models()))
@@ -15,7 +16,7 @@ def test_packaged_model_runs(name: str) -> None:
     model = load_model(name)
     assert model.name == name
     assert model.doc
-    results = Simulation(model).run(until=0.5 if name == "collision_avoidance" else None)
+    results = Simulation(model).run(until=DURATIONS.get(name))
     assert results.events > 0
 
 

@@ -26,6 +26,7 @@ from epicycle.aspects import MeasurementFailure, PacketLoss
 from epicycle.runner import Model, ModelError, Results, Simulation, load_composite, load_model
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.graph import firing_order
+from tests.demo_models import DURATIONS
 
 
 class Noisy(Actor):
@@ -203,7 +204,7 @@ run: {stop: 9, record: sum.output}
 @pytest.mark.parametrize("name", sorted(packaged_models()))
 def test_a_model_runs_again_as_if_it_were_new(name: str) -> None:
     model = load_model(name)
-    until = 0.5 if name == "collision_avoidance" else min(model.stop or 20.0, 20.0)
+    until = min(model.stop or 20.0, DURATIONS.get(name, 20.0), 20.0)
     first, again = (Simulation(model, seed=3).run(until=until) for _ in range(2))
     anew = Simulation(load_model(name), seed=3).run(until=until)
     assert first.digest == again.digest == anew.digest

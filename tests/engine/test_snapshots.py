@@ -25,6 +25,7 @@ from epicycle.runner.engine import ActorError, CopyError, SnapshotError, Tracer
 from tests.aspects.strengths import AT_WORK
 from tests.aspects.testing.test_non_interference import GRID, at_home
 from tests.conformance.conformance_parts import TYPES
+from tests.demo_models import DURATIONS
 from tests.engine.engine_parts import Plan, Script, Ticker, load
 
 CONFORMANCE = sorted((Path(__file__).parents[1] / "conformance" / "models").glob("*.yaml"))
@@ -120,7 +121,7 @@ def assert_goes_on(model: Model, number: int, seed: int = 0, keep_log: bool = Tr
 def test_snapshots_of_packaged_models(name: str) -> None:
     short = ["observers=1", "disturbance=0.5"] if name == "collision_avoidance" else []
     model = load_model(name, set=short)
-    model.stop = min(model.stop or 100.0, {"collision_avoidance": 1.0, "machine_shop": 40_000.0}.get(name, 300.0))
+    model.stop = min(model.stop or 100.0, DURATIONS.get(name, 300.0))
     assert_goes_on(model, 3)
 
 

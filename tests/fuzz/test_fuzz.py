@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_mutants_of_good_models(seed: int) -> None:
     # In a process of its own, which watches what it opens, and whose memory is limited.
     command = [sys.executable, "-m", "tests.fuzz.fuzz", "--mutants", "1000", "--seed", str(seed), "--jobs", "1"]

@@ -17,8 +17,7 @@ from epicycle.runner.show import FigureError, draw
 from epicycle.runner.show.figures import Trajectories
 from epicycle.runner.show.pen import PALETTE, Sheet
 from epicycle.runner.text import Problems
-
-DURATIONS = {"collision_avoidance": 2.0, "machine_shop": 100_000.0}  # s
+from tests.demo_models import DURATIONS
 
 
 class Light(Enum):

@@ -20,6 +20,7 @@ from epicycle.runner import Simulation, load_model
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.engine import Results, Signal, plain
 from epicycle.runner.results import write_signals
+from tests.demo_models import DURATIONS
 
 
 class Light(Enum):
@@ -143,9 +144,6 @@ def restored(row: dict[str, Any]) -> Any:
         return json.loads(text)
     made = {"float": lambda: value, "int": lambda: int(text or value), "bool": lambda: value == 1.0}
     return made.get(kind, lambda: text)()
-
-
-DURATIONS = {"collision_avoidance": 2.0, "machine_shop": 100_000.0}  # s
 
 
 @pytest.mark.parametrize("name", sorted(packaged_models()))
