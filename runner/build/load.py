@@ -100,7 +100,10 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
     # Without a composite nobody needs to know what all packages offer.
     for name in sorted(known.composites.keys() & known.catalogue.actors.keys() if known.composites else ()):
         at = known.composites[name].position
-        problems.add(f"composite {name!r} has the name of an actor type", at, "give it another name")
+        # It is no error: a model stays as good as it was when a later version brings an actor of that name.
+        problems.warn(
+            f"composite {name!r} hides the actor type of that name", at, "give it another name if both are wanted"
+        )
     values.of_model = root.parameters
     names = settler.parameters("", root, {}, {}, None)
     made = Unfolding(known, settler, Draft(ModelGraph(limits)))

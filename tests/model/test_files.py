@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors import Actor, Parameter
+from epicycle.runner import Simulation
 from epicycle.runner.build import load_model
 from epicycle.runner.text import ModelError
 
@@ -68,3 +69,22 @@ def test_what_cannot_be_read(folder: Path, file: str, message: str) -> None:
     assert problem.message == f"reader.file: {message}"
     assert problem.position is not None
     assert (problem.position.line, problem.position.column) == (3, 32)
+
+
+def test_a_composite_may_have_the_name_of_an_actor_type(tmp_path: Path) -> None:
+    """A later version of Epicycle may bring an actor of that name, and the model stays as it was."""
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "model: m\ncomposites:\n  Merge: {outputs: [out], actors: {c: {type: Clock, period: 1}}, "
+        "connections: [c.output -> out]}\nactors: {a: {type: Merge}}\nrun: {stop: 2, record: a.out}\n"
+    )
+    model = load_model(path)
+    assert [str(each) for each in model.warnings] == [
+        (
+            f"{path}:3:3: warning: composite 'Merge' hides the actor type of that name\n"
+            "    3 |   Merge: {outputs: [out], actors: {c: {type: Clock, period: 1}}, connections: [c.output -> out]}\n"
+            "      |   ^^^^^\n"
+            "   help: give it another name if both are wanted"
+        )
+    ]
+    assert Simulation(model).run()["a.out"].tokens == [0, 1, 2]
