@@ -9,7 +9,7 @@ import ast
 import dataclasses
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -199,12 +199,17 @@ class PortFormulaParameter(_ExpressionParameter[PortFormula | None]):
         return value if isinstance(value, PortFormula) else super().convert(value)
 
 
+_PLAIN: Final = frozenset({bool, int, float, str, type(None)})
+
+
 def operand(token: Any) -> Any:
     """A token as the expression language knows it: arrays become lists, dataclasses dicts of their fields."""
-    if isinstance(token, (bool, int, float, str)) or token is None:
+    if type(token) in _PLAIN:
         return token
-    if isinstance(token, (np.generic, np.ndarray)):
+    if isinstance(token, (np.generic, np.ndarray)):  # one that is a float, too, divides by zero without an error
         return token.tolist()
+    if isinstance(token, (bool, int, float, str)):
+        return token
     if isinstance(token, (list, tuple)):
         return [operand(item) for item in token]
     if isinstance(token, Mapping):

@@ -16,8 +16,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from epicycle.actors import Function, ParameterError
-from epicycle.actors.expression import Formula
+from epicycle.actors import EpicycleError, Function, ParameterError
+from epicycle.actors.expression import Formula, operand
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.text import ModelError
 from tests.actors.feeding import feed, load, model_of, tokens
@@ -108,6 +108,14 @@ def test_an_expression_that_fails_tells_its_values(expression: str, token: Any, 
     with pytest.raises(ActorError) as caught:
         feed({"type": "Expression", "expression": expression}, {"x": [(1.0, token)]})
     assert str(caught.value).partition("\n")[0] == message
+
+
+@pytest.mark.parametrize("number", [0.0, np.float64(0.0), np.array(0.0)])
+def test_a_number_of_numpy_divides_as_any_other(number: Any) -> None:
+    assert operand(number) == 0.0
+    with pytest.raises(EpicycleError) as caught:
+        Formula("1.0 / x")({"x": operand(number)})
+    assert str(caught.value) == "'1.0 / x': 1.0 / x divides by zero, with x = 0.0"
 
 
 @pytest.mark.parametrize(
