@@ -25,6 +25,7 @@ from .reference import (
     is_part,
     parts_of,
     shown,
+    topic_order,
 )
 from .types import Catalogue, CatalogueError, Types, built_in, installed, load_all, types_of_file
 
@@ -65,6 +66,7 @@ __all__ = [
     "shown",
     "take_problem",
     "token_types",
+    "topic_order",
     "types_of_file",
     "unreadable",
 ]

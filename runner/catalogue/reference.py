@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from inspect import cleandoc
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -185,6 +186,38 @@ def shown(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+# What one looks for, in the order in which it is listed, and the modules of actors and aspects that are about it.
+TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
+    "sources": ("Where tokens begin", ("sources", "replay")),
+    "computing": (
+        "Arithmetic, logic, expressions, sums, statistics",
+        ("accumulation", "arithmetic", "functions", "logic", "statistics"),
+    ),
+    "flow": ("Where tokens go, what passes, and what is kept", ("flow", "passing", "variables")),
+    "time": ("Delays and timers", ("timing",)),
+    "queues and resources": ("What waits, and what it waits for", ("queues", "resources")),
+    "entities": ("Tokens with fields, and lists of tokens", ("entities",)),
+    "networks": ("Links, switches, repeats", ("links",)),
+    "modes": ("State machines", ("modes",)),
+    "control": ("Continuous state, linear systems, filters, controllers, limits", ("continuous", "control")),
+    "vehicles": ("Vehicles on the ground, their sensors, and how they are guided", ("vehicles",)),
+    "robotics": ("Robots that observe and avoid a moving obstacle, as in the paper", ("robotics",)),
+    "sinks": ("Where tokens end", ("sinks",)),
+    "communication": ("At input ports: whether, when and how a message arrives", ("communication", "media")),
+    "measurement": ("At output ports: what a sensor seems to have measured", ("measurement",)),
+    "situation": ("What depends on where bodies are: distance, range, line of sight, partition", ("situation",)),
+    "execution": ("At actors: firings that take time or do not happen, crashes, clocks", ("clock", "execution")),
+    "observation": ("At any port: what looks, and changes nothing", ("observation",)),
+}
+
+
+def topic_order(reference: TypeReference) -> tuple[int, str, str]:
+    """Where a type stands in a list: by its topic, those of other packages at the end, then by its name."""
+    order = list(TOPICS)
+    place = order.index(reference.group) if reference.group in order else len(order)
+    return place, reference.group, reference.name.casefold()
+
+
 def doc_of(cls: type) -> str:
     """The docstring of the class itself: a line for each paragraph, code in single backquotes as in Markdown."""
     own = vars(cls).get("__doc__") or ""
@@ -202,9 +235,13 @@ def first_sentence(doc: str) -> str:
 
 
 def _group(cls: type) -> tuple[str, str]:
-    """The topic under which a type is listed, and what its module says of it."""
+    """The topic under which a type is listed, and what is said of it; for a package's own, its name and doc."""
     parts = cls.__module__.split(".")
     # epicycle.actors.robotics.world is about robotics; acme_robots.lidar is of acme_robots.
     depth = 3 if parts[0] == "epicycle" else 1
+    own = parts[depth - 1] if len(parts) >= depth else parts[-1]
+    for topic, (about, modules) in TOPICS.items() if depth == 3 else ():
+        if own in modules:
+            return topic, about
     module = sys.modules.get(".".join(parts[:depth]))
-    return parts[depth - 1] if len(parts) >= depth else parts[-1], first_sentence(getattr(module, "__doc__", "") or "")
+    return own, first_sentence(getattr(module, "__doc__", "") or "")

@@ -26,15 +26,16 @@ from ..catalogue import (
     describe,
     parts_of,
     shown,
+    topic_order,
 )
 from ..language import CONSTRUCTS
 from ..printing import columns
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
-    """What types declare, topic by topic and in the order of their names."""
+    """What types declare, topic by topic."""
     found = [describe(name, cls) for name, cls in types.items()]
-    return sorted(found, key=lambda each: (each.group, each.name.casefold()))
+    return sorted(found, key=topic_order)
 
 
 def parts_described(types: Iterable[type[Configurable]]) -> dict[str, list[TypeReference]]:
@@ -140,8 +141,9 @@ def markdown(
     for title, references in (("Actors", actors), ("Aspects", aspects)):
         lines.append(f"## {title}\n")
         for (group, about), members in by_group(references):
-            names = ", ".join(f"[{each.name}](#{each.name.lower()})" for each in members)
-            lines.append(f"**{group}** ({about}): {names}\n")
+            lines.append(f"**{group[0].upper()}{group[1:]}.** {about}.\n")
+            table = [f"| [{each.name}](#{each.name.lower()}) | {_cell(each.summary)} |" for each in members]
+            lines.append("\n".join(["| | |", "| --- | --- |", *table]) + "\n")
         lines += [block for each in references for block in _markdown(each)]
     for base, known in parts_described(every).items():
         about = f"## {base}\n\nThe value of a parameter, such as `{{type: {known[0].name}, ...}}`.\n" if known else ""
@@ -172,8 +174,12 @@ def _metrics() -> list[str]:
 
 
 def _rows(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    cells = [[cell.replace("|", "\\|") for cell in (f"`{name}`", *others)] for name, *others in rows]
+    cells = [[_cell(each) for each in (f"`{name}`", *others)] for name, *others in rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (heading, ["---"] * len(heading), *cells)) + "\n"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def _markdown(reference: TypeReference) -> list[str]:

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner.build import load_model
-from epicycle.runner.catalogue import CatalogueError, Types, installed
+from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, installed
+from epicycle.runner.catalogue.reference import TOPICS
 from epicycle.runner.text import ModelError
 
 THIRD_PARTY = Path(__file__).parents[1] / "third_party"
@@ -216,3 +217,9 @@ def test_third_party_package_installs_with_pip(tmp_path: Path) -> None:
     options = ("--quiet", "--no-deps", "--no-build-isolation", "--disable-pip-version-check")
     subprocess.run([sys.executable, "-m", "pip", "install", *options, "--target", site, source], check=True)
     check_installed(site)
+
+
+def test_every_type_of_epicycle_has_a_topic_and_every_topic_a_type() -> None:
+    types = built_in()
+    groups = {describe(name, cls).group for known in (types.actors, types.aspects) for name, cls in known.items()}
+    assert groups == {*TOPICS}
