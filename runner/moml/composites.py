@@ -1,0 +1,414 @@
+"""Composites of a file as composite classes of the model language: their parts, wires, directors and parameters."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from .actors import Actor, face_of, is_decoration, is_layout, plain, seconds
+from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
+from .counterpart import Counterpart
+from .entities import Entity, Property
+from .names import Names, snake
+from .notes import Notes
+from .relations import End, Net, PortFace, Wiring
+from .scope import Scope, is_text, is_variable
+from .syntax import ExpressionError
+from .table import counterpart_of
+from .writing import Flow
+
+COMPOSITES = frozenset({
+    "TypedCompositeActor", "CompositeActor", "CompositeEntity", "ModalModel", "Refinement", "ModalRefinement",
+    "TypedAtomicActorComposite", "DECompositeActor", "ThreadedComposite", "CaseRefinement", "TypedOpaqueComposite",
+    *MODELS,
+})  # fmt: skip
+MACHINES = frozenset({"FSMActor", "ModalController", "InterfaceAutomaton", "FSMDirector"})
+_DE_LIKE = ("DEDirector", "DECQDirector")
+_FIRED_WHOLE = ("SDFDirector", "SROnceDirector", "SRDirector", "DDFDirector", "HDFDirector", "PSDFDirector", "FSMDirector",
+                "MultirateFSMDirector", "HSDirector", "DirectorLikeSDF", "TMDirector", "GiottoDirector")  # fmt: skip
+
+
+def kind(entity: Property) -> str:
+    """The name of its Java class, without the package."""
+    return entity.java.rpartition(".")[2]
+
+
+def is_machine(entity: Entity) -> bool:
+    """Whether it is a state machine, with or without refinements."""
+    return kind(entity) in MACHINES or kind(entity) == "ModalModel" or any(map(is_controller, entity.entities.values()))
+
+
+def is_controller(entity: Entity) -> bool:
+    """Whether it is the machine inside of a modal model."""
+    return kind(entity) in ("ModalController", "FSMActor") and entity.name == "_Controller"
+
+
+def director_of(entity: Entity) -> Property | None:
+    """The director that a composite has of its own."""
+    found = [each for each in entity.properties.values() if kind(each).endswith("Director") and not is_layout(each)]
+    return found[-1] if found else None
+
+
+@dataclass
+class Part:
+    """What a child of a composite becomes: its name and entry, and its ports by their names there."""
+
+    name: str
+    entry: Flow
+    row: Counterpart | None = None  # of an actor
+    ports: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class Level:
+    """One composite that is being imported."""
+
+    entity: Entity
+    path: str  # as messages tell it
+    scope: Scope
+    names: Names  # of its actors
+    ports: Names
+    parameters: Names
+    own_names: dict[str, str] = field(default_factory=dict)  # parameters that may stay names, and ours for them
+    used: set[str] = field(default_factory=set)
+    parts: dict[str, Part | None] = field(default_factory=dict)
+    requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are actors there
+
+    def told(self, name: str) -> str:
+        """The path of something within, for messages."""
+        return f"{self.path}.{name}" if self.path else name
+
+
+class Conversion:
+    """Goes through a model and makes its sections; what they share is here."""
+
+    def __init__(self, model: Entity, notes: Notes) -> None:
+        self.model = model
+        self.notes = notes
+        self.classes: dict[str, dict[str, Any]] = {}
+        self._known: dict[str, str] = {}  # the class of a body
+        self._class_names = Names()
+        self.rows: dict[int, Counterpart | None] = {}
+        for each in model.everything():
+            self.rows[id(each)] = None if is_composite(each) or is_machine(each) else counterpart_of(each.java)
+        self._scopes: dict[int, Scope] = {}
+        self._nets: dict[int, list[Net]] = {}
+        self.levels: dict[int, Level] = {}
+        self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
+        self.wiring = Wiring(model, self.face, self._width)
+
+    # -- what wires need ------------------------------------------------------------------------------------------
+
+    def face(self, entity: Entity, port: str) -> PortFace | None:
+        """The direction of a port, and whether it is a multiport; None if nothing is to be wired to it."""
+        if is_request(entity) or is_response(entity):
+            return PortFace("output" if is_request(entity) else "input", False)
+        row = self.rows.get(id(entity))
+        found = face_of(row, entity, port)
+        if found is None and row is None and not is_composite(entity) and not is_machine(entity):
+            return PortFace("output" if port.startswith("output") else "input", True)
+        return found
+
+    def _width(self, composite: Entity, relation: str) -> int | None:
+        said = composite.relations[relation].text("width")
+        if said is None or not said.strip():
+            return None
+        try:
+            found = self.scope_of(composite).value(said)
+        except ExpressionError as error:
+            self.notes.note(f"{relation}: its width {said!r}: {error}")
+            return None
+        return found if isinstance(found, int) and found >= 0 else None
+
+    def scope_of(self, entity: Entity) -> Scope:
+        """The scope of a composite anywhere in the model."""
+        if not self._scopes:
+            self._enter(self.model, None)
+        return self._scopes[id(entity)]
+
+    def _enter(self, entity: Entity, around: Scope | None) -> None:
+        waiting = [(entity, around)]
+        while waiting:
+            each, outer = waiting.pop()
+            scope = self._scopes[id(each)] = Scope(each, outer, {})
+            waiting += [(child, scope) for child in each.entities.values()]
+
+    # -- composites -----------------------------------------------------------------------------------------------
+
+    def level(self, entity: Entity, path: str) -> Level:
+        """What is known of a composite before its parts are."""
+        level = Level(entity, path, self.scope_of(entity), Names(), Names(), Names(in_expressions=True))
+        self.levels[id(entity)] = level
+        for name, said in entity.properties.items():
+            if is_variable(said) and not is_layout(said) and not is_decoration(said) and self._stays(name, said, level):
+                level.own_names[name] = level.parameters.of(name)
+        return level
+
+    def _stays(self, name: str, said: Property, level: Level) -> bool:
+        """Whether a parameter can be one of ours."""
+        try:
+            value = level.scope(name)
+            plain(value)
+        except (ExpressionError, KeyError, ValueError):
+            return False
+        return value is not None and (not isinstance(value, str) or is_text(said))
+
+    def body(self, level: Level) -> dict[str, Any]:
+        """The sections of a composite, or of the model."""
+        entity = level.entity
+        for name in entity.ports:
+            level.names.take(level.ports.of(name))
+        for child in entity.entities.values():
+            if is_request(child) or is_response(child):
+                level.requests[child.name] = level.ports.of(child.name)
+                level.names.take(level.requests[child.name])
+        for port, ours in level.ports.renamed().items():
+            self.notes.note(f"{level.told(port)} is called {ours}")
+        actors: dict[str, Flow] = {}
+        for child in entity.entities.values():
+            if child.name in level.requests:
+                continue
+            part = level.parts[child.name] = self._part(child, level)
+            if part is not None:
+                actors[part.name] = part.entry
+                if part.name != child.name:
+                    self.notes.note(f"{level.told(child.name)} is called {part.name}")
+        connections = self._connections(level)
+        found: dict[str, Any] = {}
+        if entity.doc:
+            found["doc"] = " ".join(entity.doc.split())
+        inputs, outputs = self._borders(level)
+        if inputs:
+            found["inputs"] = inputs
+        if outputs:
+            found["outputs"] = outputs
+        if actors:
+            found["actors"] = actors
+        if connections:
+            found["connections"] = connections
+        aspects = aspects_of(self, level)
+        if aspects:
+            found["aspects"] = aspects
+        self._about_properties(level)
+        return found
+
+    def _about_properties(self, level: Level) -> None:
+        for name, said in level.entity.properties.items():
+            if is_layout(said) or is_decoration(said) or is_variable(said) or kind(said).endswith("Director"):
+                continue
+            if said.value is not None or said.java:
+                self.notes.note(f"{level.told(name)}, a {kind(said) or 'property'}: has no counterpart")
+
+    def parameters(self, level: Level) -> dict[str, Any]:
+        """The parameters that something inside names."""
+        found = {}
+        for name, ours in level.own_names.items():
+            if name in level.used:
+                found[ours] = plain(level.scope(name))
+        return found
+
+    def _borders(self, level: Level) -> tuple[list[str], list[str]]:
+        found: tuple[list[str], list[str]] = ([], [])
+        for port in level.entity.ports:
+            face = self.face(level.entity, port)
+            if face is not None:
+                for channel in range(self._channels(level.entity, port)):
+                    found[face.direction == "output"].append(self.port_name(level.ports, port, channel))
+        for name, ours in level.requests.items():
+            found[is_response(level.entity.entities[name])].append(ours)
+        return found
+
+    def _channels(self, entity: Entity, port: str) -> int:
+        """How many ports of ours stand for a port of a composite."""
+        face = self.face(entity, port)
+        if face is None or not face.multi:
+            return 1
+        return max(self.wiring.width(entity, port), self._outer_width(entity, port), 1)
+
+    def _outer_width(self, entity: Entity, port: str) -> int:
+        around = self.container_of(entity)
+        return 0 if around is None else self.wiring.width(around, f"{entity.name}.{port}")
+
+    def container_of(self, entity: Entity) -> Entity | None:
+        """The composite in which an entity is; None for the model."""
+        return self._containers.get(id(entity))
+
+    def nets_of(self, composite: Entity) -> list[Net]:
+        """What is joined in a composite."""
+        if id(composite) not in self._nets:
+            self._nets[id(composite)] = self.wiring.nets(composite) if id(composite) in self.wiring.groups else []
+        return self._nets[id(composite)]
+
+    def port_name(self, names: Names, port: str, channel: int) -> str:
+        """Our name for a channel of a composite's port: each channel is a port by itself."""
+        return names.of(port) if channel == 0 else names.of(f"{port}_{channel}")
+
+    def _part(self, child: Entity, level: Level) -> Part | None:
+        from .modes import machine_part
+
+        if is_aspect(child):
+            return None
+        name = level.names.of(child.name)
+        if is_machine(child):
+            return machine_part(self, child, level, name)
+        if is_composite(child):
+            return self.composite_part(child, level, name)
+        row = self.rows[id(child)]
+        if row is None:
+            self._unknown(child, level)
+            return None
+        if row.is_view and not self._is_watched(child, level):
+            self.notes.count("view")
+            return None
+        actor = Actor(
+            child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
+            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
+        )  # fmt: skip
+        actor.convert()
+        level.used |= actor.used
+        return Part(name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports)
+
+    def _unknown(self, child: Entity, level: Level) -> None:
+        what = f"{level.told(child.name)} is a {child.java}"
+        if any(self.face(child, port.rpartition(".")[2]) for port in level.entity.links if port.startswith(f"{child.name}.")):
+            self.notes.error(f"{what}, which has no counterpart")
+        else:
+            self.notes.note(f"{what}: has no counterpart, and nothing is connected to it")
+
+    def _is_watched(self, child: Entity, level: Level) -> bool:
+        """Whether a view cannot be left out: an aspect stands there, or it takes a channel of a multiport."""
+        if is_decorated(child):
+            return True
+        relations = {
+            link.relation for port, links in level.entity.links.items() if port.startswith(f"{child.name}.") for link in links
+        }
+        for port, links in level.entity.links.items():
+            face = self.wiring._face(level.entity, port)
+            if face is not None and face.multi and face.direction == "output" and "." in port and len(links) > 1:
+                if relations & {link.relation for link in links}:
+                    return True
+        return False
+
+    def composite_part(self, child: Entity, level: Level, name: str) -> Part:
+        """A composite as an instance of a class of ours."""
+        inner = self.level(child, level.told(child.name))
+        body = self.body(inner)
+        values = self.parameters(inner)
+        if (director := director_of(child)) is not None:
+            found = self.director(director, inner)
+            if body.get("actors"):
+                body = _with_director(body, found)
+        if not body.get("actors"):
+            self.notes.note(f"{inner.path} has nothing in it")
+        return Part(name, self.instance(child, body, values))
+
+    def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow:
+        """The entry of an instance; its class is one that is there already, if that says the same."""
+        key = json.dumps([body, sorted(values)], default=str)
+        if key not in self._known:
+            name = self._class_names.fresh(child.of_class.rpartition(".")[2] or child.name)
+            self._known[key] = name
+            ordered = {"doc": body.pop("doc")} if "doc" in body else {}
+            self.classes[name] = {**ordered, **({"parameters": Flow(values)} if values else {}), **body}
+        name = self._known[key]
+        default = self.classes[name].get("parameters", {})
+        changed = {each: value for each, value in values.items() if not _same(default[each], value)}
+        return Flow({"type": name, **changed})
+
+    def director(self, director: Property, level: Level) -> dict[str, Any]:
+        """What is said of a director of a composite's own."""
+        name, found = kind(director), dict[str, Any]()
+        scope = Scope(director, level.scope)
+        told = level.told(director.name)
+        if name in _FIRED_WHOLE:
+            self.notes.note(f"{told}, a {name}: what is inside fires by the rules of DE")
+        elif name not in _DE_LIKE:
+            self.notes.error(f"{told} is a {director.java}, which has no counterpart")
+        for key, said in director.properties.items():
+            if is_layout(said) or said.value is None or not said.value.strip():
+                continue
+            try:
+                self._of_director(key, said, scope, found, told, is_model=level.entity is self.model)
+            except (ExpressionError, ValueError, TypeError) as error:
+                self.notes.note(f"{told}.{key} = {said.value!r}: {error}")
+        return found
+
+    def _of_director(
+        self, key: str, said: Property, scope: Scope, found: dict[str, Any], told: str, *, is_model: bool
+    ) -> None:
+        if key in ("binCountFactor", "isCQAdaptive", "minBinCount", "maskImpliedFirings", "timeResolution", "verbose",
+                   "localClock", "allowDisconnectedGraphs", "allowRateChanges", "vectorizationFactor", "iterations",
+                   "stopWhenQueueIsEmpty", "enforceMicrostepSemantics", "SuppressWarnings", "constrainBufferSizes",
+                   "seed"):  # fmt: skip
+            if key == "localClock" and (drift := said.text("clockDrift")):
+                found["drift"] = plain(scope.value(drift))
+            elif key == "iterations" and not is_model and scope.value_of(said) not in (0, 1, -1):
+                self.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
+            return
+        value = scope.value_of(said)
+        if key == "startTime" and value is not None:
+            found["start"] = seconds(value)
+        elif key == "stopTime" and value is not None:
+            if value not in (float("inf"), 1.7976931348623157e308):
+                found["stop"] = float(value)
+        elif key == "clockDrift" and value != 1.0:
+            found["drift"] = plain(value)
+        elif key == "synchronizeToRealTime" and value is False:
+            pass
+        elif key in ("synchronizeToRealTime", "timeScale", "realTime"):
+            self.notes.note(f"{told}.{key} = {said.value!r}: run it with --realtime")
+        else:
+            self.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
+
+    # -- wires ----------------------------------------------------------------------------------------------------
+
+    def _connections(self, level: Level) -> list[Any]:
+        from .wires import connections_of
+
+        return connections_of(self, level)
+
+    def end(self, level: Level, end: End) -> tuple[str, bool] | None:
+        """Our name for one end of a net, and whether tokens come from there; None if it is left out."""
+        entity = level.entity if not end.actor else level.entity.entities.get(end.actor)
+        face = None if entity is None else self.face(entity, end.port)
+        if entity is None or face is None:
+            return None
+        if not end.actor:
+            return self.port_name(level.ports, end.port, end.channel), face.direction == "input"
+        if end.actor in level.requests:
+            return level.requests[end.actor], is_request(entity)
+        part = level.parts.get(end.actor)
+        if part is None:
+            return None
+        return f"{part.name}.{self.port_of(entity, part, end.port, end.channel)}", face.direction == "output"
+
+    def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str:
+        """Our name for the port of a child."""
+        if port in part.ports:
+            return part.ports[port]
+        if part.row is None:
+            return self.port_name(self.levels[id(entity)].ports, port, channel)
+        if port in part.row.ports:
+            return part.row.ports[port].ours
+        return part.row.parameters[port].ours if port in part.row.parameters else snake(port)
+
+
+def is_composite(entity: Entity) -> bool:
+    """Whether it is a graph of its own."""
+    return kind(entity) in COMPOSITES or (bool(entity.entities) and counterpart_of(entity.java) is None and not entity.java.startswith("ptolemy.actor.lib.hoc"))
+
+
+def _with_director(body: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
+    """The body with its director in the usual place."""
+    said = {key: value for key, value in found.items() if key != "stop"}
+    front = {key: body[key] for key in ("doc", "inputs", "outputs") if key in body}
+    return {**front, "director": Flow(said), **{key: value for key, value in body.items() if key not in front}}
+
+
+def _same(one: object, other: object) -> bool:
+    return type(one) is type(other) and one == other
+
+
+__all__ = ["Conversion", "Level", "Net", "Part", "is_composite", "is_machine", "replace"]
