@@ -28,7 +28,7 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..graph import Clock, Hop, ModelGraph, WovenAspect, is_within
+from ..graph import Clock, Hop, ModelGraph, WovenAspect, channel_of, is_within
 from ..results import EventLog, Signal
 from ..text import describe
 from .aspect_context import EngineContext
@@ -219,19 +219,21 @@ class Ways:
             output.disconnect()
 
     def _find(self) -> list[tuple[OutputPort[Any], Emitter]]:
-        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
+        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.  Where a
+        # connection is shared, all wires over it are one.
         leaving: dict[str, list[tuple[Hop, ...]]] = {}
         for actor in self.actors.values():
             for port in actor.inputs.values():
-                wires = self.graph.wires_to(port)
-                port.width = len(wires)
-                for channel, wire in enumerate(wires):
-                    self._channels[wire.hops] = channel
-                    leaving.setdefault(wire.source.path, []).append(wire.hops)
+                channels = self.graph.channels_to(port)
+                port.width = len(channels)
+                for channel, wires in enumerate(channels):
+                    for wire in wires:
+                        self._channels[wire.hops] = channel
+                        leaving.setdefault(wire.source.path, []).append(wire.hops)
         for hops in leaving.values():
             hops.sort(key=lambda way: [hop.order for hop in way])  # as they are declared
         emitters = [
-            (output, self._emitter(output, leaving.get(output.path, [])))
+            (output, self._emitter(output, _by_channel(leaving.get(output.path, []))))
             for actor in self.actors.values()
             for output in actor.outputs.values()
         ]
@@ -254,34 +256,40 @@ class Ways:
         listeners = self._listeners.get(path, [])
         return [listener if isinstance(listener, Way) else Call(listener) for listener in listeners]
 
-    def _emitter(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emitter:
+    def _emitter(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]]) -> Emitter:
         """What ``port.send`` does."""
-        port.width = len(wires)
-        everywhere = self._sender(port, wires, None, self._branches(port.path, ()))
+        port.width = len(channels)
+        everywhere = self._sender(port, channels, None, self._branches(port.path, ()))
         # An aspect at an output stands before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
             return everywhere
         return Screened(everywhere, partial(self._woven, port.path, port.path))
 
     def _sender(
-        self, port: OutputPort[Any], wires: list[tuple[Hop, ...]], channel: int | None, ways: list[Way]
+        self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]], channel: int | None, ways: list[Way]
     ) -> Sender:
         writer = self.log.writer("send", port.actor.path, port.name, channel, "")
-        return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self, wires)
+        return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self, channels)
 
-    def along(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]], channel: int) -> Sender:
-        """What sends over one of the wires of a port."""
-        return self._sender(port, wires, channel, [self._way(wires[channel])])
+    def along(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]], channel: int) -> Sender:
+        """What sends over one of the channels of a port."""
+        wires = channels[channel]
+        ways = [self._way(wires[0])] if len(wires) == 1 else self._branches(port.path, (), wires)
+        return self._sender(port, channels, channel, ways)
 
-    def _branches(self, path: str, hops: tuple[Hop, ...]) -> list[Way]:
-        """The ways onward from a port, one for each connection that leaves it."""
+    def _branches(
+        self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None
+    ) -> list[Way]:
+        """The ways onward from a port, one for each connection that leaves it, or that some wires take."""
         ways = []
         for hop in self.graph.outgoing(path):
             far, taken = hop.destination, (*hops, hop)
+            if wires is not None and not any(wire[: len(taken)] == taken for wire in wires):
+                continue
             if self.graph.owner(far) in self.actors:
                 onward = self._put(taken)
             else:
-                onward = all_of(self._heard(far) + self._branches(far, taken))
+                onward = all_of(self._heard(far) + self._branches(far, taken, wires))
             ways.append(self._over(hop, onward, taken))
         return ways
 
@@ -295,14 +303,14 @@ class Ways:
     def _over(self, hop: Hop, onward: Way, channel: tuple[Hop, ...]) -> Way:
         """One connection: its delay, and the aspects and the passage at its far end."""
         far = hop.destination
-        passage = self._passages.get(far)
+        passage, lane = self._passages.get(far), channel_of(channel, hop)
         is_output = self.graph.direction(far) == "output"
         source = far if is_output else hop.source
         # Aspects at a port of a composite stand outside of it.
         if passage is not None and not is_output:
-            onward = self._woven(far, source, passage.lane(channel, onward))
+            onward = self._woven(far, source, passage.lane(lane, onward))
         elif passage is not None:
-            onward = passage.lane(channel, self._woven(far, source, onward))
+            onward = passage.lane(lane, self._woven(far, source, onward))
         else:
             onward = self._woven(far, source, onward)
         for woven in reversed(self._woven_on.get((hop.source, far), [])):
@@ -436,3 +444,11 @@ class Ways:
                 raise
             except Exception as error:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
+
+
+def _by_channel(wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
+    """The wires of an output port by the channel, in their order."""
+    found: dict[object, list[tuple[Hop, ...]]] = {}
+    for hops in wires:
+        found.setdefault(channel_of(hops, hops[0]), []).append(hops)
+    return list(found.values())

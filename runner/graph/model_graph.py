@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import Actor, InputPort, OutputPort
@@ -28,6 +28,7 @@ class Hop:
     delay: int | None  # ns; None: within the tag
     position: Position | None
     order: int
+    shared: int | None = field(default=None, kw_only=True)  # the same for all hops of a connection that is one channel
 
     def __str__(self) -> str:
         return f"{self.source} -> {self.destination}"
@@ -209,9 +210,11 @@ class ModelGraph:
         port.name, port.path = path.rpartition(".")[2], path
         self.ports[path].port = port
 
-    def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
+    def connect(
+        self, source: str, destination: str, delay: int | None, position: Position | None, shared: int | None = None
+    ) -> None:
         self._check_open()
-        self._enter(Hop(source, destination, delay, position, self._order))
+        self._enter(Hop(source, destination, delay, position, self._order, shared=shared))
 
     def _enter(self, hop: Hop) -> None:
         self._order = hop.order + 1
@@ -335,6 +338,13 @@ class ModelGraph:
             if isinstance(start := self.ports[hops[0].source].port, OutputPort)
         ]
 
+    def channels_to(self, port: InputPort[Any]) -> list[list[Wire]]:
+        """The wires that end at an input port, by the channel."""
+        found: dict[object, list[Wire]] = {}
+        for wire in self.wires_to(port):
+            found.setdefault(channel_of(wire.hops, wire.hops[-1]), []).append(wire)
+        return list(found.values())
+
     def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
         """The ways from a port to actors' ports; ``check_passages`` has seen to it that they end."""
         for hop in self.outgoing(path) if forward else self.incoming(path):
@@ -364,6 +374,11 @@ class ModelGraph:
                 waiting += [each for each in reversed(before) if each not in seen]
                 seen.update(before)
         return found
+
+
+def channel_of(hops: tuple[Hop, ...], hop: Hop) -> object:
+    """What tells the channels of a port apart: the wire, or the connection at the port if that is one channel."""
+    return hops if hop.shared is None else hop.shared
 
 
 def is_within(path: str, outer: str) -> bool:

@@ -197,7 +197,7 @@ def _model(conversion: Conversion, level: Level, aspect: Entity, places: list[Pl
     at: list[Any] = []
     requests = [each.name for each in aspect.entities.values() if _kind(each) in REQUESTS]
     for place in places:
-        asked = place.value("inputPort") or place.value("requestPort") or place.value("inPort") or ""
+        asked = next((text.strip() for each in ("inputPort", "requestPort", "port") if (text := place.said.text(each))), "")
         pointcut = {"at": place.path}
         if len(requests) > 1:
             if asked not in aspect.entities:

@@ -348,14 +348,14 @@ class Conversion:
                 self.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
             return
         value = scope.value_of(said)
-        if key == "startTime" and value is not None:
+        if key == "startTime" and value:
             found["start"] = seconds(value)
         elif key == "stopTime" and value is not None:
-            if value not in (float("inf"), 1.7976931348623157e308):
+            if value < 1e300:
                 found["stop"] = float(value)
         elif key == "clockDrift" and value != 1.0:
             found["drift"] = plain(value)
-        elif key == "synchronizeToRealTime" and value is False:
+        elif key in ("startTime", "stopTime", "clockDrift") or value is False:
             pass
         elif key in ("synchronizeToRealTime", "timeScale", "realTime"):
             self.notes.note(f"{told}.{key} = {said.value!r}: run it with --realtime")
