@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from epicycle.actors import Actor as OwnActor
+
 from .actors import Actor, face_of, is_decoration, is_layout, plain, seconds
 from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
-from .counterpart import Counterpart
+from .counterpart import Counterpart, counterpart_of_type
 from .entities import Entity, Property
+from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
 from .relations import End, Net, PortFace, Wiring
@@ -24,7 +28,6 @@ COMPOSITES = frozenset({
     "TypedAtomicActorComposite", "DECompositeActor", "ThreadedComposite", "CaseRefinement", "TypedOpaqueComposite",
     *MODELS,
 })  # fmt: skip
-MACHINES = frozenset({"FSMActor", "ModalController", "InterfaceAutomaton", "FSMDirector"})
 _DE_LIKE = ("DEDirector", "DECQDirector")
 _FIRED_WHOLE = ("SDFDirector", "SROnceDirector", "SRDirector", "DDFDirector", "HDFDirector", "PSDFDirector", "FSMDirector",
                 "MultirateFSMDirector", "HSDirector", "DirectorLikeSDF", "TMDirector", "GiottoDirector")  # fmt: skip
@@ -33,16 +36,6 @@ _FIRED_WHOLE = ("SDFDirector", "SROnceDirector", "SRDirector", "DDFDirector", "H
 def kind(entity: Property) -> str:
     """The name of its Java class, without the package."""
     return entity.java.rpartition(".")[2]
-
-
-def is_machine(entity: Entity) -> bool:
-    """Whether it is a state machine, with or without refinements."""
-    return kind(entity) in MACHINES or kind(entity) == "ModalModel" or any(map(is_controller, entity.entities.values()))
-
-
-def is_controller(entity: Entity) -> bool:
-    """Whether it is the machine inside of a modal model."""
-    return kind(entity) in ("ModalController", "FSMActor") and entity.name == "_Controller"
 
 
 def director_of(entity: Entity) -> Property | None:
@@ -84,7 +77,7 @@ class Level:
 class Conversion:
     """Goes through a model and makes its sections; what they share is here."""
 
-    def __init__(self, model: Entity, notes: Notes) -> None:
+    def __init__(self, model: Entity, notes: Notes, own: Mapping[str, type[OwnActor]]) -> None:
         self.model = model
         self.notes = notes
         self.classes: dict[str, dict[str, Any]] = {}
@@ -92,12 +85,18 @@ class Conversion:
         self._class_names = Names()
         self.rows: dict[int, Counterpart | None] = {}
         for each in model.everything():
-            self.rows[id(each)] = None if is_composite(each) or is_machine(each) else counterpart_of(each.java)
+            is_row = not is_composite(each) and not is_machine(each)
+            self.rows[id(each)] = self._row(each, own) if is_row else None
         self._scopes: dict[int, Scope] = {}
         self._nets: dict[int, list[Net]] = {}
+        self.version = version_of(model)
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
         self.wiring = Wiring(model, self.face, self._width)
+
+    def _row(self, entity: Entity, own: Mapping[str, type[OwnActor]]) -> Counterpart | None:
+        found = own.get(kind(entity))
+        return counterpart_of(entity.java) if found is None else counterpart_of_type(found)
 
     # -- what wires need ------------------------------------------------------------------------------------------
 
@@ -246,8 +245,6 @@ class Conversion:
         return names.of(port) if channel == 0 else names.of(f"{port}_{channel}")
 
     def _part(self, child: Entity, level: Level) -> Part | None:
-        from .modes import machine_part
-
         if is_aspect(child):
             return None
         name = level.names.of(child.name)
@@ -393,6 +390,12 @@ class Conversion:
         if port in part.row.ports:
             return part.row.ports[port].ours
         return part.row.parameters[port].ours if port in part.row.parameters else snake(port)
+
+
+def version_of(model: Entity) -> tuple[int, int]:
+    """The version of Ptolemy that wrote a model; a recent one if that is not said."""
+    said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
+    return (int(said[1]), int(said[2])) if said is not None else (11, 0)
 
 
 def is_composite(entity: Entity) -> bool:

@@ -8,6 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from epicycle.actors import Actor as OwnActor
+from epicycle.actors import declared_parameters, declared_ports
+
 from .names import snake
 from .relations import PortFace
 
@@ -75,6 +78,20 @@ def _parameter(name: str, text: str) -> ParameterSaid:
     assert match is not None, text
     default = UNSAID if match["default"] is None else ast.literal_eval(match["default"])
     return ParameterSaid(match["ours"] or snake(name), match["kind"], default)
+
+
+def counterpart_of_type(kind: type[OwnActor]) -> Counterpart:
+    """The row of an actor that somebody wrote to stand for a Java class of its name: all names are ours in camel case."""
+    ports = {}
+    for name, port in declared_ports(kind).items():
+        ports[_camel(name)] = PortSaid(name, PortFace(port.direction, port.multi))
+    parameters = {_camel(name): ParameterSaid(name, "value") for name in declared_parameters(kind)}
+    return Counterpart(kind.__name__, ports, parameters)
+
+
+def _camel(name: str) -> str:
+    first, *rest = name.split("_")
+    return first + "".join(each.capitalize() for each in rest)
 
 
 def view(ports: str = "input*") -> Counterpart:

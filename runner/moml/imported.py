@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from epicycle.actors import Actor
 
 from .actors import seconds
 from .composites import Conversion, director_of
@@ -28,14 +30,17 @@ class Imported:
     notes: tuple[str, ...]
 
 
-def import_moml(path: Path, load: Callable[[Path], object] | None = None) -> Imported:
+def import_moml(
+    path: Path, load: Callable[[Path], object] | None = None, types: Iterable[type] = ()
+) -> Imported:
     """Import a file; raises ``MomlError`` with all that stands in the way.
 
-    ``load`` is given a file with the result and is to raise what is wrong with it.
+    ``load`` is given a file with the result and is to raise what is wrong with it.  ``types`` are actors of one's own:
+    one that has the name of a Java class stands for it.
     """
     notes = Notes()
     root = Builder(lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
-    text = _text(root, path.name, notes)
+    text = _text(root, path.name, notes, {each.__name__: each for each in types if issubclass(each, Actor)})
     if notes.errors:
         raise MomlError(_refusal(path.name, notes.errors))
     if load is not None:
@@ -48,8 +53,8 @@ def _refusal(name: str, reasons: list[str]) -> str:
     return f"{name} cannot be imported:\n{told}"
 
 
-def _text(model: Entity, file: str, notes: Notes) -> str:
-    conversion = Conversion(model, notes)
+def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]) -> str:
+    conversion = Conversion(model, notes, own)
     level = conversion.level(model, "")
     body = conversion.body(level)
     sections: dict[str, Any] = {"model": Names().of(model.name or Path(file).stem)}

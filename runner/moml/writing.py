@@ -76,7 +76,7 @@ def block(value: Mapping[str, object], indent: int = 0) -> Iterable[str]:
         elif isinstance(each, (Mapping, list, tuple)):
             yield f"{head} {line(each)}"
         else:
-            yield f"{head} {scalar(each)}"
+            yield head if each is None else f"{head} {scalar(each)}"
 
 
 def _is_long(head: str, items: Sequence[object]) -> bool:
