@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +15,6 @@ from .relations import PortFace
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
 from .translate import translated
-from .writing import Flow
 
 _LAYOUT = re.compile(
     r"vergil|\.gui\.|[iI]con|Location|Annotation|SizeAttribute|WindowProperties|VersionAttribute|TextAttribute|"
@@ -52,7 +51,7 @@ class Actor:
     ports: dict[str, str] = field(default_factory=dict)  # ours, for those of its ports that the row does not know
     used: set[str] = field(default_factory=set)  # the parameters of the model that it names
     told: set[str] = field(default_factory=set)  # parameters that are dealt with
-    beside: list[tuple[str, Flow, str]] = field(default_factory=list)  # further actors, each with one port of this one
+    follow: Callable[[str, str], None] = lambda ours, text: None  # lets one of ours go by an expression over variables
 
     # -- what is said in the file ---------------------------------------------------------------------------------
 
@@ -130,6 +129,8 @@ class Actor:
         try:
             found = self.scope.value_of(said)
             self.values[row.ours] = self._by_name(said, found, row.kind) or written(found, row.kind)
+            if not is_text(said):
+                self.follow(row.ours, said.value or "")
         except (ExpressionError, TypeError, ValueError, OverflowError) as error:
             self.notes.error(f"{self.path}.{name} = {_brief(said.value or '')}: {error}")
 

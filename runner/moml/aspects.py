@@ -135,7 +135,7 @@ def _bus(conversion: Conversion, level: Level, aspect: Entity, places: list[Plac
     factor = 0.1
     for key, said in aspect.properties.items():
         if key in ("serviceTimeMultiplicationFactor", "serviceTime"):
-            factor = scope.value_of(said)
+            factor = factor if (value := scope.value_of(said)) is None else value
         elif not is_layout(said) and not is_decoration(said) and said.value is not None:
             conversion.notes.note(f"{level.told(aspect.name)}.{key} = {said.value!r}: has no counterpart")
     # Of one length and one place in the order, a declaration; all of them are one medium.

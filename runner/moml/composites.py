@@ -21,6 +21,7 @@ from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
 from .table import counterpart_of
+from .variables import Variables
 from .writing import Flow
 
 COMPOSITES = frozenset({
@@ -60,6 +61,8 @@ class Level:
 
     entity: Entity
     path: str  # as messages tell it
+    at: str  # where it is in the written model: "" or a path with a dot behind it
+    outer: Level | None
     scope: Scope
     names: Names  # of its actors
     ports: Names
@@ -68,6 +71,8 @@ class Level:
     used: set[str] = field(default_factory=set)
     parts: dict[str, Part | None] = field(default_factory=dict)
     requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are actors there
+    added_outputs: list[str] = field(default_factory=list)  # by which something in it sets a variable around it
+    added_connections: list[str] = field(default_factory=list)
 
     def told(self, name: str) -> str:
         """The path of something within, for messages."""
@@ -92,6 +97,7 @@ class Conversion:
         self.version = version_of(model)
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
+        self.variables = Variables(self)
         self.wiring = Wiring(model, self.face, self._width)
 
     def _row(self, entity: Entity, own: Mapping[str, type[OwnActor]]) -> Counterpart | None:
@@ -102,6 +108,8 @@ class Conversion:
 
     def face(self, entity: Entity, port: str) -> PortFace | None:
         """The direction of a port, and whether it is a multiport; None if nothing is to be wired to it."""
+        if (id(entity), port) in self.variables.ports:
+            return PortFace("input", False)
         if is_request(entity) or is_response(entity):
             return PortFace("output" if is_request(entity) else "input", False)
         row = self.rows.get(id(entity))
@@ -136,12 +144,14 @@ class Conversion:
 
     # -- composites -----------------------------------------------------------------------------------------------
 
-    def level(self, entity: Entity, path: str) -> Level:
+    def level(self, entity: Entity, path: str, at: str = "", outer: Level | None = None) -> Level:
         """What is known of a composite before its parts are."""
-        level = Level(entity, path, self.scope_of(entity), Names(), Names(), Names(in_expressions=True))
+        names = Names(), Names(), Names(in_expressions=True)
+        level = Level(entity, path, at, outer, self.scope_of(entity), *names)
         self.levels[id(entity)] = level
         for name, said in entity.properties.items():
-            if is_variable(said) and not is_layout(said) and not is_decoration(said) and self._stays(name, said, level):
+            is_parameter = is_variable(said) and not is_layout(said) and not is_decoration(said)
+            if is_parameter and self._stays(name, said, level) and self.variables.find(level.scope, name) is None:
                 level.own_names[name] = level.parameters.of(name)
         return level
 
@@ -175,6 +185,8 @@ class Conversion:
                 if part.name != child.name:
                     self.notes.note(f"{level.told(child.name)} is called {part.name}")
         connections = self._connections(level)
+        following = self.variables.add(level, actors, connections)
+        connections += level.added_connections
         found: dict[str, Any] = {}
         if entity.doc:
             found["doc"] = " ".join(entity.doc.split())
@@ -187,7 +199,7 @@ class Conversion:
             found["actors"] = actors
         if connections:
             found["connections"] = connections
-        aspects = aspects_of(self, level)
+        aspects = {**aspects_of(self, level), **following}
         if aspects:
             found["aspects"] = aspects
         self._about_properties(level)
@@ -217,6 +229,10 @@ class Conversion:
                     found[face.direction == "output"].append(self.port_name(level.ports, port, channel))
         for name, ours in level.requests.items():
             found[is_response(level.entity.entities[name])].append(ours)
+        for each in self.variables.of(level.entity):
+            if each.is_port and each.name not in level.entity.ports:
+                found[0].append(level.ports.of(each.name))
+        found[1].extend(level.added_outputs)
         return found
 
     def _channels(self, entity: Entity, port: str) -> int:
@@ -233,6 +249,11 @@ class Conversion:
     def container_of(self, entity: Entity) -> Entity | None:
         """The composite in which an entity is; None for the model."""
         return self._containers.get(id(entity))
+
+    def is_linked(self, entity: Entity, port: str) -> bool:
+        """Whether something is linked to a port from outside."""
+        around = self.container_of(entity)
+        return around is not None and bool(around.links.get(f"{entity.name}.{port}"))
 
     def nets_of(self, composite: Entity) -> list[Net]:
         """What is joined in a composite."""
@@ -263,9 +284,13 @@ class Conversion:
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
             {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
         )  # fmt: skip
+        actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
         actor.convert()
         level.used |= actor.used
-        return Part(name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports)
+        part = Part(name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports)
+        if actor.row.type == "SetVariable":
+            self.variables.note_setter(child, level, part)
+        return part
 
     def _unknown(self, child: Entity, level: Level) -> None:
         what = f"{level.told(child.name)} is a {child.java}"
@@ -290,7 +315,7 @@ class Conversion:
 
     def composite_part(self, child: Entity, level: Level, name: str) -> Part:
         """A composite as an instance of a class of ours."""
-        inner = self.level(child, level.told(child.name))
+        inner = self.level(child, level.told(child.name), f"{level.at}{name}.", level)
         body = self.body(inner)
         values = self.parameters(inner)
         if (director := director_of(child)) is not None:

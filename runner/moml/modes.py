@@ -52,6 +52,8 @@ class _Machine:
     entity: Entity  # the modal model, or the machine itself
     controller: Entity
     path: str
+    at: str
+    outer: Level
     ports: Names  # of ports and variables
     states: Names = field(default_factory=Names)
     variables: dict[str, str] = field(default_factory=dict)  # ours
@@ -83,7 +85,7 @@ class _Machine:
             if len(refinements) > 1:
                 self.tell(f"{state.name} has {len(refinements)} refinements, and only {refinements[0]} is one here")
             if refinements and self.entity is not self.controller:
-                if (refinement := self._refinement(refinements[0])) is not None:
+                if (refinement := self._refinement(refinements[0], self.states.of(state.name))) is not None:
                     said["refinement"] = refinement
             if self._flag(state, "isFinalState") or state.name in [each.strip() for each in finals]:
                 said["final"] = True
@@ -131,13 +133,13 @@ class _Machine:
             self.tell(f"{owner.name}.{name} = {said!r}: {error}")
             return False
 
-    def _refinement(self, name: str) -> Any:
+    def _refinement(self, name: str, mode: str) -> Any:
         """The class of a refinement, which knows its ports by the names that they have outside."""
         child = self.entity.entities.get(name)
         if child is None:
             self.conversion.notes.error(f"{self.path}: there is no refinement {name!r}")
             return None
-        found = refinement_of(self.conversion, child, f"{self.path}.{name}", self.ports)
+        found = refinement_of(self, child, f"{self.path}.{name}", mode)
         return found["type"] if len(found) == 1 else found
 
     # -- transitions ----------------------------------------------------------------------------------------------
@@ -301,7 +303,7 @@ def machine_part(conversion: Conversion, child: Entity, level: Level, name: str)
     assert controller is not None
     path = level.told(child.name)
     ports = Names(_RESERVED, in_expressions=True)
-    machine = _Machine(conversion, child, controller, path, ports)
+    machine = _Machine(conversion, child, controller, path, f"{level.at}{name}.", level, ports)
     _tell_rest(conversion, child, path, machine)
     if child is controller:
         entry = Flow({"type": "StateMachine", **machine.written()})
@@ -324,17 +326,17 @@ def _class(machine: _Machine) -> dict[str, Any]:
     return {**found, **said}
 
 
-def refinement_of(conversion: Conversion, child: Entity, path: str, ports: Names) -> Flow:
+def refinement_of(around: _Machine, child: Entity, path: str, mode: str) -> Flow:
     """The refinement of a mode: a composite, perhaps with modes of its own."""
     from .composites import director_of
 
-    controller = controller_of(child)
+    conversion, controller, at = around.conversion, controller_of(child), f"{around.at}{mode}."
     if controller is not None:
-        machine = _Machine(conversion, child, controller, path, ports)
+        machine = _Machine(conversion, child, controller, path, at, around.outer, around.ports)
         _tell_rest(conversion, child, path, machine)
         return conversion.instance(child, _class(machine), {})
-    level = conversion.level(child, path)
-    level.ports = ports
+    level = conversion.level(child, path, at, around.outer)
+    level.ports = around.ports
     body = conversion.body(level)
     if (director := director_of(child)) is not None:
         said = conversion.director(director, level)

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from . import special as how
 from .counterpart import Counterpart, counterpart, view
+from .variables import set_variable
 
 _SOURCES: Mapping[str, Counterpart] = {
     "DiscreteClock": counterpart(
@@ -107,6 +108,7 @@ _FLOW: Mapping[str, Counterpart] = {
     "ArrayToSequence": counterpart("Unbatch", arrayLength="nothing", enforceArrayLength="nothing"),
     "RecordAssembler": counterpart("RecordAssembler", "| output", special=how.fields("input")),
     "RecordDisassembler": counterpart("RecordDisassembler", "input |", special=how.fields("output")),
+    "SetVariable": counterpart("SetVariable", special=set_variable, variableName="nothing"),
     "IsPresent": counterpart("IsPresent", "input* | output*"),
 }  # fmt: skip
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 WIDTH = 118
-_PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./*%()\[\] +^<>=-]*\Z")
+_PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./*%()\[\], +^<>=;-]*\Z")
 _IN_FLOW = re.compile(r"[\[\]{},]")
 _SPECIAL = {"true", "false", "null", "yes", "no", "on", "off", "~", "y", "n"}
 _BARE_KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
