@@ -79,7 +79,7 @@ def aspects_of(conversion: Conversion, level: Level) -> dict[str, Flow]:
     for place in _places(conversion, level, level.entity, ""):
         name = (place.said.text("decoratorName") or "").rpartition(".")[2]
         places.setdefault(name, []).append(place)
-    made: list[tuple[float, str, Flow]] = []
+    made: Made = []
     for aspect in aspects:
         here = places.pop(aspect.name, [])
         try:
@@ -92,7 +92,11 @@ def aspects_of(conversion: Conversion, level: Level) -> dict[str, Flow]:
                 made += make(conversion, level, aspect, here)
         except (ExpressionError, ValueError, TypeError) as error:
             conversion.notes.error(f"{level.told(aspect.name)}: {error}")
-    for _, name, entry in sorted(made, key=lambda each: each[0]):
+    # Those at ports in the order of their numbers, at the places that they have among the others.
+    at_ports = iter(sorted((each for each in made if each[0] is not None), key=lambda each: each[0] or 0.0))
+    for sequence, name, entry in made:
+        if sequence is not None:
+            _, name, entry = next(at_ports)
         found[name] = entry
     return found
 
@@ -118,11 +122,11 @@ def _places(conversion: Conversion, level: Level, entity: Entity, prefix: str) -
         yield from _places(conversion, level, child, f"{path}.")
 
 
-Made = list[tuple[float, str, Flow]]  # the sequence number, the name, the entry
+Made = list[tuple[float | None, str, Flow]]  # the sequence number of one at ports, the name, the entry
 
 
-def _sequence(places: list[Place]) -> float:
-    return min((float(each.value("sequenceNumber", 0)) for each in places), default=0.0)
+def _sequence(places: list[Place]) -> float | None:
+    return min((float(each.value("sequenceNumber", 0)) for each in places if each.is_port), default=None)
 
 
 def _at(places: list[Any]) -> Any:

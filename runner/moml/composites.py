@@ -17,6 +17,7 @@ from .entities import Entity, Property
 from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
+from .reach import is_fed, leave_out_idle
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
@@ -98,7 +99,10 @@ class Conversion:
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
         self.variables = Variables(self)
+        self.idle: set[int] = set()  # what never fires
         self.wiring = Wiring(model, self.face, self._width)
+        self.triggers = self._iterations()
+        leave_out_idle(self)
 
     def _row(self, entity: Entity, own: Mapping[str, type[OwnActor]]) -> Counterpart | None:
         found = own.get(kind(entity))
@@ -108,6 +112,8 @@ class Conversion:
 
     def face(self, entity: Entity, port: str) -> PortFace | None:
         """The direction of a port, and whether it is a multiport; None if nothing is to be wired to it."""
+        if id(entity) in self.idle:
+            return None
         if (id(entity), port) in self.variables.ports:
             return PortFace("input", False)
         if is_request(entity) or is_response(entity):
@@ -141,6 +147,32 @@ class Conversion:
             each, outer = waiting.pop()
             scope = self._scopes[id(each)] = Scope(each, outer, {})
             waiting += [(child, scope) for child in each.entities.values()]
+
+    def is_fed(self, composite: Entity, child: Entity, port: str) -> bool:
+        """Whether anything sends to a port of a child."""
+        return is_fed(self, composite, child, port)
+
+    def path_of(self, composite: Entity, child: Entity) -> str:
+        """Where something is, for messages."""
+        names, around = [child.name], composite
+        while (outer := self.container_of(around)) is not None:
+            names.append(around.name)
+            around = outer
+        return ".".join(reversed(names))
+
+    def _iterations(self) -> dict[tuple[int, str], str]:
+        """The inputs of composites that trigger what fires in each iteration of their director, by its trigger."""
+        found = {}
+        for composite in self.model.everything():
+            director = director_of(composite) if composite is not self.model else None
+            if director is None or kind(director) not in _FIRED_WHOLE:
+                continue
+            inputs = [name for name, port in composite.ports.items() if port.flag("input") and composite.links.get(name)]
+            for child in composite.entities.values() if inputs else ():
+                row = self.rows.get(id(child))
+                if row is not None and "trigger" in row.ports and not composite.links.get(f"{child.name}.trigger"):
+                    found[id(composite), f"{child.name}.trigger"] = inputs[0]
+        return found
 
     # -- composites -----------------------------------------------------------------------------------------------
 
@@ -274,6 +306,8 @@ class Conversion:
         if is_composite(child):
             return self.composite_part(child, level, name)
         row = self.rows[id(child)]
+        if id(child) in self.idle:
+            return None
         if row is None:
             self._unknown(child, level)
             return None

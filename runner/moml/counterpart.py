@@ -53,6 +53,7 @@ class Counterpart:
     fixed: Mapping[str, object] = field(default_factory=dict)
     special: Callable[[Actor], None] | None = None  # what the words of a row cannot say
     is_view: bool = False  # it only shows what comes, to somebody who looks on
+    needs: frozenset[str] = frozenset()  # inputs without which it never fires there, though ours would
 
 
 def counterpart(
@@ -61,6 +62,7 @@ def counterpart(
     *,
     fixed: Mapping[str, object] | None = None,
     special: Callable[[Actor], None] | None = None,
+    needs: str = "",
     **parameters: str,
 ) -> Counterpart:
     """A row in few words: ``"input* trigger=ours | output"`` (``*`` is a multiport), ``period="time=1.0"``."""
@@ -70,7 +72,8 @@ def counterpart(
             match = _PORT.fullmatch(each)
             assert match is not None, each
             said[match["name"]] = PortSaid(match["ours"] or snake(match["name"]), PortFace(direction, bool(match["multi"])))
-    return Counterpart(type_name, said, {name: _parameter(name, each) for name, each in parameters.items()}, fixed or {}, special)
+    read = {name: _parameter(name, each) for name, each in parameters.items()}
+    return Counterpart(type_name, said, read, fixed or {}, special, needs=frozenset(needs.split()))
 
 
 def _parameter(name: str, text: str) -> ParameterSaid:

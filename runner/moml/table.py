@@ -30,11 +30,11 @@ _SOURCES: Mapping[str, Counterpart] = {
         seed="nothing", resetOnEachRun="nothing", privateSeed="nothing",
     ),
     "SingleEvent": counterpart("SingleEvent", "trigger* | output", special=how.single_event, time="time", value="value"),
-    "Const": counterpart("Const", "trigger* | output", value="value"),
-    "StringConst": counterpart("Const", "trigger* | output", special=how.text_value, value="text"),
+    "Const": counterpart("Const", "trigger* | output", needs="trigger", value="value"),
+    "StringConst": counterpart("Const", "trigger* | output", needs="trigger", special=how.text_value, value="text"),
     "Ramp": counterpart("Ramp", "trigger* init step | output", init="value", step="value"),
     "Sequence": counterpart(
-        "Sequence", "trigger* enable | output", values="list=[1]", repeat="flag", holdLastOutput="flag:hold"
+        "Sequence", "trigger* enable | output", needs="trigger", values="list=[1]", repeat="flag", holdLastOutput="flag:hold"
     ),
     "Pulse": counterpart("Pulse", "trigger* | output", values="list", indexes="list", repeat="flag"),
     "CurrentTime": counterpart("CurrentTime", "trigger* | output", useLocalTime="nothing", stopTime="nothing"),

@@ -23,7 +23,13 @@ def connections_of(conversion: Conversion, level: Level) -> list[Any]:
         if each.sinks and not each.sources and any("." in sink for sink in each.sinks):
             level_path = level.told(each.sinks[0])
             conversion.notes.note(f"{level_path} is connected to nothing that sends")
-    return [each.written() for each in _ordered(lines, conversion, level)]
+    written = [each.written() for each in _ordered(lines, conversion, level)]
+    for (composite, path), port in conversion.triggers.items():
+        actor, _, name = path.rpartition(".")
+        if composite == id(level.entity) and (part := level.parts.get(actor)) is not None:
+            ours = conversion.port_of(level.entity.entities[actor], part, name, 0)
+            written.append(f"{level.ports.of(port)} -> {part.name}.{ours}")
+    return written
 
 
 class _Line:
@@ -41,7 +47,7 @@ class _Line:
 
     def _is_shared(self, conversion: Conversion, level: Level) -> bool:
         """Whether it has to be said that all of it is one channel."""
-        counts = _Counting(conversion)
+        counts = Counting(conversion)
         if counts.senders(level.entity, self.ends) > 1:
             return True
         if counts.receivers(level.entity, self.ends) < 2:
@@ -69,7 +75,7 @@ def _sends_by_channel(conversion: Conversion, level: Level, end: End) -> bool:
     return port is None or port.multi
 
 
-class _Counting:
+class Counting:
     """How many actors' outputs lead into a net, and to how many inputs it leads, through the borders of composites."""
 
     def __init__(self, conversion: Conversion) -> None:
