@@ -53,7 +53,7 @@ class Counterpart:
     fixed: Mapping[str, object] = field(default_factory=dict)
     special: Callable[[Actor], None] | None = None  # what the words of a row cannot say
     is_view: bool = False  # it only shows what comes, to somebody who looks on
-    needs: frozenset[str] = frozenset()  # inputs without which it never fires there, though ours would
+    needs: frozenset[str] = frozenset()  # inputs of which one must be fed, or it never fires there, though ours would
 
 
 def counterpart(

@@ -37,11 +37,13 @@ def _idle(conversion: Conversion, composite: Entity) -> list[tuple[Entity, str]]
         kind = built_in().actors.get(row.type)
         if kind is None:
             continue
+        if row.needs and not any(conversion.is_fed(composite, child, name) for name in row.needs):
+            found.append((child, " and ".join(sorted(row.needs))))
+            continue
         declared = declared_ports(kind)
         for name, said in row.ports.items():
             port = declared.get(said.ours)
-            needed = (isinstance(port, InputPort) and port.required) or (name in row.needs)
-            if needed and not conversion.is_fed(composite, child, name):
+            if isinstance(port, InputPort) and port.required and not conversion.is_fed(composite, child, name):
                 found.append((child, name))
                 break
     return found

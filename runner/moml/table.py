@@ -34,7 +34,7 @@ _SOURCES: Mapping[str, Counterpart] = {
     "StringConst": counterpart("Const", "trigger* | output", needs="trigger", special=how.text_value, value="text"),
     "Ramp": counterpart("Ramp", "trigger* init step | output", init="value", step="value"),
     "Sequence": counterpart(
-        "Sequence", "trigger* enable | output", needs="trigger", values="list=[1]", repeat="flag", holdLastOutput="flag:hold"
+        "Sequence", "trigger* enable | output", needs="trigger enable", values="list=[1]", repeat="flag", holdLastOutput="flag:hold"
     ),
     "Pulse": counterpart("Pulse", "trigger* | output", values="list", indexes="list", repeat="flag"),
     "CurrentTime": counterpart("CurrentTime", "trigger* | output", useLocalTime="nothing", stopTime="nothing"),
