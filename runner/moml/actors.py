@@ -46,6 +46,8 @@ class Actor:
     notes: Notes
     row: Counterpart
     own_names: Mapping[str, str]  # parameters of the model around it, by our names
+    full_name: str = ""  # in Java, which random numbers hang on
+    seed: object = 0  # of all random actors of the model
     widths: Mapping[str, int] = field(default_factory=dict)  # how many channels its ports have
     values: dict[str, Any] = field(default_factory=dict)  # what is written
     ports: dict[str, str] = field(default_factory=dict)  # ours, for those of its ports that the row does not know

@@ -316,6 +316,7 @@ class Conversion:
             return None
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
+            f".{self.model.name}.{level.told(child.name)}", self._seed(),
             {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
         )  # fmt: skip
         actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
@@ -325,6 +326,18 @@ class Conversion:
         if actor.row.type == "SetVariable":
             self.variables.note_setter(child, level, part)
         return part
+
+    def _seed(self) -> object:
+        """The seed that all random actors share: a value that one of them gives counts for the others."""
+        for each in self.model.everything():
+            said, row = each.properties.get("seed"), self.rows.get(id(each))
+            if said is not None and row is not None and row.type in ("Random", "PoissonClock"):
+                try:
+                    if (seed := self.scope_of(each).value_of(said)) not in (0, None):
+                        return seed
+                except ExpressionError:
+                    continue
+        return 0
 
     def _unknown(self, child: Entity, level: Level) -> None:
         what = f"{level.told(child.name)} is a {child.java}"

@@ -182,26 +182,50 @@ def random(law: str, **parameters: str) -> Special:
             if value != actor.scope.value(default) or ours in ("values", "weights"):
                 found[ours] = value
         actor.values["distribution"] = found
-        if actor.get("seed", 0) not in (0, None):
-            actor.notes.note(f"{actor.path}.seed: the numbers of Java's generators have no counterpart, they are others here")
+        generator(actor)
 
     return convert
+
+
+def java_hash(text: str) -> int:
+    """The hash of a text in Java."""
+    found = 0
+    for character in text:
+        found = (31 * found + ord(character)) % 2**32
+    return found - 2**32 if found >= 2**31 else found
+
+
+def generator(actor: Actor) -> None:
+    """The numbers of Java's generators, where the model fixes them: by a seed of its own, or by the shared one."""
+    own, shared = actor.get("privateSeed"), actor.get("seed", actor.seed)
+    kind = "DRand" if ".colt." in actor.entity.java else "JavaRandom"
+    if (made := actor.text("generatorClass", "DRand")) != "DRand":
+        actor.notes.note(f"{actor.path}.generatorClass = {made!r}: has no counterpart, the numbers are others")
+    elif isinstance(own, int) and not isinstance(own, bool):
+        actor.values["generator"] = {"type": kind, "seed": own}
+    elif isinstance(shared, int) and shared:
+        actor.values["generator"] = {"type": kind, "seed": shared + java_hash(actor.full_name)}
+
+
+def poisson_clock(actor: Actor) -> None:
+    """Its stop time, and its random numbers."""
+    finite_stop(actor)
+    generator(actor)
 
 
 def colt_exponential(actor: Actor) -> None:
     """Its lambda is the rate."""
     rate = actor.get("lambda", 1.0)
-    actor.get("seed")
     actor.values["distribution"] = {"type": "Exponential", **({} if rate == 1.0 else {"mean": 1.0 / rate})}
-    actor.notes.note(f"{actor.path}: the numbers of Java's generators have no counterpart, they are others here")
+    generator(actor)
 
 
 def colt_gamma(actor: Actor) -> None:
-    """Its alpha is the shape, its lambda the rate."""
+    """Its alpha is the shape, its lambda the rate; there are no numbers of Java's for it."""
     shape, rate = actor.get("alpha", 1.0), actor.get("lambda", 1.0)
     actor.get("seed")
     actor.values["distribution"] = {"type": "Gamma", "shape": shape, "mean": shape / rate}
-    actor.notes.note(f"{actor.path}: the numbers of Java's generators have no counterpart, they are others here")
+    actor.notes.note(f"{actor.path}: its random numbers are others than in Ptolemy")
 
 
 def fields(direction: str) -> Special:

@@ -25,9 +25,8 @@ _SOURCES: Mapping[str, Counterpart] = {
         UNBOUNDED="nothing", numberOfCycles="nothing",
     ),
     "PoissonClock": counterpart(
-        "PoissonClock", "trigger* | output", special=how.finite_stop,
-        meanTime="time:mean_interval", values="list=[1, 0]", fireAtStart="flag", stopTime="time",
-        seed="nothing", resetOnEachRun="nothing", privateSeed="nothing",
+        "PoissonClock", "trigger* | output", special=how.poisson_clock,
+        meanTime="time:mean_interval", values="list=[1, 0]", fireAtStart="flag", stopTime="time", resetOnEachRun="nothing",
     ),
     "SingleEvent": counterpart("SingleEvent", "trigger* | output", special=how.single_event, time="time", value="value"),
     "Const": counterpart("Const", "trigger* | output", needs="trigger", value="value"),
@@ -42,8 +41,7 @@ _SOURCES: Mapping[str, Counterpart] = {
     "GetCurrentMicrostep": counterpart("CurrentMicrostep", "input=trigger | output"),
 }  # fmt: skip
 
-_SEEDS = {"resetOnEachRun": "nothing", "privateSeed": "nothing", "privateSeed2": "nothing", "generator": "nothing",
-          "randomElementClass": "nothing", "userCode": "nothing"}  # fmt: skip
+_SEEDS = {"resetOnEachRun": "nothing"}
 _RANDOM: Mapping[str, Counterpart] = {
     "Gaussian": counterpart("Random", "trigger* mean standardDeviation | output", special=how.random("Normal", mean="mean=0.0", standard_deviation="standardDeviation=1.0"), **_SEEDS),
     "ColtNormal": counterpart("Random", "trigger* mean standardDeviation | output", special=how.random("Normal", mean="mean=0.0", standard_deviation="standardDeviation=1.0"), **_SEEDS),
@@ -134,7 +132,9 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "Accumulator": counterpart("Accumulator", "input* reset* | output", init="number:initial", lowerBound="none", upperBound="none"),
     "Counter": counterpart("Counter", "increment* decrement* reset* | output"),
     "Differential": counterpart("Difference", initialValue="number:initial"),
-    "Integrator": counterpart("Integrator", fixed={"method": "trapezoid"}, initialValue="number:initial"),
+    "Derivative": counterpart("Derivative", "input reset | output"),
+    "AverageOverTime": counterpart("TimeAverage"),
+    "Integrator": counterpart("Integrator", "input reset | output", fixed={"method": "trapezoid"}, initialValue="number:initial"),
     "Expression": counterpart("Expression", "| output", special=how.expression),
     "LookupTable": counterpart("LookupTable", table="list:values"),
     "Limiter": counterpart("Limiter", special=how.limiter),
