@@ -96,15 +96,15 @@ class Actor:
                 self._parameter(name, said)
         self.values = {**self.row.fixed, **self.values}
         for name, said in self.entity.properties.items():
-            if name in self.told or name in self.row.parameters or is_layout(said) or is_decoration(said):
+            if name in self.told or name in self.row.parameters or is_layout(said) or is_decoration(said) or not said.value:
                 continue
-            if name == "_priority":
+            if name == "_priority" or said.java.endswith(".Priority"):
                 self.values["priority"] = self.get(name)
             elif name == "firingCountLimit":
                 if self.get(name):
                     self.notes.note(f"{self.path}.{name} = {said.value!r}: has no counterpart")
-            elif said.value is not None and not self._is_only_named(name, said):
-                self.notes.note(f"{self.path}.{name} = {_brief(said.value)}: has no counterpart")
+            elif not self._is_only_named(name, said):
+                self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: has no counterpart")
 
     def _is_only_named(self, name: str, said: Property) -> bool:
         """Whether it is a parameter that somebody added, for expressions in other ones."""

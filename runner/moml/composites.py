@@ -211,6 +211,7 @@ class Conversion:
         for child in entity.entities.values():
             if child.name in level.requests:
                 continue
+            self._about_ports(child, level)
             part = level.parts[child.name] = self._part(child, level)
             if part is not None:
                 actors[part.name] = part.entry
@@ -236,6 +237,15 @@ class Conversion:
             found["aspects"] = aspects
         self._about_properties(level)
         return found
+
+    def _about_ports(self, entity: Entity, level: Level) -> None:
+        """What the file says of ports and has no counterpart."""
+        for port in entity.ports.values():
+            for said in port.properties.values():
+                known = said.name in ("input", "output", "multiport") or is_layout(said) or is_decoration(said)
+                if not known and said.value:
+                    path = f"{level.told(entity.name)}.{port.name}" if entity is not level.entity else level.told(port.name)
+                    self.notes.note(f"{path}.{said.name} = {said.value!r}: has no counterpart")
 
     def _about_properties(self, level: Level) -> None:
         for name, said in level.entity.properties.items():
@@ -340,11 +350,18 @@ class Conversion:
         return 0
 
     def _unknown(self, child: Entity, level: Level) -> None:
-        what = f"{level.told(child.name)} is a {child.java}"
-        if any(self.face(child, port.rpartition(".")[2]) for port in level.entity.links if port.startswith(f"{child.name}.")):
-            self.notes.error(f"{what}, which has no counterpart")
+        told = level.told(child.name)
+        linked = [port.rpartition(".")[2] for port, links in level.entity.links.items() if port.startswith(f"{child.name}.") and links]
+        if not linked:
+            self.notes.note(f"{told} is a {child.java}, has no counterpart, and is left out: nothing is connected to it")
+        elif all(self._only_takes(child, port) for port in linked):
+            self.notes.note(f"{told} is a {child.java}, has no counterpart, and is left out: it only takes what comes")
         else:
-            self.notes.note(f"{what}: has no counterpart, and nothing is connected to it")
+            self.notes.error(f"{told} is a {child.java}, which has no counterpart")
+
+    def _only_takes(self, child: Entity, port: str) -> bool:
+        face = self.face(child, port)
+        return face is not None and face.direction == "input" and (port.startswith("input") or port in child.ports)
 
     def _is_watched(self, child: Entity, level: Level) -> bool:
         """Whether a view cannot be left out: an aspect stands there, or it takes a channel of a multiport."""
@@ -369,9 +386,11 @@ class Conversion:
             found = self.director(director, inner)
             if body.get("actors"):
                 body = _with_director(body, found)
-        if not body.get("actors"):
-            self.notes.note(f"{inner.path} has nothing in it")
-        return Part(name, self.instance(child, body, values))
+        entry = self.instance(child, body, values)
+        for said in child.properties.values():
+            if said.name == "_priority" or kind(said) == "Priority":
+                entry["priority"] = inner.scope.value_of(said)
+        return Part(name, entry)
 
     def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow:
         """The entry of an instance; its class is one that is there already, if that says the same."""
@@ -391,7 +410,7 @@ class Conversion:
         name, found = kind(director), dict[str, Any]()
         scope = Scope(director, level.scope)
         told = level.told(director.name)
-        if name in _FIRED_WHOLE:
+        if name in _FIRED_WHOLE and level.entity is not self.model:
             self.notes.note(f"{told}, a {name}: what is inside fires by the rules of DE")
         elif name not in _DE_LIKE:
             self.notes.error(f"{told} is a {director.java}, which has no counterpart")

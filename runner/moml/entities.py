@@ -84,9 +84,10 @@ Tell = Callable[[str, int], None]
 
 
 class Builder:
-    """Does what the elements of a file say; ``tell`` takes what cannot be done."""
+    """Does what the elements of the file of that name say; ``tell`` takes what cannot be done."""
 
-    def __init__(self, tell: Tell) -> None:
+    def __init__(self, name: str, tell: Tell) -> None:
+        self._file = name
         self._tell = tell
         self._count = self._links = 0
 
@@ -95,7 +96,7 @@ class Builder:
         while root.tag == "group" and len(root.children) == 1:
             root = root.children[0]
         if root.tag not in ("entity", "class", "model"):
-            raise MomlError(f"line {root.line}: <{root.tag}> is no model: MoML begins with <entity>")
+            raise MomlError(f"{self._file}:{root.line}: <{root.tag}> is no model: MoML begins with <entity>")
         return self._made(root, [])
 
     def _made(self, element: Element, around: list[Entity]) -> Entity:
@@ -120,12 +121,12 @@ class Builder:
     def _enter(self, count: int, element: Element) -> None:
         self._count += count
         if self._count > MAX_ENTITIES:
-            raise MomlError(f"line {element.line}: the model comes to more than {MAX_ENTITIES:,} entities")
+            raise MomlError(f"{self._file}:{element.line}: the model comes to more than {MAX_ENTITIES:,} entities")
 
     def _name(self, element: Element) -> str:
         name = element.get("name")
         if name is None:
-            raise MomlError(f"line {element.line}: <{element.tag}> has no name")
+            raise MomlError(f"{self._file}:{element.line}: <{element.tag}> has no name")
         return name
 
     def _class(self, name: str, around: list[Entity]) -> Entity | None:

@@ -11,6 +11,7 @@ from typing import Any
 from epicycle.actors import Actor
 
 from .actors import seconds
+from .channels import join_channels
 from .composites import Conversion, director_of
 from .document import MomlError, read_document
 from .entities import Builder, Entity
@@ -39,7 +40,7 @@ def import_moml(
     one that has the name of a Java class stands for it.
     """
     notes = Notes()
-    root = Builder(lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
+    root = Builder(path.name, lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
     text = _text(root, path.name, notes, {each.__name__: each for each in types if issubclass(each, Actor)})
     if notes.errors:
         raise MomlError(_refusal(path.name, notes.errors))
@@ -54,6 +55,7 @@ def _refusal(name: str, reasons: list[str]) -> str:
 
 
 def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]) -> str:
+    join_channels(model, notes)
     conversion = Conversion(model, notes, own)
     level = conversion.level(model, "")
     body = conversion.body(level)

@@ -162,6 +162,17 @@ def math_function(actor: Actor) -> None:
     actor.values["function"] = word
 
 
+def string_compare(actor: Actor) -> None:
+    """StringCompare, as far as texts can be compared here."""
+    words = {"equals": "{0} == {1}", "contains": "{1} in {0}", "startsWith": "{0}[:len({1})] == {1}"}
+    word = actor.text("function", "equals")
+    if word not in words:
+        actor.notes.error(f"{actor.path}.function = {word!r}: has no counterpart")
+        return
+    said = [each if actor.widths.get(each, 0) else repr(actor.text(each)) for each in ("firstString", "secondString")]
+    actor.values["expression"] = words[word].format(*said)
+
+
 def rounding(actor: Actor) -> None:
     """Round, of which the half goes up and truncation is a function of its own."""
     words = {"ceil": "ceil(input)", "floor": "floor(input)", "round": "floor(input + 0.5)", "truncate": "int(input)"}

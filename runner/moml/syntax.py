@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import NoReturn, TypeAlias
 
 MAX_LENGTH = 100_000
-MAX_DEPTH = 60
+MAX_DEPTH = 40
+MAX_TERMS = 200
 
 
 class ExpressionError(Exception):
@@ -114,8 +115,11 @@ _TOKEN = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f"}
-_LEVELS = (("||",), ("&&",), ("|",), ("#",), ("&",), ("==", "!="), ("<", "<=", ">", ">="), ("<<", ">>", ">>>"),
-           ("+", "-"), ("*", "/", "%"))  # fmt: skip
+_LEVELS: dict[object, int] = {
+    sign: level
+    for level, signs in enumerate(("||", "&&", "|", "#", "&", "== !=", "< <= > >=", "<< >> >>>", "+ -", "* / %"))
+    for sign in signs.split()
+}  # how tightly signs hold
 _CONSTANTS = {"true": True, "false": False}
 
 
@@ -123,7 +127,10 @@ def parse(text: str) -> Tree:
     """The tree of an expression; raises ``ExpressionError``."""
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"an expression of more than {MAX_LENGTH:,} characters")
-    return _Parser(text).whole()
+    try:
+        return _Parser(text).whole()
+    except RecursionError:  # who calls may be deep down already
+        raise ExpressionError(f"{_short(text)} is nested too deeply") from None
 
 
 def unescaped(text: str) -> str:
@@ -223,16 +230,14 @@ class _Parser:
         self._depth -= 1
         return test
 
-    def _level(self, level: int) -> Tree:
-        if level == len(_LEVELS):
-            return self._unary()
-        left = self._level(level + 1)
+    def _level(self, least: int) -> Tree:
+        left = self._unary()
         count = 0
-        while (sign := self._peek()) in _LEVELS[level]:
+        while (level := _LEVELS.get(sign := self._peek(), -1)) >= least:
             self._place += 1
             left = Binary(str(sign), left, self._level(level + 1))
             count += 1
-            if count > 400:
+            if count > MAX_TERMS:
                 self._fail("it is too long")
         return left
 

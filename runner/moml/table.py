@@ -154,6 +154,12 @@ _COMPUTING: Mapping[str, Counterpart] = {
         "Expression", "input=input sourcePosition=sourcePosition extractLength=extractLength | output",
         special=how.formula("input[{sourcePosition}:{sourcePosition} + {extractLength}]", sourcePosition=0, extractLength=1),
     ),
+    "StringSubstring": counterpart(
+        "Expression", "input=input start=start stop=stop | output",
+        special=how.formula("input[{start}:{stop}]", start=0, stop=0),
+    ),
+    "StringCompare": counterpart("Expression", "firstString=firstString secondString=secondString | output", special=how.string_compare, ignoreCase="none"),
+    "ElementsToArray": counterpart("Match", "input* | output"),
     "StringLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
     "StringIndexOf": counterpart(
         "Expression", "searchFor=searchFor inText=inText | output", special=how.formula("{searchFor} in {inText}")

@@ -47,7 +47,10 @@ Said = tuple[str, int]
 
 def translated(tree: Tree, names: Mapping[str, str], scope: Scope) -> str:
     """The expression, in which ``names`` stand for what is known in the run alone; raises ``ExpressionError``."""
-    return _Translation(names, scope).said(tree)[0]
+    try:
+        return _Translation(names, scope).said(tree)[0]
+    except RecursionError:
+        raise ExpressionError("it is nested too deeply") from None
 
 
 def literal(value: object) -> str:
@@ -112,8 +115,11 @@ class _Translation:
                 return "{} if {} else {}".format(*parts), _CHOICE
             case Method(of, name, None):
                 return f"{self._held(of, _ATOM)}[{name!r}]", _ATOM
-            case Method(of, name, arguments) if arguments is not None:
+            case Method(of, name, arguments) if arguments is not None and (name in _SAME or name in _PATTERNS):
                 return self._function(name, (of, *arguments))
+            case Method(of, name, arguments) if arguments is not None:
+                indices = "".join(f"[{self.said(each)[0]}]" for each in arguments)
+                return f"{self._held(of, _ATOM)}[{name!r}]{indices}", _ATOM
             case Call(Name(name), arguments) if name not in self._names and not self._is_known(name):
                 return self._function(name, arguments)
             case Call(function, arguments):

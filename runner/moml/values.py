@@ -59,6 +59,8 @@ def evaluate(tree: Tree, scope: Scope) -> Any:
         return _value(tree, scope)
     except KeyError as error:
         raise ExpressionError(f"{error.args[0]!r} is not known") from None
+    except RecursionError:
+        raise ExpressionError("it is nested too deeply") from None
     except (TypeError, ValueError, IndexError, ZeroDivisionError, OverflowError, AttributeError, MemoryError) as error:
         raise ExpressionError(f"it cannot be computed: {error}") from None
 
@@ -87,11 +89,15 @@ def _value(tree: Tree, scope: Scope) -> Any:
             return _called(tree, scope)
         case Method(of, name, arguments):
             whole = _value(of, scope)
-            if arguments is None or (not arguments and isinstance(whole, dict) and name in whole):
-                if isinstance(whole, dict):
-                    return whole[name]
-                arguments = ()
-            return _FUNCTIONS[name](whole, *(_value(each, scope) for each in arguments))
+            given = [_value(each, scope) for each in arguments or ()]
+            if isinstance(whole, dict) and name in whole:
+                whole = whole[name]
+                for index in given:
+                    whole = _at(whole, index)
+                return whole
+            if name not in _FUNCTIONS:
+                raise ExpressionError(f"the function {name!r} is not known here")
+            return _FUNCTIONS[name](whole, *given)
         case Array(items):
             found = [_value(each, scope) for each in items]
             # One type for all elements: as soon as there is a double, all are.
