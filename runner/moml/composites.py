@@ -394,7 +394,8 @@ class Conversion:
 
     def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow:
         """The entry of an instance; its class is one that is there already, if that says the same."""
-        key = json.dumps([body, sorted(values)], default=str)
+        # A parameter takes values of the kind of its default.
+        key = json.dumps([body, sorted((name, type(value).__name__) for name, value in values.items())], default=str)
         if key not in self._known:
             name = self._class_names.fresh(child.of_class.rpartition(".")[2] or child.name)
             self._known[key] = name

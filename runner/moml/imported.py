@@ -40,8 +40,12 @@ def import_moml(
     one that has the name of a Java class stands for it.
     """
     notes = Notes()
-    root = Builder(path.name, lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
-    text = _text(root, path.name, notes, {each.__name__: each for each in types if issubclass(each, Actor)})
+    own = {each.__name__: each for each in types if issubclass(each, Actor)}
+    try:
+        root = Builder(path.name, lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
+        text = _text(root, path.name, notes, own)
+    except RecursionError:
+        raise MomlError(f"{path.name}: it is nested too deeply") from None
     if notes.errors:
         raise MomlError(_refusal(path.name, notes.errors))
     if load is not None:
