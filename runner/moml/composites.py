@@ -54,6 +54,7 @@ class Part:
     entry: Flow
     row: Counterpart | None = None  # of an actor
     ports: Mapping[str, str] = field(default_factory=dict)
+    unwired: frozenset[str] = frozenset()  # ports there for which there is none of ours
 
 
 @dataclass
@@ -469,7 +470,7 @@ class Conversion:
         if end.actor in level.requests:
             return level.requests[end.actor], is_request(entity)
         part = level.parts.get(end.actor)
-        if part is None:
+        if part is None or end.port in part.unwired:
             return None
         return f"{part.name}.{self.port_of(entity, part, end.port, end.channel)}", face.direction == "output"
 

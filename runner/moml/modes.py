@@ -11,7 +11,7 @@ from .entities import Entity, Property, Relation
 from .names import Names
 from .scope import Scope, is_variable
 from .syntax import Binary, Call, Const, ExpressionError, Name, Tree
-from .translate import translated
+from .translate import names_of, translated
 from .writing import Flow
 
 if TYPE_CHECKING:
@@ -57,6 +57,8 @@ class _Machine:
     ports: Names  # of ports and variables
     states: Names = field(default_factory=Names)
     variables: dict[str, str] = field(default_factory=dict)  # ours
+    asked: set[str] = field(default_factory=set)  # names in guards and actions
+    sent: set[str] = field(default_factory=set)  # outputs of actions
 
     def __post_init__(self) -> None:
         self.scope = self.conversion.scope_of(self.controller)
@@ -225,7 +227,16 @@ class _Machine:
             for part in rest[1:]:
                 whole = Binary("&&", whole, part)
             said["when"] = translated(whole, names, self.scope)
+        self.asked.update(*map(names_of, parts))
         return said
+
+    def unwired(self) -> frozenset[str]:
+        """The ports that no guard or action names."""
+        asked = {re.sub(r"(_\d+)?(_isPresent)?\Z", "", name) for name in self.asked} | self.asked
+        unread = {name for name in self.inputs if name not in asked}
+        for name in sorted(unread):
+            self.tell(f"{name} is left out: nothing reads it")
+        return frozenset(unread | {name for name in self.outputs if name not in self.sent})
 
     def _time(self, tree: Tree, names: dict[str, str]) -> str:
         text = translated(tree, names, self.scope)
@@ -256,7 +267,10 @@ class _Machine:
             if ours is None:
                 self.tell(f"{transition.name}: {target} = {text} is left out: {port} is no output and no variable here")
                 continue
-            value = translated(self.scope.tree(self.scope.filled(text)), self._names(), self.scope)
+            tree = self.scope.tree(self.scope.filled(text))
+            value = translated(tree, self._names(), self.scope)
+            self.asked |= names_of(tree)
+            self.sent.add(port)
             said.append(f"{ours} = {value}")
         return said
 
@@ -305,13 +319,15 @@ def machine_part(conversion: Conversion, child: Entity, level: Level, name: str)
     ports = Names(_RESERVED, in_expressions=True)
     machine = _Machine(conversion, child, controller, path, f"{level.at}{name}.", level, ports)
     _tell_rest(conversion, child, path, machine)
+    unwired: frozenset[str] = frozenset()
     if child is controller:
         entry = Flow({"type": "StateMachine", **machine.written()})
+        unwired = machine.unwired()
     else:
         entry = conversion.instance(child, _class(machine), {})
     if (priority := child.properties.get("_priority")) is not None and priority.value:
         entry["priority"] = conversion.scope_of(child).value_of(priority)
-    return Part(name, entry, ports={**machine.inputs, **machine.outputs})
+    return Part(name, entry, ports={**machine.inputs, **machine.outputs}, unwired=unwired)
 
 
 def _class(machine: _Machine) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import declared_ports
 
 from ..catalogue import built_in
+from .modes import is_machine
 from .relations import End, Net
 from .writing import Flow
 
@@ -98,7 +99,7 @@ class Counting:
         comes_from = (face.direction == "output") == bool(end.actor)
         if comes_from is not senders:
             return 0
-        if end.actor and id(child) not in conversion.wiring.groups:
+        if end.actor and (id(child) not in conversion.wiring.groups or is_machine(child)):
             return 1
         # On the other side of a composite's port.
         if end.actor:
@@ -107,6 +108,8 @@ class Counting:
             inside, port = conversion.container_of(composite), f"{composite.name}.{end.port}"
         if inside is None:
             return 0
+        if is_machine(inside):  # whose refinements are joined with its ports by their names
+            return 1
         key = (id(inside), port, end.channel, senders)
         if key in self._open:
             return 0
