@@ -61,7 +61,7 @@ actors:
     variables: {count: 0}
     modes: {idle: null, busy: null, end: {final: true}}
     transitions:
-      - "idle -> busy on in_ when in_ > 1 do out = in_ * 10; count = count + 1"
+      - idle -> busy on in_ when in_ > 1 do out = in_ * 10; count = count + 1
       - busy -> idle preemptive after 0.5 s do out = -count
       - idle -> end immediate nondeterministic when count > 1
 connections:
