@@ -39,12 +39,33 @@ class TimeDelay(Actor):
 
     def initialize(self) -> None:
         self._held: Pending[Any] | _Steps = _Steps(self) if self.steps else Pending(self)
+        self._held: Pending[Any] = Pending(self)
+        self._line: list[tuple[int, int, int, Any]] = []  # with their times, microsteps and numbers
+        self._number = 0
 
     def fire(self) -> None:
+        if self.steps:
+            self._step()
+            return
         for token in self._held.due():
             self.output.send(token)
         for token in self.input.tokens:
             self._held.put(token, self.delay)
+
+    def _step(self) -> None:
+        """Each token of the tag has a firing of its own, in which at most one leaves that is due."""
+        now = self.tag
+        tokens = self.input.tokens
+        for place in range(max(1, len(tokens))):
+            if self._line and self._line[0][:2] <= now:
+                self.output.send(heapq.heappop(self._line)[3])
+            if self._line and self._line[0][0] <= now.time:
+                self.wake_in(0)
+            if place < len(tokens):
+                wake = self.wake_in(self.delay)
+                microstep = now.microstep if wake.time > now.time else wake.microstep
+                heapq.heappush(self._line, (wake.time, microstep, self._number, tokens[place]))
+                self._number += 1
 
 
 class _Steps:
