@@ -37,7 +37,7 @@ cdef class DelayForm(Native):
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.line = self.actor._held._line
         self.delay = nanoseconds_of(self.actor.delay)
-        return self.output is not None and not self.actor.steps
+        return self.output is not None
 
     cpdef fire(self):
         cdef Py_ssize_t place
