@@ -100,9 +100,6 @@ class Bus(Medium):
     ``dropped``, for want of a place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share
     in which the bus carries; ``mean_wait``, the mean time from coming to the begin of carriage; ``mean_queue``, the
     mean number that wait.
-    ``dropped``, for want of a place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share in
-    which the bus carries; ``mean_wait``, the mean time from coming to the begin of carriage; ``mean_queue``, the mean
-    number that wait.
 
     With Poisson arrivals at rate a and a constant carriage s it is M/D/1: utilisation r = a s and
     mean_wait = r s / (2 (1 - r)) (Pollaczek-Khinchine); with priorities, mean_wait of class k is

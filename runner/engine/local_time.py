@@ -167,7 +167,6 @@ class Border(Actor):
 
     In each of its firings one token of each channel passes its ports.  What an actor sends whose firing was put off
     from outside leaves at the next microstep, unless the composite fires at this tag for what comes in.
-    In each of its firings one token of each channel passes its ports.
     """
 
     def __init__(self, path: str, director: Director, outside: Director | Refinement) -> None:
@@ -187,7 +186,18 @@ class Border(Actor):
         """Whether the composite is yet to fire at the present tag."""
         return self._director.is_to_come(self._first, self._last)
 
-   
+    def resume(self) -> None:
+        """An actor inside fires now whose firing was put off from outside."""
+        self._resumed = self.tag
+
+    def lets_pass(self, passage: Passage) -> bool:
+        """Whether what waits at a port may pass it now."""
+        now = self.tag
+        if passage in self.inputs_before:
+            self._came_in = now
+            return True
+        return self._resumed != now or self._came_in == now
+
     def go_on(self, passage: Passage) -> None:
         """Tokens are left at a port."""
         if passage in self.inputs_before:

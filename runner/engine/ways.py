@@ -137,7 +137,6 @@ class Ways:
     def _add_border(self, composite: str, outside: Director | Refinement) -> None:
         """Let a composite fire again as long as tokens wait at its inputs."""
         border = self._borders[composite] = Border(composite, self.director, outside)
-        border = Border(composite, self.director, outside)
         for paths, passages in zip(
             self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
         ):
