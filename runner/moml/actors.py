@@ -140,7 +140,9 @@ class Actor:
         """The value in terms of the parameters of the model, if that comes to the same."""
         if is_text(said) or kind not in ("value", "list", "number", "whole", "flag", "time", "times"):
             return None
-        found = in_parameters(said.value or "", value, self.scope, self.own_names)
+        found = in_parameters(
+            said.value or "", value, self.scope, self.own_names, is_time=kind in ("time", "times")
+        )
         if found is None:
             return None
         text, used = found
@@ -148,8 +150,13 @@ class Actor:
         return text
 
 
+def _kinds(value: object) -> object:
+    """The types of a value and its parts."""
+    return [_kinds(each) for each in value] if isinstance(value, list) else type(value)
+
+
 def in_parameters(
-    text: str, value: object, scope: Scope, own_names: Mapping[str, str]
+    text: str, value: object, scope: Scope, own_names: Mapping[str, str], *, is_time: bool
 ) -> tuple[str, set[str]] | None:
     """``${...}`` over parameters that stands for a value, and the parameters in it; None if it would be another."""
     from epicycle.actors.expression import ExpressionError as OwnError
@@ -163,7 +170,8 @@ def in_parameters(
         if not used:
             return None
         ours = translated(tree, {name: own_names[name] for name in used}, scope)
-        if evaluate(ours, {own_names[name]: scope(name) for name in used}) == value:
+        found = evaluate(ours, {own_names[name]: scope(name) for name in used})
+        if found == value and (is_time or _kinds(found) == _kinds(value)):
             return f"${{{ours}}}", used
     except (ExpressionError, OwnError, KeyError):
         pass

@@ -120,6 +120,8 @@ class Conversion:
         if is_request(entity) or is_response(entity):
             return PortFace("output" if is_request(entity) else "input", False)
         row = self.rows.get(id(entity))
+        if row is not None and port in row.ports and not row.has_port(port):
+            return None
         found = face_of(row, entity, port)
         if found is None and row is None and not is_composite(entity) and not is_machine(entity):
             return PortFace("output" if port.startswith("output") else "input", True)
@@ -213,6 +215,7 @@ class Conversion:
             if child.name in level.requests:
                 continue
             self._about_ports(child, level)
+            self._about_links(child, level)
             part = level.parts[child.name] = self._part(child, level)
             if part is not None:
                 actors[part.name] = part.entry
@@ -247,6 +250,13 @@ class Conversion:
                 if not known and said.value:
                     path = f"{level.told(entity.name)}.{port.name}" if entity is not level.entity else level.told(port.name)
                     self.notes.note(f"{path}.{said.name} = {said.value!r}: has no counterpart")
+
+    def _about_links(self, child: Entity, level: Level) -> None:
+        """Ports to which something is linked, and that actors of ours do not have."""
+        row = self.rows.get(id(child))
+        for name in row.ports if row is not None and not row.is_view else ():
+            if not row.has_port(name) and level.entity.links.get(f"{child.name}.{name}"):
+                self.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
 
     def _about_properties(self, level: Level) -> None:
         for name, said in level.entity.properties.items():

@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import Actor as OwnActor
-from epicycle.actors import declared_parameters, declared_ports
+from epicycle.actors import declared_parameters, declared_ports, has_own_ports
+
+from ..catalogue import built_in
 
 from .names import snake
 from .relations import PortFace
@@ -54,6 +56,11 @@ class Counterpart:
     special: Callable[[Actor], None] | None = None  # what the words of a row cannot say
     is_view: bool = False  # it only shows what comes, to somebody who looks on
     needs: frozenset[str] = frozenset()  # inputs of which one must be fed, or it never fires there, though ours would
+
+    def has_port(self, name: str) -> bool:
+        """Whether a port there is one of our actor's."""
+        kind = built_in().actors.get(self.type)
+        return kind is None or has_own_ports(kind) or self.ports[name].ours in declared_ports(kind)
 
 
 def counterpart(

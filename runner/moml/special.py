@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .names import Names
 from .scope import is_text
 from .syntax import ExpressionError
-from .translate import translated
+from .translate import names_of, translated
 from .writing import Flow
 
 if TYPE_CHECKING:
@@ -108,10 +108,12 @@ def expression(actor: Actor) -> None:
         actor.notes.note(f"{actor.path}.{name} is called {ours}")
     try:
         tree = actor.scope.tree(text)
-        ours = translated(tree, {**actor.ports, "time": "time"}, actor.scope)
+        ours = translated(tree, {**actor.ports, "time": "time", "iteration": "iteration"}, actor.scope)
     except ExpressionError as error:
         actor.notes.error(f"{actor.path}: expression: {error}")
         return
+    if "iteration" in names_of(tree):
+        actor.values["iteration"] = True
     actor.values["expression"] = _with_all(ours, [each for port, each in actor.ports.items() if actor.widths.get(port, 0)])
 
 
@@ -260,6 +262,15 @@ def limiter(actor: Actor) -> None:
         value = actor.get(name, math.inf if name == "top" else -math.inf)
         if isinstance(value, (int, float)) and not math.isinf(value) and abs(value) < 1.7e308:
             actor.values[ours] = value
+
+
+def pid(actor: Actor) -> None:
+    """PID, whose input is the error: the gains have the other sign."""
+    for name, ours, default in (("Kp", "proportional", 1.0), ("Ki", "integral", 0.0), ("Kd", "derivative", 0.0)):
+        value = actor.get(name, default)
+        if value:
+            actor.values[ours] = -value
+    actor.values["integration"] = "trapezoid"
 
 
 def no_trigger(*names: str) -> Special:

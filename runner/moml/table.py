@@ -107,6 +107,14 @@ _FLOW: Mapping[str, Counterpart] = {
     "RecordAssembler": counterpart("RecordAssembler", "| output", special=how.fields("input")),
     "RecordDisassembler": counterpart("RecordDisassembler", "input |", special=how.fields("output")),
     "SetVariable": counterpart("SetVariable", special=set_variable, variableName="nothing"),
+    "Default": counterpart("Default", "preferred alternate | output"),
+    "Sequencer": counterpart(
+        "Sequencer", "input sequenceNumber=number | output", startingSequenceNumber="whole:first"
+    ),
+    "ElementsToArray": counterpart("Collect", "input* | output"),
+    "ArrayToElements": counterpart("Spread", "input | output*"),
+    "Sleep": counterpart("Commutator", "input* | output*", sleepTime="nothing"),
+    "ExecutionTime": counterpart("Commutator", executionTime="nothing"),
     "IsPresent": counterpart("IsPresent", "input* | output*"),
 }  # fmt: skip
 
@@ -125,7 +133,7 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "MultiplyDivide": counterpart("MultiplyDivide", "multiply* divide* | output"),
     "Scale": counterpart("Scale", "input factor | output", factor="number", scaleOnLeft="nothing"),
     "AbsoluteValue": counterpart("MathFunction", fixed={"function": "abs"}),
-    "MathFunction": counterpart("MathFunction", "firstOperand secondOperand | output", special=how.math_function),
+    "MathFunction": counterpart("MathFunction", "firstOperand=input secondOperand=input | output", special=how.math_function),
     "UnaryMathFunction": counterpart("MathFunction", special=how.choice("function", "function", "exp", {each: each for each in ("exp", "log", "sign", "square", "sqrt")})),
     "TrigFunction": counterpart("MathFunction", special=how.choice("function", "function", "sin", {each: each for each in ("sin", "cos", "tan", "asin", "acos", "atan")})),
     "Round": counterpart("Expression", "input=input | output", special=how.rounding),
@@ -138,6 +146,11 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "Expression": counterpart("Expression", "| output", special=how.expression),
     "LookupTable": counterpart("LookupTable", table="list:values"),
     "Limiter": counterpart("Limiter", special=how.limiter),
+    "Maximum": counterpart("Extreme", "input* | maximumValue=value channelNumber=channel", fixed={"take": "greatest"}),
+    "Minimum": counterpart("Extreme", "input* | minimumValue=value channelNumber=channel", fixed={"take": "least"}),
+    "Average": counterpart("MovingAverage", fixed={"span": "1e8 s"}),
+    "PID": counterpart("PID", "input=measurement reset | output", special=how.pid),
+    "IIR": counterpart("DiscreteFilter", numerator="list=[1.0]", denominator="list=[1.0]"),
     "MovingAverage": counterpart("MovingAverage", maxPastInputsToAverage="whole:size=10"),
     "Remainder": counterpart(
         "Expression", "input=input | output", special=how.formula("input - {divisor} * int(input / {divisor})", divisor=1.0)
@@ -159,7 +172,9 @@ _COMPUTING: Mapping[str, Counterpart] = {
         special=how.formula("input[{start}:{stop}]", start=0, stop=0),
     ),
     "StringCompare": counterpart("Expression", "firstString=firstString secondString=secondString | output", special=how.string_compare, ignoreCase="none"),
-    "ElementsToArray": counterpart("Match", "input* | output"),
+    "BooleanToAnything": counterpart(
+        "Expression", "input=input | output", special=how.formula("{trueValue} if input else {falseValue}", trueValue=True, falseValue=False)
+    ),
     "StringLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
     "StringIndexOf": counterpart(
         "Expression", "searchFor=searchFor inText=inText | output", special=how.formula("{searchFor} in {inText}")

@@ -233,7 +233,8 @@ def _divided(left: Any, right: Any) -> Any:
     if isinstance(left, int) and isinstance(right, int):
         if right == 0:
             raise ZeroDivisionError("division by zero")
-        return left // right if left % right == 0 else left / right
+        quotient = abs(left) // abs(right)  # towards zero, as in Java
+        return quotient if (left < 0) == (right < 0) else -quotient
     if right == 0:
         if left == 0 or math.isnan(left):
             raise ZeroDivisionError("it is not a number")
