@@ -33,8 +33,8 @@ import_ = Command(  # "import" is no name in Python
     "import",
     "make a model of a MoML file of Ptolemy II",
     "Import a model of Ptolemy II: a MoML file with a DE director becomes a model in YAML, in which "
-    "'director: {like: ptolemy}' lets all be as it is there. Layout, icons and views are left out. Each other thing that "
-    "has no counterpart is told in a line, here and at the head of the model. Test actors become checks, which "
+    "'director: {like: ptolemy}' lets all be as it is there. Layout, icons and views are left out. Each other thing "
+    "that has no counterpart is told in a line, here and at the head of the model. Test actors become checks, which "
     "'epicycle run' judges. A model that cannot be said is refused with the reasons (exit code 2), and nothing is "
     "written. No other file is read.",
     (

@@ -297,9 +297,7 @@ class Ways:
         ways = [self._way(wires[0])] if len(wires) == 1 else self._branches(port.path, (), wires)
         return self._sender(port, channels, channel, ways)
 
-    def _branches(
-        self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None
-    ) -> list[Way]:
+    def _branches(self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None) -> list[Way]:
         """The ways onward from a port, one for each connection that leaves it, or that some wires take."""
         ways = []
         for hop in self.graph.outgoing(path):

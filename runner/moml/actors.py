@@ -23,7 +23,14 @@ _LAYOUT = re.compile(
     r"BackwardTypeInference|DependencyHighlighter|ModelErrorHandler|PeriodicDirectorHelper|GenerateCode|"
     r"SingletonAttribute|ProvenanceAttribute|DefaultContainer|CodeGenerat|UnitSystem"
 )
-_DECORATION = re.compile(r"\$\w*Attributes\Z|ResourceAttributes\Z|TimeAttributes\Z|DecorationParameters\Z|DecoratorAttributes")
+_DECORATION = re.compile(
+    r"\$\w*Attributes\Z|ResourceAttributes\Z|TimeAttributes\Z|DecorationParameters\Z|DecoratorAttributes"
+)
+
+
+_UNIMPORTANT = frozenset({
+    "resetOnEachRun", "stopTimeIsLocal", "UNBOUNDED", "useLocalTime", "scaleOnLeft", "trainingMode",
+})  # fmt: skip
 
 
 def is_layout(said: Property) -> bool:
@@ -91,12 +98,14 @@ class Actor:
         """Find the values of all parameters."""
         if self.row.special is not None:
             self.row.special(self)
-        for name, said in self.row.parameters.items():
+        for name, row in self.row.parameters.items():
             if name not in self.told:
-                self._parameter(name, said)
+                self._parameter(name, row)
         self.values = {**self.row.fixed, **self.values}
         for name, said in self.entity.properties.items():
-            if name in self.told or name in self.row.parameters or is_layout(said) or is_decoration(said) or not said.value:
+            if name in self.told or name in self.row.parameters or name in _UNIMPORTANT or not said.value:
+                continue
+            if is_layout(said) or is_decoration(said):
                 continue
             if name == "_priority" or said.java.endswith(".Priority"):
                 self.values["priority"] = self.get(name)
@@ -140,9 +149,7 @@ class Actor:
         """The value in terms of the parameters of the model, if that comes to the same."""
         if is_text(said) or kind not in ("value", "list", "number", "whole", "flag", "time", "times"):
             return None
-        found = in_parameters(
-            said.value or "", value, self.scope, self.own_names, is_time=kind in ("time", "times")
-        )
+        found = in_parameters(said.value or "", value, self.scope, self.own_names, is_time=kind in ("time", "times"))
         if found is None:
             return None
         text, used = found

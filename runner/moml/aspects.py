@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .actors import is_decoration, is_layout, plain, seconds
-from .entities import Entity, Property
+from .entities import Entity, Property, kind
+from .parts import Converting, Level
 from .scope import Scope
 from .syntax import ExpressionError
 from .writing import Flow
-
-if TYPE_CHECKING:
-    from .composites import Conversion, Level
 
 BUSES = frozenset({"Bus", "AtomicCommunicationAspect"})
 SCHEDULERS = {"FCFSScheduler": "fcfs", "FixedPriorityScheduler": "priority", "EDFScheduler": "edf"}
@@ -23,24 +21,22 @@ RESPONSES = frozenset({"CommunicationResponsePort", "ExecutionResponsePort", "CQ
 LOWEST = 2**31 - 1
 
 
-def _kind(entity: Property) -> str:
-    return entity.java.rpartition(".")[2]
-
-
 def is_aspect(entity: Entity) -> bool:
     """Whether it is an aspect, and no actor."""
     package = ".aspect." in entity.java or ".resourceScheduler" in entity.java or ".aspects." in entity.java
-    return _kind(entity) in MODELS or _kind(entity) in SCHEDULERS or (package and _kind(entity) not in REQUESTS | RESPONSES)
+    return (
+        kind(entity) in MODELS or kind(entity) in SCHEDULERS or (package and kind(entity) not in REQUESTS | RESPONSES)
+    )
 
 
 def is_request(entity: Property) -> bool:
     """Whether tokens or firings come into an aspect's model by it."""
-    return _kind(entity) in REQUESTS
+    return kind(entity) in REQUESTS
 
 
 def is_response(entity: Property) -> bool:
     """Whether they leave it there."""
-    return _kind(entity) in RESPONSES
+    return kind(entity) in RESPONSES
 
 
 @dataclass
@@ -69,7 +65,7 @@ def _is_enabled(said: Property) -> bool:
     return is_decoration(said) and (said.text("enable") or "").strip() not in ("", "false")
 
 
-def aspects_of(conversion: Conversion, level: Level) -> dict[str, Flow]:
+def aspects_of(conversion: Converting, level: Level) -> dict[str, Flow]:
     """The aspects that a composite declares, in the order in which a token meets them."""
     found: dict[str, Flow] = {}
     aspects = [each for each in level.entity.entities.values() if is_aspect(each)]
@@ -83,7 +79,7 @@ def aspects_of(conversion: Conversion, level: Level) -> dict[str, Flow]:
     for aspect in aspects:
         here = places.pop(aspect.name, [])
         try:
-            make = _MAKERS.get(_kind(aspect))
+            make = _MAKERS.get(kind(aspect))
             if make is None and not here:
                 conversion.notes.note(f"{level.told(aspect.name)}, a {aspect.java}: stands nowhere, and is left out")
             elif make is None:
@@ -101,7 +97,7 @@ def aspects_of(conversion: Conversion, level: Level) -> dict[str, Flow]:
     return found
 
 
-def _places(conversion: Conversion, level: Level, entity: Entity, prefix: str) -> Iterator[Place]:
+def _places(conversion: Converting, level: Level, entity: Entity, prefix: str) -> Iterator[Place]:
     """The ports and actors within at which aspects are enabled."""
     inner = conversion.levels.get(id(entity))
     for child in entity.entities.values():
@@ -133,7 +129,7 @@ def _at(places: list[Any]) -> Any:
     return places[0] if len(places) == 1 else places
 
 
-def _bus(conversion: Conversion, level: Level, aspect: Entity, places: list[Place]) -> Made:
+def _bus(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
     scope = conversion.scope_of(aspect)
     name = level.names.of(aspect.name)
     factor = 0.1
@@ -161,13 +157,13 @@ def _bus(conversion: Conversion, level: Level, aspect: Entity, places: list[Plac
     return made
 
 
-def _scheduler(conversion: Conversion, level: Level, aspect: Entity, places: list[Place]) -> Made:
+def _scheduler(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
     scope, told = conversion.scope_of(aspect), level.told(aspect.name)
     if not places:
         conversion.notes.note(f"{told} stands nowhere, and is left out")
         return []
     entry = Flow({"type": "Processor"})
-    policy = SCHEDULERS[_kind(aspect)]
+    policy = SCHEDULERS[kind(aspect)]
     if policy != "fcfs":
         entry["policy"] = policy
     for key, said in aspect.properties.items():
@@ -189,7 +185,7 @@ def _scheduler(conversion: Conversion, level: Level, aspect: Entity, places: lis
     return [(_sequence(places), level.names.of(aspect.name), entry)]
 
 
-def _model(conversion: Conversion, level: Level, aspect: Entity, places: list[Place]) -> Made:
+def _model(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
     told = level.told(aspect.name)
     if not places:
         conversion.notes.note(f"{told} stands nowhere, and is left out")
@@ -199,10 +195,12 @@ def _model(conversion: Conversion, level: Level, aspect: Entity, places: list[Pl
     inner = conversion.levels[id(aspect)]
     entry = Flow(part.entry)
     at: list[Any] = []
-    requests = [each.name for each in aspect.entities.values() if _kind(each) in REQUESTS]
+    requests = [each.name for each in aspect.entities.values() if kind(each) in REQUESTS]
     for place in places:
-        asked = next((text.strip() for each in ("inputPort", "requestPort", "port") if (text := place.said.text(each))), "")
-        pointcut = {"at": place.path}
+        asked = next(
+            (text.strip() for each in ("inputPort", "requestPort", "port") if (text := place.said.text(each))), ""
+        )
+        pointcut: dict[str, object] = {"at": place.path}
         if len(requests) > 1:
             if asked not in aspect.entities:
                 raise ExpressionError(f"{place.path} asks for {asked!r}, which is no request port")
@@ -214,7 +212,7 @@ def _model(conversion: Conversion, level: Level, aspect: Entity, places: list[Pl
     return [(_sequence(places), name, entry)]
 
 
-_MAKERS: dict[str, Callable[[Conversion, Level, Entity, list[Place]], Made]] = {
+_MAKERS: dict[str, Callable[[Converting, Level, Entity, list[Place]], Made]] = {
     **dict.fromkeys(("Bus",), _bus),
     **dict.fromkeys(SCHEDULERS, _scheduler),
     **dict.fromkeys(MODELS, _model),

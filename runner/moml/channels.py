@@ -45,5 +45,3 @@ def _join(composite: Entity, names: list[str], channel: str) -> None:
                 if link.relation is not None and link.relation != relation:
                     composite.joined.append((relation, link.relation, link.order))
                     link.relation = relation
-
-

@@ -5,19 +5,20 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 from epicycle.actors import Actor as OwnActor
 
-from .actors import Actor, face_of, is_decoration, is_layout, plain, seconds
+from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
 from .counterpart import Counterpart, counterpart_of_type
-from .entities import Entity, Property
+from .directors import director_of, fires_whole, said_of
+from .entities import Entity, Property, kind
 from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
-from .reach import is_fed, leave_out_idle
+from .parts import Level, Part
+from .reach import leave_out_idle
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
@@ -30,55 +31,6 @@ COMPOSITES = frozenset({
     "TypedAtomicActorComposite", "DECompositeActor", "ThreadedComposite", "CaseRefinement", "TypedOpaqueComposite",
     *MODELS,
 })  # fmt: skip
-_DE_LIKE = ("DEDirector", "DECQDirector")
-_FIRED_WHOLE = ("SDFDirector", "SROnceDirector", "SRDirector", "DDFDirector", "HDFDirector", "PSDFDirector", "FSMDirector",
-                "MultirateFSMDirector", "HSDirector", "DirectorLikeSDF", "TMDirector", "GiottoDirector")  # fmt: skip
-
-
-def kind(entity: Property) -> str:
-    """The name of its Java class, without the package."""
-    return entity.java.rpartition(".")[2]
-
-
-def director_of(entity: Entity) -> Property | None:
-    """The director that a composite has of its own."""
-    found = [each for each in entity.properties.values() if kind(each).endswith("Director") and not is_layout(each)]
-    return found[-1] if found else None
-
-
-@dataclass
-class Part:
-    """What a child of a composite becomes: its name and entry, and its ports by their names there."""
-
-    name: str
-    entry: Flow
-    row: Counterpart | None = None  # of an actor
-    ports: Mapping[str, str] = field(default_factory=dict)
-    unwired: frozenset[str] = frozenset()  # ports there for which there is none of ours
-
-
-@dataclass
-class Level:
-    """One composite that is being imported."""
-
-    entity: Entity
-    path: str  # as messages tell it
-    at: str  # where it is in the written model: "" or a path with a dot behind it
-    outer: Level | None
-    scope: Scope
-    names: Names  # of its actors
-    ports: Names
-    parameters: Names
-    own_names: dict[str, str] = field(default_factory=dict)  # parameters that may stay names, and ours for them
-    used: set[str] = field(default_factory=set)
-    parts: dict[str, Part | None] = field(default_factory=dict)
-    requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are actors there
-    added_outputs: list[str] = field(default_factory=list)  # by which something in it sets a variable around it
-    added_connections: list[str] = field(default_factory=list)
-
-    def told(self, name: str) -> str:
-        """The path of something within, for messages."""
-        return f"{self.path}.{name}" if self.path else name
 
 
 class Conversion:
@@ -151,10 +103,6 @@ class Conversion:
             scope = self._scopes[id(each)] = Scope(each, outer, {})
             waiting += [(child, scope) for child in each.entities.values()]
 
-    def is_fed(self, composite: Entity, child: Entity, port: str) -> bool:
-        """Whether anything sends to a port of a child."""
-        return is_fed(self, composite, child, port)
-
     def path_of(self, composite: Entity, child: Entity) -> str:
         """Where something is, for messages."""
         names, around = [child.name], composite
@@ -168,9 +116,11 @@ class Conversion:
         found = {}
         for composite in self.model.everything():
             director = director_of(composite) if composite is not self.model else None
-            if director is None or kind(director) not in _FIRED_WHOLE:
+            if director is None or not fires_whole(director):
                 continue
-            inputs = [name for name, port in composite.ports.items() if port.flag("input") and composite.links.get(name)]
+            inputs = [
+                name for name, port in composite.ports.items() if port.flag("input") and composite.links.get(name)
+            ]
             for child in composite.entities.values() if inputs else ():
                 row = self.rows.get(id(child))
                 if row is not None and "trigger" in row.ports and not composite.links.get(f"{child.name}.trigger"):
@@ -248,13 +198,19 @@ class Conversion:
             for said in port.properties.values():
                 known = said.name in ("input", "output", "multiport") or is_layout(said) or is_decoration(said)
                 if not known and said.value:
-                    path = f"{level.told(entity.name)}.{port.name}" if entity is not level.entity else level.told(port.name)
+                    path = (
+                        f"{level.told(entity.name)}.{port.name}"
+                        if entity is not level.entity
+                        else level.told(port.name)
+                    )
                     self.notes.note(f"{path}.{said.name} = {said.value!r}: has no counterpart")
 
     def _about_links(self, child: Entity, level: Level) -> None:
         """Ports to which something is linked, and that actors of ours do not have."""
         row = self.rows.get(id(child))
-        for name in row.ports if row is not None and not row.is_view else ():
+        if row is None or row.is_view:
+            return
+        for name in row.ports:
             if not row.has_port(name) and level.entity.links.get(f"{child.name}.{name}"):
                 self.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
 
@@ -362,9 +318,15 @@ class Conversion:
 
     def _unknown(self, child: Entity, level: Level) -> None:
         told = level.told(child.name)
-        linked = [port.rpartition(".")[2] for port, links in level.entity.links.items() if port.startswith(f"{child.name}.") and links]
+        linked = [
+            port.rpartition(".")[2]
+            for port, links in level.entity.links.items()
+            if port.startswith(f"{child.name}.") and links
+        ]
         if not linked:
-            self.notes.note(f"{told} is a {child.java}, has no counterpart, and is left out: nothing is connected to it")
+            self.notes.note(
+                f"{told} is a {child.java}, has no counterpart, and is left out: nothing is connected to it"
+            )
         elif all(self._only_takes(child, port) for port in linked):
             self.notes.note(f"{told} is a {child.java}, has no counterpart, and is left out: it only takes what comes")
         else:
@@ -379,13 +341,16 @@ class Conversion:
         if is_decorated(child):
             return True
         relations = {
-            link.relation for port, links in level.entity.links.items() if port.startswith(f"{child.name}.") for link in links
+            link.relation
+            for port, links in level.entity.links.items()
+            if port.startswith(f"{child.name}.")
+            for link in links
         }
         for port, links in level.entity.links.items():
             face = self.wiring._face(level.entity, port)
-            if face is not None and face.multi and face.direction == "output" and "." in port and len(links) > 1:
-                if relations & {link.relation for link in links}:
-                    return True
+            is_one = face is not None and face.multi and face.direction == "output" and "." in port and len(links) > 1
+            if is_one and relations & {link.relation for link in links}:
+                return True
         return False
 
     def composite_part(self, child: Entity, level: Level, name: str) -> Part:
@@ -394,7 +359,7 @@ class Conversion:
         body = self.body(inner)
         values = self.parameters(inner)
         if (director := director_of(child)) is not None:
-            found = self.director(director, inner)
+            found = said_of(director, inner.told(director.name), inner.scope, self.notes, of_model=False)
             if body.get("actors"):
                 body = _with_director(body, found)
         entry = self.instance(child, body, values)
@@ -416,51 +381,6 @@ class Conversion:
         default = self.classes[name].get("parameters", {})
         changed = {each: value for each, value in values.items() if not _same(default[each], value)}
         return Flow({"type": name, **changed})
-
-    def director(self, director: Property, level: Level) -> dict[str, Any]:
-        """What is said of a director of a composite's own."""
-        name, found = kind(director), dict[str, Any]()
-        scope = Scope(director, level.scope)
-        told = level.told(director.name)
-        if name in _FIRED_WHOLE and level.entity is not self.model:
-            self.notes.note(f"{told}, a {name}: what is inside fires by the rules of DE")
-        elif name not in _DE_LIKE:
-            self.notes.error(f"{told} is a {director.java}, which has no counterpart")
-        for key, said in director.properties.items():
-            if is_layout(said) or said.value is None or not said.value.strip():
-                continue
-            try:
-                self._of_director(key, said, scope, found, told, is_model=level.entity is self.model)
-            except (ExpressionError, ValueError, TypeError) as error:
-                self.notes.note(f"{told}.{key} = {said.value!r}: {error}")
-        return found
-
-    def _of_director(
-        self, key: str, said: Property, scope: Scope, found: dict[str, Any], told: str, *, is_model: bool
-    ) -> None:
-        if key in ("binCountFactor", "isCQAdaptive", "minBinCount", "maskImpliedFirings", "timeResolution", "verbose",
-                   "localClock", "allowDisconnectedGraphs", "allowRateChanges", "vectorizationFactor", "iterations",
-                   "stopWhenQueueIsEmpty", "enforceMicrostepSemantics", "SuppressWarnings", "constrainBufferSizes",
-                   "seed"):  # fmt: skip
-            if key == "localClock" and (drift := said.text("clockDrift")):
-                found["drift"] = plain(scope.value(drift))
-            elif key == "iterations" and not is_model and scope.value_of(said) not in (0, 1, -1):
-                self.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
-            return
-        value = scope.value_of(said)
-        if key == "startTime" and value:
-            found["start"] = seconds(value)
-        elif key == "stopTime" and value is not None:
-            if value < 1e300:
-                found["stop"] = float(value)
-        elif key == "clockDrift" and value != 1.0:
-            found["drift"] = plain(value)
-        elif key in ("startTime", "stopTime", "clockDrift") or value is False:
-            pass
-        elif key in ("synchronizeToRealTime", "timeScale", "realTime"):
-            self.notes.note(f"{told}.{key} = {said.value!r}: run it with --realtime")
-        else:
-            self.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
 
     # -- wires ----------------------------------------------------------------------------------------------------
 
@@ -503,18 +423,19 @@ def version_of(model: Entity) -> tuple[int, int]:
 
 def is_composite(entity: Entity) -> bool:
     """Whether it is a graph of its own."""
-    return kind(entity) in COMPOSITES or (bool(entity.entities) and counterpart_of(entity.java) is None and not entity.java.startswith("ptolemy.actor.lib.hoc"))
+    return kind(entity) in COMPOSITES or (
+        bool(entity.entities)
+        and counterpart_of(entity.java) is None
+        and not entity.java.startswith("ptolemy.actor.lib.hoc")
+    )
 
 
 def _with_director(body: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
     """The body with its director in the usual place."""
     said = {key: value for key, value in found.items() if key != "stop"}
-    front = {key: body[key] for key in ("doc", "inputs", "outputs") if key in body}
+    front: dict[str, Any] = {key: body[key] for key in ("doc", "inputs", "outputs") if key in body}
     return {**front, "director": Flow(said), **{key: value for key, value in body.items() if key not in front}}
 
 
 def _same(one: object, other: object) -> bool:
     return type(one) is type(other) and one == other
-
-
-__all__ = ["Conversion", "Level", "Net", "Part", "is_composite", "is_machine", "replace"]

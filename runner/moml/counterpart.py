@@ -6,20 +6,17 @@ import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from epicycle.actors import Actor as OwnActor
 from epicycle.actors import declared_parameters, declared_ports, has_own_ports
 
 from ..catalogue import built_in
-
 from .names import snake
 from .relations import PortFace
 
-if TYPE_CHECKING:
-    from .actors import Actor
-
 UNSAID: Any = object()
+Special = Callable[[Any], None]  # what finds the values of an actor that is imported
 _PORT = re.compile(r"(?P<name>\w+)(?P<multi>\*?)(?:=(?P<ours>\w+))?\Z")
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(?::(?P<ours>\w+))?(?:=(?P<default>.*))?\Z", re.DOTALL)
 
@@ -53,7 +50,7 @@ class Counterpart:
     ports: Mapping[str, PortSaid]
     parameters: Mapping[str, ParameterSaid]
     fixed: Mapping[str, object] = field(default_factory=dict)
-    special: Callable[[Actor], None] | None = None  # what the words of a row cannot say
+    special: Special | None = None  # what the words of a row cannot say
     is_view: bool = False  # it only shows what comes, to somebody who looks on
     needs: frozenset[str] = frozenset()  # inputs of which one must be fed, or it never fires there, though ours would
 
@@ -68,7 +65,7 @@ def counterpart(
     ports: str = "input | output",
     *,
     fixed: Mapping[str, object] | None = None,
-    special: Callable[[Actor], None] | None = None,
+    special: Special | None = None,
     needs: str = "",
     **parameters: str,
 ) -> Counterpart:
@@ -78,7 +75,9 @@ def counterpart(
         for each in names.split():
             match = _PORT.fullmatch(each)
             assert match is not None, each
-            said[match["name"]] = PortSaid(match["ours"] or snake(match["name"]), PortFace(direction, bool(match["multi"])))
+            said[match["name"]] = PortSaid(
+                match["ours"] or snake(match["name"]), PortFace(direction, bool(match["multi"]))
+            )
     read = {name: _parameter(name, each) for name, each in parameters.items()}
     return Counterpart(type_name, said, read, fixed or {}, special, needs=frozenset(needs.split()))
 
@@ -91,7 +90,7 @@ def _parameter(name: str, text: str) -> ParameterSaid:
 
 
 def counterpart_of_type(kind: type[OwnActor]) -> Counterpart:
-    """The row of an actor that somebody wrote to stand for a Java class of its name: all names are ours in camel case."""
+    """The row of an actor of one's own, for a Java class of its name: all names are ours in camel case."""
     ports = {}
     for name, port in declared_ports(kind).items():
         ports[_camel(name)] = PortSaid(name, PortFace(port.direction, port.multi))
@@ -105,7 +104,7 @@ def _camel(name: str) -> str:
 
 
 def view(ports: str = "input*") -> Counterpart:
-    """An actor that shows what comes to it; where an aspect stands there, or a channel counts, a Recorder is in its place."""
+    """An actor that only shows what comes; a Recorder where an aspect stands there, or a channel counts."""
     found = counterpart("Recorder", ports)
     ours = {name: PortSaid("input", each.face) for name, each in found.ports.items()}
     return Counterpart("Recorder", ours, {}, is_view=True)

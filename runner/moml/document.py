@@ -24,7 +24,9 @@ MAX_DEPTH = 100
 _DOCTYPE = re.compile(
     rb"""<!DOCTYPE\s+[\w.:-]+(?:\s+PUBLIC\s+(?:"[^"<>]*"|'[^'<>]*')|\s+SYSTEM)?(?:\s+(?:"[^"<>]*"|'[^'<>]*'))?\s*>"""
 )
-_PROLOG = re.compile(rb"\s*(?:<\?xml[^>]*\?>)?(?:\s|<!--(?:(?!-->).){0,100000}-->|<\?(?:(?!\?>).){0,100000}\?>)*", re.DOTALL)
+_PROLOG = re.compile(
+    rb"\s*(?:<\?xml[^>]*\?>)?(?:\s|<!--(?:(?!-->).){0,100000}-->|<\?(?:(?!\?>).){0,100000}\?>)*", re.DOTALL
+)
 _ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=")
 
 

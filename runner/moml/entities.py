@@ -1,7 +1,7 @@
 """What a MoML file builds: entities with ports, relations and links; classes are opened up in their instances.
 
-MoML is a list of things to do: an element makes what it names, or changes what is there.  An instance of a class that the
-file defines begins as a copy of it, so what comes out knows no classes any more, only from which one each entity came.
+MoML is a list of things to do: an element makes what it names, or changes what is there.  An instance of a class that
+the file defines begins as a copy of it, so what comes out knows no classes any more, only which one an entity was of.
 """
 
 from __future__ import annotations
@@ -32,6 +32,11 @@ class Property:
         """The value of one of its attributes."""
         found = self.properties.get(name)
         return None if found is None else found.value
+
+
+def kind(said: Property) -> str:
+    """The name of its Java class, without the package."""
+    return said.java.rpartition(".")[2]
 
 
 @dataclass

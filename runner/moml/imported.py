@@ -12,7 +12,8 @@ from epicycle.actors import Actor
 
 from .actors import seconds
 from .channels import join_channels
-from .composites import Conversion, director_of
+from .composites import Conversion
+from .directors import director_of, said_of
 from .document import MomlError, read_document
 from .entities import Builder, Entity
 from .names import Names
@@ -31,9 +32,7 @@ class Imported:
     notes: tuple[str, ...]
 
 
-def import_moml(
-    path: Path, load: Callable[[Path], object] | None = None, types: Iterable[type] = ()
-) -> Imported:
+def import_moml(path: Path, load: Callable[[Path], object] | None = None, types: Iterable[type] = ()) -> Imported:
     """Import a file; raises ``MomlError`` with all that stands in the way.
 
     ``load`` is given a file with the result and is to raise what is wrong with it.  ``types`` are actors of one's own:
@@ -69,7 +68,7 @@ def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]
     run: dict[str, Any] = {}
     said: dict[str, Any] = {}
     if (director := director_of(model)) is not None:
-        said = conversion.director(director, level)
+        said = said_of(director, director.name, level.scope, notes, of_model=True)
     if (stop := said.pop("stop", None)) is not None:
         run["stop"] = seconds(max(stop - _start(said), 0.0))
     if parameters := conversion.parameters(level):

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .actors import is_decoration, is_layout, plain, seconds
-from .entities import Entity, Property, Relation
+from .directors import director_of, said_of
+from .entities import Entity, Property, Relation, kind
 from .names import Names
-from .scope import Scope, is_variable
+from .parts import Converting, Level, Part
+from .scope import is_variable
 from .syntax import Binary, Call, Const, ExpressionError, Name, Tree
 from .translate import names_of, translated
 from .writing import Flow
-
-if TYPE_CHECKING:
-    from .composites import Conversion, Level, Part
 
 MACHINES = frozenset({"FSMActor", "ModalController", "InterfaceAutomaton", "FSMActorModal"})
 _RESERVED = ("mode", "trigger", "time", "mode_time", "error", "machine")
@@ -27,16 +26,13 @@ _FLAGS = {"preemptive": "preemptive", "immediate": "immediate", "nondeterministi
           "defaultTransition": "else", "error": "error"}  # fmt: skip
 
 
-def kind(entity: Property) -> str:
-    """The name of its Java class, without the package."""
-    return entity.java.rpartition(".")[2]
-
-
 def controller_of(entity: Entity) -> Entity | None:
     """The machine of an entity: itself, or what is inside of a modal model; None if it has none."""
     if kind(entity) in MACHINES:
         return entity
-    return next((each for each in entity.entities.values() if kind(each) in MACHINES and each.name == "_Controller"), None)
+    return next(
+        (each for each in entity.entities.values() if kind(each) in MACHINES and each.name == "_Controller"), None
+    )
 
 
 def is_machine(entity: Entity) -> bool:
@@ -48,7 +44,7 @@ def is_machine(entity: Entity) -> bool:
 class _Machine:
     """One machine that is being imported."""
 
-    conversion: Conversion
+    conversion: Converting
     entity: Entity  # the modal model, or the machine itself
     controller: Entity
     path: str
@@ -64,11 +60,18 @@ class _Machine:
         self.scope = self.conversion.scope_of(self.controller)
         owner = self.entity if self.entity.ports else self.controller
         said = {**self.controller.ports, **owner.ports}
-        self.inputs = {name: self.ports.of(name) for name, port in said.items() if port.flag("input") and not port.flag("output")}
+        self.inputs = {
+            name: self.ports.of(name) for name, port in said.items() if port.flag("input") and not port.flag("output")
+        }
         self.outputs = {name: self.ports.of(name) for name, port in said.items() if port.flag("output")}
         for transition in self.controller.relations.values():
             for name, _ in self._actions(transition, "setActions"):
-                if "." not in name and "(" not in name and name not in self.outputs and self.scope.find(name) is not None:
+                if (
+                    "." not in name
+                    and "(" not in name
+                    and name not in self.outputs
+                    and self.scope.find(name) is not None
+                ):
                     self.variables[name] = self.ports.of(name)
 
     def tell(self, text: str) -> None:
@@ -87,8 +90,7 @@ class _Machine:
             if len(refinements) > 1:
                 self.tell(f"{state.name} has {len(refinements)} refinements, and only {refinements[0]} is one here")
             if refinements and self.entity is not self.controller:
-                if (refinement := self._refinement(refinements[0], self.states.of(state.name))) is not None:
-                    said["refinement"] = refinement
+                said |= self._refinement(refinements[0], self.states.of(state.name))
             if self._flag(state, "isFinalState") or state.name in [each.strip() for each in finals]:
                 said["final"] = True
             if self._flag(state, "isInitialState"):
@@ -135,14 +137,14 @@ class _Machine:
             self.tell(f"{owner.name}.{name} = {said!r}: {error}")
             return False
 
-    def _refinement(self, name: str, mode: str) -> Any:
+    def _refinement(self, name: str, mode: str) -> dict[str, Any]:
         """The class of a refinement, which knows its ports by the names that they have outside."""
         child = self.entity.entities.get(name)
         if child is None:
             self.conversion.notes.error(f"{self.path}: there is no refinement {name!r}")
-            return None
+            return {}
         found = refinement_of(self, child, f"{self.path}.{name}", mode)
-        return found["type"] if len(found) == 1 else found
+        return {"refinement": found["type"] if len(found) == 1 else found}
 
     # -- transitions ----------------------------------------------------------------------------------------------
 
@@ -157,7 +159,9 @@ class _Machine:
         if self._flag(transition, "termination"):
             self.conversion.notes.error(f"{self.path}.{transition.name}: termination transitions have no counterpart")
         if (transition.text("refinementName") or "").strip():
-            self.conversion.notes.error(f"{self.path}.{transition.name}: a refinement of a transition has no counterpart")
+            self.conversion.notes.error(
+                f"{self.path}.{transition.name}: a refinement of a transition has no counterpart"
+            )
         try:
             said = {} if "else" in flags else self._guard(transition)
             actions = [*self._said_actions(transition, "outputActions"), *self._said_actions(transition, "setActions")]
@@ -190,7 +194,11 @@ class _Machine:
 
     def _leads_to_refinement(self, state: str) -> bool:
         found = self.controller.entities.get(state)
-        return self.entity is not self.controller and found is not None and bool((found.text("refinementName") or "").strip())
+        return (
+            self.entity is not self.controller
+            and found is not None
+            and bool((found.text("refinementName") or "").strip())
+        )
 
     def _names(self) -> dict[str, str]:
         """What guards and actions name, and how that is said here."""
@@ -309,10 +317,8 @@ def _line(source: str, target: str, flags: list[str], said: dict[str, str]) -> A
 # -- as parts of a model ------------------------------------------------------------------------------------------
 
 
-def machine_part(conversion: Conversion, child: Entity, level: Level, name: str) -> Part:
+def machine_part(conversion: Converting, child: Entity, level: Level, name: str) -> Part:
     """A state machine as an actor, a modal model as a composite with modes."""
-    from .composites import Part
-
     controller = controller_of(child)
     assert controller is not None
     path = level.told(child.name)
@@ -344,8 +350,6 @@ def _class(machine: _Machine) -> dict[str, Any]:
 
 def refinement_of(around: _Machine, child: Entity, path: str, mode: str) -> Flow:
     """The refinement of a mode: a composite, perhaps with modes of its own."""
-    from .composites import director_of
-
     conversion, controller, at = around.conversion, controller_of(child), f"{around.at}{mode}."
     if controller is not None:
         machine = _Machine(conversion, child, controller, path, at, around.outer, around.ports)
@@ -355,21 +359,32 @@ def refinement_of(around: _Machine, child: Entity, path: str, mode: str) -> Flow
     level.ports = around.ports
     body = conversion.body(level)
     if (director := director_of(child)) is not None:
-        said = conversion.director(director, level)
+        said = said_of(director, level.told(director.name), level.scope, conversion.notes, of_model=False)
         for key in said:
             conversion.notes.note(f"{path}: {key} of the director of a refinement has no counterpart")
     return conversion.instance(child, body, conversion.parameters(level))
 
 
-def _tell_rest(conversion: Conversion, child: Entity, path: str, machine: _Machine) -> None:
+def _tell_rest(conversion: Converting, child: Entity, path: str, machine: _Machine) -> None:
     """Attributes that say nothing here."""
-    known = {"initialStateName", "finalStateNames", "directorClass", "resetOnEachRun", "seed", "_priority", "stateDependentCausality"}
+    known = {
+        "initialStateName",
+        "finalStateNames",
+        "directorClass",
+        "resetOnEachRun",
+        "seed",
+        "_priority",
+        "stateDependentCausality",
+    }
     for owner in {id(each): each for each in (child, machine.controller)}.values():
         for name, said in owner.properties.items():
-            if name in known or is_layout(said) or is_decoration(said) or is_variable(said) or kind(said).endswith("Director"):
+            if (
+                name in known
+                or is_layout(said)
+                or is_decoration(said)
+                or is_variable(said)
+                or kind(said).endswith("Director")
+            ):
                 continue
             if said.value is not None or said.java:
                 conversion.notes.note(f"{path}.{name}, a {kind(said) or 'property'}: has no counterpart")
-
-
-__all__ = ["Scope", "controller_of", "is_machine", "machine_part", "refinement_of"]

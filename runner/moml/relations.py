@@ -62,6 +62,14 @@ class Groups:
         """The group that a link leads to."""
         return None if link.relation is None or link.relation not in self._of else self._root(link.relation)
 
+    def total(self, links: list[Link]) -> int:
+        """How many channels links come to, as far as that is known."""
+        found = 0
+        for link in links:
+            group = self.of(link)
+            found += 0 if group is None else self.width[group] or 0
+        return found
+
     def members(self, group: str) -> list[str]:
         """The relations of a group."""
         return [name for name in self._of if self._root(name) == group]
@@ -119,7 +127,9 @@ class Wiring:
                 if child is None or id(child) not in self.groups or name not in child.links:
                     continue
                 inner, inside = self.groups[id(child)], child.links[name]
-                found = self._balance(outer, links, inner, inside) or self._balance(inner, inside, outer, links) or found
+                found = (
+                    self._balance(outer, links, inner, inside) or self._balance(inner, inside, outer, links) or found
+                )
         return found
 
     def _balance(self, known: Groups, links: list[Link], open_: Groups, others: list[Link]) -> bool:
@@ -127,8 +137,8 @@ class Wiring:
         unknown = [group for link in others if (group := open_.of(link)) is not None and open_.width[group] is None]
         if None in widths or len(unknown) != 1:
             return False
-        taken = sum(open_.width[group] or 0 for link in others if (group := open_.of(link)) is not None)
-        open_.width[unknown[0]] = max(sum(each or 0 for each in widths) - taken, 0)
+        taken = open_.total(others)
+        open_.width[unknown[0]] = max(known.total(links) - taken, 0)
         return True
 
     def width(self, composite: Entity, port: str) -> int:
@@ -136,8 +146,7 @@ class Wiring:
         groups = self.groups.get(id(composite))
         if groups is None:
             return 0
-        links = composite.links.get(port, [])
-        return sum(groups.width[group] or 0 for link in links if (group := groups.of(link)) is not None)
+        return groups.total(composite.links.get(port, []))
 
     def nets(self, composite: Entity) -> list[Net]:
         """What is joined in a composite, each channel by itself."""
@@ -169,7 +178,9 @@ class Wiring:
     ) -> list[tuple[int, str, int]]:
         """The ports of a group in the order in which Ptolemy comes to them, from the relation of a sender on."""
         members = groups.members(group)
-        start = next((name for name in members for _, port, _ in at.get(name, []) if self._sends(composite, port)), None)
+        start = next(
+            (name for name in members for _, port, _ in at.get(name, []) if self._sends(composite, port)), None
+        )
         found: list[tuple[int, str, int]] = []
         seen: set[str] = set()
         waiting = [start] if start is not None else members[:1]

@@ -31,7 +31,9 @@ def is_variable(said: Property) -> bool:
 class Scope:
     """The attributes of one entity, within those of its surroundings."""
 
-    def __init__(self, entity: Property, around: Scope | None = None, defaults: Mapping[str, object] | None = None) -> None:
+    def __init__(
+        self, entity: Property, around: Scope | None = None, defaults: Mapping[str, object] | None = None
+    ) -> None:
         self.entity = entity
         self.around = around
         self.defaults = defaults or {}

@@ -62,8 +62,17 @@ def text_value(actor: Actor) -> None:
     actor.values["value"] = actor.text("value").replace("${", "$${")
 
 
-def test(actor: Actor, *, strict: bool = True) -> None:
+def strict_test(actor: Actor) -> None:
     """The check of a model: what is expected, on one channel or on several together."""
+    _test(actor, strict=True)
+
+
+def non_strict_test(actor: Actor) -> None:
+    """The same, token by token."""
+    _test(actor, strict=False)
+
+
+def _test(actor: Actor, *, strict: bool) -> None:
     if actor.get("trainingMode", False) is True:
         actor.notes.note(f"{actor.path} is in training mode: it checks nothing")
         _records(actor)
@@ -83,11 +92,6 @@ def test(actor: Actor, *, strict: bool = True) -> None:
     elif strict and nested:
         actor.values["together"] = True
     actor.values = {"values": values, **actor.values}
-
-
-def non_strict_test(actor: Actor) -> None:
-    """The same, channel by channel."""
-    test(actor, strict=False)
 
 
 def _records(actor: Actor) -> None:
@@ -114,7 +118,9 @@ def expression(actor: Actor) -> None:
         return
     if "iteration" in names_of(tree):
         actor.values["iteration"] = True
-    actor.values["expression"] = _with_all(ours, [each for port, each in actor.ports.items() if actor.widths.get(port, 0)])
+    actor.values["expression"] = _with_all(
+        ours, [each for port, each in actor.ports.items() if actor.widths.get(port, 0)]
+    )
 
 
 def _with_all(text: str, ports: list[str]) -> str:
@@ -157,7 +163,10 @@ def math_function(actor: Actor) -> None:
     """MathFunction, whose modulo has two operands."""
     word = actor.text("function", "exp")
     if word == "modulo":
-        actor.values = {"type": "Expression", "expression": "firstOperand - secondOperand * int(firstOperand / secondOperand)"}
+        actor.values = {
+            "type": "Expression",
+            "expression": "firstOperand - secondOperand * int(firstOperand / secondOperand)",
+        }
         actor.ports |= {"firstOperand": "firstOperand", "secondOperand": "secondOperand"}
         return
     actor.ports |= {"firstOperand": "input"}

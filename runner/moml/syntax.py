@@ -102,9 +102,7 @@ class Steps:
     last: Tree
 
 
-Tree: TypeAlias = (
-    Const | Name | Unary | Binary | Choice | Call | Method | Array | Record | Matrix | Steps
-)
+Tree: TypeAlias = Const | Name | Unary | Binary | Choice | Call | Method | Array | Record | Matrix | Steps
 
 _TOKEN = re.compile(
     r"""\s*(?:(?P<comment>//[^\n]*|/\*.*?\*/)
@@ -312,7 +310,7 @@ class _Parser:
             return self._brackets()
         if value == "{|":
             raise ExpressionError(f"{_short(self._text)}: unions are not known here")
-        self._fail("it ends too early" if kind == "end" else f"{value!r} was not expected")
+        return self._fail("it ends too early" if kind == "end" else f"{value!r} was not expected")
 
     def _is_field(self) -> bool:
         kind = self._tokens[self._place][0]
@@ -329,7 +327,7 @@ class _Parser:
             if self._skip(end):
                 return Record(tuple(fields))
             self._expect(",")
-        self._fail("a field 'name = value' was expected")
+        return self._fail("a field 'name = value' was expected")
 
     def _brackets(self) -> Tree:
         if self._is_field():

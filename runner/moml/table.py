@@ -15,53 +15,90 @@ from .variables import set_variable
 
 _SOURCES: Mapping[str, Counterpart] = {
     "DiscreteClock": counterpart(
-        "Clock", "trigger* start stop period | output", special=how.finite_stop,
-        period="time=1.0", offsets="times", values="list=[1]", stopTime="time", stopTimeIsLocal="nothing",
+        "Clock",
+        "trigger* start stop period | output",
+        special=how.finite_stop,
+        period="time=1.0",
+        offsets="times",
+        values="list=[1]",
+        stopTime="time",
     ),
     "Clock": counterpart(
-        "Clock", "trigger* start stop period | output", special=how.old_clock,
+        "Clock",
+        "trigger* start stop period | output",
+        special=how.old_clock,
         fixed={"new_period": "at once", "late_trigger": True},
-        period="time=2.0", offsets="times=[0.0, 1.0]", values="list=[1, 0]", stopTime="time", stopTimeIsLocal="nothing",
-        UNBOUNDED="nothing", numberOfCycles="nothing",
+        period="time=2.0",
+        offsets="times=[0.0, 1.0]",
+        values="list=[1, 0]",
+        stopTime="time",
+        numberOfCycles="nothing",
     ),
     "PoissonClock": counterpart(
-        "PoissonClock", "trigger* | output", special=how.poisson_clock,
-        meanTime="time:mean_interval", values="list=[1, 0]", fireAtStart="flag", stopTime="time", resetOnEachRun="nothing",
+        "PoissonClock",
+        "trigger* | output",
+        special=how.poisson_clock,
+        meanTime="time:mean_interval",
+        values="list=[1, 0]",
+        fireAtStart="flag",
+        stopTime="time",
     ),
-    "SingleEvent": counterpart("SingleEvent", "trigger* | output", special=how.single_event, time="time", value="value"),
+    "SingleEvent": counterpart(
+        "SingleEvent", "trigger* | output", special=how.single_event, time="time", value="value"
+    ),
     "Const": counterpart("Const", "trigger* | output", needs="trigger", value="value"),
     "StringConst": counterpart("Const", "trigger* | output", needs="trigger", special=how.text_value, value="text"),
     "Ramp": counterpart("Ramp", "trigger* init step | output", init="value", step="value"),
     "Sequence": counterpart(
-        "Sequence", "trigger* enable | output", needs="trigger enable", values="list=[1]", repeat="flag", holdLastOutput="flag:hold"
+        "Sequence",
+        "trigger* enable | output",
+        needs="trigger enable",
+        values="list=[1]",
+        repeat="flag",
+        holdLastOutput="flag:hold",
     ),
     "Pulse": counterpart("Pulse", "trigger* | output", values="list", indexes="list", repeat="flag"),
-    "CurrentTime": counterpart("CurrentTime", "trigger* | output", useLocalTime="nothing", stopTime="nothing"),
+    "CurrentTime": counterpart("CurrentTime", "trigger* | output", stopTime="nothing"),
     "CurrentMicrostep": counterpart("CurrentMicrostep", "trigger* | output"),
     "GetCurrentMicrostep": counterpart("CurrentMicrostep", "input=trigger | output"),
-}  # fmt: skip
+}
 
-_SEEDS = {"resetOnEachRun": "nothing"}
+
+def _random(ports: str, special: how.Special) -> Counterpart:
+    return counterpart("Random", f"trigger* {ports} | output", special=special)
+
+
+_NORMAL = _random(
+    "mean standardDeviation", how.random("Normal", mean="mean=0.0", standard_deviation="standardDeviation=1.0")
+)
+_COIN = _random("trueProbability", how.random("Bernoulli", probability="trueProbability=0.5"))
 _RANDOM: Mapping[str, Counterpart] = {
-    "Gaussian": counterpart("Random", "trigger* mean standardDeviation | output", special=how.random("Normal", mean="mean=0.0", standard_deviation="standardDeviation=1.0"), **_SEEDS),
-    "ColtNormal": counterpart("Random", "trigger* mean standardDeviation | output", special=how.random("Normal", mean="mean=0.0", standard_deviation="standardDeviation=1.0"), **_SEEDS),
-    "Uniform": counterpart("Random", "trigger* lowerBound upperBound | output", special=how.random("Uniform", low="lowerBound=0.0", high="upperBound=1.0"), **_SEEDS),
-    "Bernoulli": counterpart("Random", "trigger* trueProbability | output", special=how.random("Bernoulli", probability="trueProbability=0.5"), **_SEEDS),
-    "ColtBernoulli": counterpart("Random", "trigger* trueProbability | output", special=how.random("Bernoulli", probability="trueProbability=0.5"), **_SEEDS),
-    "CoinFlip": counterpart("Random", "trigger* trueProbability | output", special=how.random("Bernoulli", probability="trueProbability=0.5"), **_SEEDS),
-    "Triangular": counterpart("Random", "trigger* min max mode | output", special=how.random("Triangular", low="min=0.0", high="max=1.0", mode="mode=0.5"), **_SEEDS),
-    "DiscreteRandomSource": counterpart("Random", "trigger* | output", special=how.random("Choice", values="values={0, 1}", weights="pmf={0.5, 0.5}"), **_SEEDS),
-    "ColtExponential": counterpart("Random", "trigger* lambda | output", special=how.colt_exponential, **_SEEDS),
-    "ColtGamma": counterpart("Random", "trigger* alpha lambda | output", special=how.colt_gamma, **_SEEDS),
-}  # fmt: skip
+    "Gaussian": _NORMAL,
+    "ColtNormal": _NORMAL,
+    "Uniform": _random("lowerBound upperBound", how.random("Uniform", low="lowerBound=0.0", high="upperBound=1.0")),
+    "Bernoulli": _COIN,
+    "ColtBernoulli": _COIN,
+    "CoinFlip": _COIN,
+    "Triangular": _random("min max mode", how.random("Triangular", low="min=0.0", high="max=1.0", mode="mode=0.5")),
+    "DiscreteRandomSource": _random("", how.random("Choice", values="values={0, 1}", weights="pmf={0.5, 0.5}")),
+    "ColtExponential": _random("lambda", how.colt_exponential),
+    "ColtGamma": _random("alpha lambda", how.colt_gamma),
+}
 
 _TIME: Mapping[str, Counterpart] = {
     "Queue": counterpart(
-        "Queue", "input trigger* | output size", special=how.positive("capacity"),
-        capacity="whole", persistentTrigger="flag",
+        "Queue",
+        "input trigger* | output size",
+        special=how.positive("capacity"),
+        capacity="whole",
+        persistentTrigger="flag",
     ),
     "Server": counterpart(
-        "Server", "input serviceTime | output size", special=how.positive("capacity"), serviceTime="time", capacity="whole",
+        "Server",
+        "input serviceTime | output size",
+        special=how.positive("capacity"),
+        serviceTime="time",
+        capacity="whole",
     ),
     "TimeDelay": counterpart("TimeDelay", "input delay | output", delay="time", minimumDelay="nothing"),
     "MicrostepDelay": counterpart("TimeDelay", fixed={"delay": "0 s"}),
@@ -71,7 +108,7 @@ _TIME: Mapping[str, Counterpart] = {
     "TimeGap": counterpart("TimeGap"),
     "WaitingTime": counterpart("WaitingTime", "waiter waitee=waited_for | output"),
     "TimeCompare": counterpart("TimeCompare", "input1=first input2=second | output", nonnegative="flag"),
-}  # fmt: skip
+}
 
 _FLOW: Mapping[str, Counterpart] = {
     "Merge": counterpart("Merge", "input* | output", discardEvents="flag:discard"),
@@ -93,14 +130,18 @@ _FLOW: Mapping[str, Counterpart] = {
     "BooleanSelect": counterpart("BooleanSelect", "trueInput* falseInput* control | output*"),
     "Multiplexor": counterpart("Select", "input* select=control | output", fixed={"unread": "lost"}),
     "BooleanMultiplexor": counterpart(
-        "Expression", "trueInput=trueInput falseInput=falseInput select | output",
+        "Expression",
+        "trueInput=trueInput falseInput=falseInput select | output",
         special=how.formula("trueInput if select else falseInput"),
     ),
     "Distributor": counterpart("Router", "input* | output*", special=how.no_trigger("blockSize=1")),
     "Commutator": counterpart("Commutator", "input* | output", blockSize="whole:block"),
     "Synchronizer": counterpart("Synchronizer", "input* | output*"),
     "Repeat": counterpart(
-        "Repeat", "input numberOfTimes=times | output", special=how.no_trigger("blockSize=1"), numberOfTimes="whole:times"
+        "Repeat",
+        "input numberOfTimes=times | output",
+        special=how.no_trigger("blockSize=1"),
+        numberOfTimes="whole:times",
     ),
     "SequenceToArray": counterpart("Batch", "input arrayLength | output", arrayLength="whole:number=1"),
     "ArrayToSequence": counterpart("Unbatch", arrayLength="nothing", enforceArrayLength="nothing"),
@@ -108,41 +149,60 @@ _FLOW: Mapping[str, Counterpart] = {
     "RecordDisassembler": counterpart("RecordDisassembler", "input |", special=how.fields("output")),
     "SetVariable": counterpart("SetVariable", special=set_variable, variableName="nothing"),
     "Default": counterpart("Default", "preferred alternate | output"),
-    "Sequencer": counterpart(
-        "Sequencer", "input sequenceNumber=number | output", startingSequenceNumber="whole:first"
-    ),
+    "Sequencer": counterpart("Sequencer", "input sequenceNumber=number | output", startingSequenceNumber="whole:first"),
     "ElementsToArray": counterpart("Collect", "input* | output"),
     "ArrayToElements": counterpart("Spread", "input | output*"),
     "Sleep": counterpart("Commutator", "input* | output*", sleepTime="nothing"),
     "ExecutionTime": counterpart("Commutator", executionTime="nothing"),
     "IsPresent": counterpart("IsPresent", "input* | output*"),
-}  # fmt: skip
+}
 
 _GATES = {each: each for each in ("and", "or", "xor", "nand", "nor", "xnor")}
 _COMPUTING: Mapping[str, Counterpart] = {
     "Comparator": counterpart(
-        "Comparator", "left right | output",
-        special=how.choice("comparison", "comparison", ">", {each: each for each in (">", ">=", "<", "<=", "==", "!=")}),
+        "Comparator",
+        "left right | output",
+        special=how.choice(
+            "comparison", "comparison", ">", {each: each for each in (">", ">=", "<", "<=", "==", "!=")}
+        ),
         tolerance="number",
     ),
     "Equals": counterpart("Equals", "input* | output", tolerance="number"),
-    "LogicFunction": counterpart("LogicGate", "input* | output", special=how.choice("function", "function", "and", _GATES)),
+    "LogicFunction": counterpart(
+        "LogicGate", "input* | output", special=how.choice("function", "function", "and", _GATES)
+    ),
     "LogicGate": counterpart("LogicGate", "input* | output", special=how.choice("logic", "function", "and", _GATES)),
     "LogicalNot": counterpart("LogicGate", "input* | output*", fixed={"function": "not"}),
     "AddSubtract": counterpart("AddSubtract", "plus* minus* | output"),
     "MultiplyDivide": counterpart("MultiplyDivide", "multiply* divide* | output"),
-    "Scale": counterpart("Scale", "input factor | output", factor="number", scaleOnLeft="nothing"),
+    "Scale": counterpart("Scale", "input factor | output", factor="number"),
     "AbsoluteValue": counterpart("MathFunction", fixed={"function": "abs"}),
-    "MathFunction": counterpart("MathFunction", "firstOperand=input secondOperand=input | output", special=how.math_function),
-    "UnaryMathFunction": counterpart("MathFunction", special=how.choice("function", "function", "exp", {each: each for each in ("exp", "log", "sign", "square", "sqrt")})),
-    "TrigFunction": counterpart("MathFunction", special=how.choice("function", "function", "sin", {each: each for each in ("sin", "cos", "tan", "asin", "acos", "atan")})),
+    "MathFunction": counterpart(
+        "MathFunction", "firstOperand=input secondOperand=input | output", special=how.math_function
+    ),
+    "UnaryMathFunction": counterpart(
+        "MathFunction",
+        special=how.choice(
+            "function", "function", "exp", {each: each for each in ("exp", "log", "sign", "square", "sqrt")}
+        ),
+    ),
+    "TrigFunction": counterpart(
+        "MathFunction",
+        special=how.choice(
+            "function", "function", "sin", {each: each for each in ("sin", "cos", "tan", "asin", "acos", "atan")}
+        ),
+    ),
     "Round": counterpart("Expression", "input=input | output", special=how.rounding),
-    "Accumulator": counterpart("Accumulator", "input* reset* | output", init="number:initial", lowerBound="none", upperBound="none"),
+    "Accumulator": counterpart(
+        "Accumulator", "input* reset* | output", init="number:initial", lowerBound="none", upperBound="none"
+    ),
     "Counter": counterpart("Counter", "increment* decrement* reset* | output"),
     "Differential": counterpart("Difference", initialValue="number:initial"),
     "Derivative": counterpart("Derivative", "input reset | output"),
     "AverageOverTime": counterpart("TimeAverage"),
-    "Integrator": counterpart("Integrator", "input reset | output", fixed={"method": "trapezoid"}, initialValue="number:initial"),
+    "Integrator": counterpart(
+        "Integrator", "input reset | output", fixed={"method": "trapezoid"}, initialValue="number:initial"
+    ),
     "Expression": counterpart("Expression", "| output", special=how.expression),
     "LookupTable": counterpart("LookupTable", table="list:values"),
     "Limiter": counterpart("Limiter", special=how.limiter),
@@ -153,57 +213,108 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "IIR": counterpart("DiscreteFilter", numerator="list=[1.0]", denominator="list=[1.0]"),
     "MovingAverage": counterpart("MovingAverage", maxPastInputsToAverage="whole:size=10"),
     "Remainder": counterpart(
-        "Expression", "input=input | output", special=how.formula("input - {divisor} * int(input / {divisor})", divisor=1.0)
+        "Expression",
+        "input=input | output",
+        special=how.formula("input - {divisor} * int(input / {divisor})", divisor=1.0),
     ),
-    "ArrayElement": counterpart("Expression", "input=input index=index | output", special=how.formula("input[{index}]", index=0)),
+    "ArrayElement": counterpart(
+        "Expression", "input=input index=index | output", special=how.formula("input[{index}]", index=0)
+    ),
     "ArrayLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
     "ArraySum": counterpart("Expression", "input=input | output", special=how.formula("sum(input)")),
     "ArrayMinimum": counterpart("Expression", "input=input | output", special=how.formula("min(input)")),
     "ArrayMaximum": counterpart("Expression", "input=input | output", special=how.formula("max(input)")),
     "ArrayAverage": counterpart("Expression", "input=input | output", special=how.formula("sum(input) / len(input)")),
     "ArraySort": counterpart("Expression", "input=input | output", special=how.formula("sorted(input)")),
-    "ArrayContains": counterpart("Expression", "array=array element=element | output", special=how.formula("{element} in array")),
+    "ArrayContains": counterpart(
+        "Expression", "array=array element=element | output", special=how.formula("{element} in array")
+    ),
     "ArrayExtract": counterpart(
-        "Expression", "input=input sourcePosition=sourcePosition extractLength=extractLength | output",
-        special=how.formula("input[{sourcePosition}:{sourcePosition} + {extractLength}]", sourcePosition=0, extractLength=1),
+        "Expression",
+        "input=input sourcePosition=sourcePosition extractLength=extractLength | output",
+        special=how.formula(
+            "input[{sourcePosition}:{sourcePosition} + {extractLength}]", sourcePosition=0, extractLength=1
+        ),
     ),
     "StringSubstring": counterpart(
-        "Expression", "input=input start=start stop=stop | output",
+        "Expression",
+        "input=input start=start stop=stop | output",
         special=how.formula("input[{start}:{stop}]", start=0, stop=0),
     ),
-    "StringCompare": counterpart("Expression", "firstString=firstString secondString=secondString | output", special=how.string_compare, ignoreCase="none"),
+    "StringCompare": counterpart(
+        "Expression",
+        "firstString=firstString secondString=secondString | output",
+        special=how.string_compare,
+        ignoreCase="none",
+    ),
     "BooleanToAnything": counterpart(
-        "Expression", "input=input | output", special=how.formula("{trueValue} if input else {falseValue}", trueValue=True, falseValue=False)
+        "Expression",
+        "input=input | output",
+        special=how.formula("{trueValue} if input else {falseValue}", trueValue=True, falseValue=False),
     ),
     "StringLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
     "StringIndexOf": counterpart(
         "Expression", "searchFor=searchFor inText=inText | output", special=how.formula("{searchFor} in {inText}")
     ),
-}  # fmt: skip
+}
 
 _SINKS: Mapping[str, Counterpart] = {
     "Test": counterpart(
-        "Test", "input* | output", special=how.test, tolerance="number", requireAllCorrectValues="flag:complete",
+        "Test",
+        "input* | output",
+        special=how.strict_test,
+        tolerance="number",
+        requireAllCorrectValues="flag:complete",
         requireOrderedValues="none",
     ),
     "NonStrictTest": counterpart(
-        "Test", "input | output", special=how.non_strict_test, tolerance="number", requireAllCorrectValues="flag:complete",
+        "Test",
+        "input | output",
+        special=how.non_strict_test,
+        tolerance="number",
+        requireAllCorrectValues="flag:complete",
         requireOrderedValues="none",
     ),
     "Recorder": counterpart("Recorder", "input* |", special=how.positive("capacity"), capacity="whole"),
     "Stop": counterpart("Stop", "input* |"),
-}  # fmt: skip
+}
 
-_VIEWS = frozenset({
-    "Display", "MonitorValue", "Discard", "TimedPlotter", "SequencePlotter", "XYPlotter", "XYScope", "TimedScope",
-    "SequenceScope", "HistogramPlotter", "BarGraph", "RealTimePlotter", "ArrayPlotter", "PlotterBase", "Console",
-    "FileWriter", "LineWriter", "DoubleMatrixWriter", "ExpressionWriter", "CSVWriter", "SequentialTimedPlotter",
-    "SequentialScope", "Publisher0", "MatrixViewer", "LEDMatrix", "ComputeHistogramPlotter", "TableDisplay",
-})  # fmt: skip
+_VIEWS = frozenset(
+    {
+        "Display",
+        "MonitorValue",
+        "Discard",
+        "TimedPlotter",
+        "SequencePlotter",
+        "XYPlotter",
+        "XYScope",
+        "TimedScope",
+        "SequenceScope",
+        "HistogramPlotter",
+        "BarGraph",
+        "RealTimePlotter",
+        "ArrayPlotter",
+        "PlotterBase",
+        "Console",
+        "FileWriter",
+        "LineWriter",
+        "DoubleMatrixWriter",
+        "ExpressionWriter",
+        "CSVWriter",
+        "SequentialTimedPlotter",
+        "SequentialScope",
+        "Publisher0",
+        "MatrixViewer",
+        "LEDMatrix",
+        "ComputeHistogramPlotter",
+        "TableDisplay",
+    }
+)
 _ALSO = {
-    "TimedDelay": "TimeDelay", "VariableDelay": "TimeDelay",
+    "TimedDelay": "TimeDelay",
+    "VariableDelay": "TimeDelay",
     "IntRamp": "Ramp",
-}  # fmt: skip
+}
 
 _NAMED: Mapping[str, Counterpart] = {**_SOURCES, **_RANDOM, **_TIME, **_FLOW, **_COMPUTING, **_SINKS}
 # The same name in two packages.

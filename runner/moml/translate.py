@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from .syntax import Array, Binary, Call, Choice, Const, ExpressionError, Matrix, Method, Name, Record, Tree, Unary
 from .values import Scope, evaluate

@@ -115,6 +115,7 @@ def _value(tree: Tree, scope: Scope) -> Any:
 
 def _called(tree: Call, scope: Scope) -> Any:
     arguments = [_value(each, scope) for each in tree.arguments]
+    whole: Any
     if isinstance(tree.function, Name):
         try:
             whole = scope(tree.function.name)
@@ -252,7 +253,7 @@ def _raised(left: Any, right: Any) -> Any:
     if isinstance(exponent, int) and isinstance(base, int) and exponent >= 0:
         if exponent * max(abs(base), 2).bit_length() > 2000:
             raise OverflowError("the result is too large")
-        return base**exponent
+        return elementary.power(base, exponent)
     return elementary.power(float(base), exponent)
 
 
@@ -269,10 +270,10 @@ def _whole(value: Any) -> int:
 
 
 def _shift(left: Any, right: Any) -> int:
-    left, right = _whole(left), _whole(right)
-    if not -63 <= right <= 63:
+    bits, by = _whole(left), _whole(right)
+    if not -63 <= by <= 63:
         raise ExpressionError("it shifts too far")
-    return left << right if right >= 0 else left >> -right
+    return bits << by if by >= 0 else bits >> -by
 
 
 _BINARY: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -339,7 +340,7 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "ceil": _numeric(lambda x: float(math.ceil(x))),
     "round": _numeric(lambda x: math.floor(x + 0.5)),
     "roundToInt": _numeric(lambda x: math.floor(x + 0.5)),
-    "sqrt": _numeric(lambda x: math.sqrt(x)),
+    "sqrt": _numeric(math.sqrt),
     "exp": _numeric(elementary.exp),
     "log": _numeric(elementary.log),
     "log10": _numeric(elementary.log10),
@@ -352,19 +353,21 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "atan": _numeric(elementary.atan),
     "atan2": lambda y, x: elementary.atan2(float(y), float(x)),
     "pow": lambda x, y: elementary.power(float(x), y),
-    "remainder": lambda x, y: math.remainder(x, y),
+    "remainder": math.remainder,
     "sgn": _numeric(lambda x: (x > 0) - (x < 0)),
     "neighborhood": lambda x, y, d: abs(x - y) <= d,
     "length": len,
     "size": len,
     "get": lambda whole, index: whole[index] if isinstance(whole, dict) else _at(whole, index),
-    "getElement": lambda whole, index: _at(whole, index),
+    "getElement": _at,
     "sum": _summed,
-    "sort": lambda items: sorted(items),
-    "sortAscending": lambda items: sorted(items),
+    "sort": sorted,
+    "sortAscending": sorted,
     "sortDescending": lambda items: sorted(items, reverse=True),
     "append": lambda *parts: _limited([each for part in parts for each in part]),
-    "concatenate": lambda *parts: _limited([each for part in (parts[0] if len(parts) == 1 else parts) for each in part]),
+    "concatenate": lambda *parts: _limited(
+        [each for part in (parts[0] if len(parts) == 1 else parts) for each in part]
+    ),
     "subarray": lambda items, start, count: items[start : start + count],
     "repeat": _repeated,
     "array": lambda *items: list(items),
@@ -386,6 +389,6 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "startsWith": lambda text, start: text.startswith(start),
     "endsWith": lambda text, end: text.endswith(end),
     "indexOf": lambda text, part: text.find(part),
-    "isNaN": lambda x: math.isnan(x),
-    "isInfinite": lambda x: math.isinf(x),
+    "isNaN": math.isnan,
+    "isInfinite": math.isinf,
 }

@@ -6,17 +6,14 @@ Each is a ``Variable`` beside the actors of the composite that declares it; what
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from .actors import Actor, plain
 from .entities import Entity
+from .parts import Converting, Level, Part
 from .scope import Scope
 from .syntax import ExpressionError, Tree
 from .translate import names_of, translated
 from .writing import Flow
-
-if TYPE_CHECKING:
-    from .composites import Conversion, Level, Part
 
 _FIRST = -1000  # a priority: a new value counts for all who fire at that microstep
 
@@ -37,7 +34,7 @@ class Changing:
 class Variables:
     """All parameters of a model that change."""
 
-    def __init__(self, conversion: Conversion) -> None:
+    def __init__(self, conversion: Converting) -> None:
         self._conversion = conversion
         self._found: dict[tuple[int, str], Changing] = {}
         for entity in conversion.model.everything():
@@ -154,7 +151,9 @@ class Variables:
             if not each.setters and not each.is_port:
                 continue
             name = self.actor_of(each)
-            actors[name] = Flow({"type": "Variable", "priority": _FIRST, **({} if each.delayed else {"delayed": False})})
+            actors[name] = Flow(
+                {"type": "Variable", "priority": _FIRST, **({} if each.delayed else {"delayed": False})}
+            )
             sources = [level.ports.of(each.name)] if each.is_port else each.setters
             connections += [f"{source} -> {name}.input" for source in sources]
             for path, expression in each.readers:
@@ -176,5 +175,3 @@ def set_variable(actor: Actor) -> None:
         value = None
     if value is not None:
         actor.values["value"] = plain(value)
-
-

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import heapq
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from typing import Any
 
 from epicycle.actors import declared_ports
 
 from ..catalogue import built_in
 from .modes import is_machine
+from .parts import Converting, Level
 from .relations import End, Net
 from .writing import Flow
 
-if TYPE_CHECKING:
-    from .composites import Conversion, Level
 
-
-def connections_of(conversion: Conversion, level: Level) -> list[Any]:
+def connections_of(conversion: Converting, level: Level) -> list[Any]:
     """The connections of a composite."""
-    made = [_Line(conversion, level, net) for net in conversion.nets_of(level.entity)]
+    counting = Counting(conversion)
+    made = [_Line(conversion, level, net, counting) for net in conversion.nets_of(level.entity)]
     lines = [each for each in made if each.sources and each.sinks]
     for each in made:
         if each.sinks and not each.sources and any("." in sink for sink in each.sinks):
@@ -36,7 +36,7 @@ def connections_of(conversion: Conversion, level: Level) -> list[Any]:
 class _Line:
     """One connection, with what is to be known of its ends."""
 
-    def __init__(self, conversion: Conversion, level: Level, net: Net) -> None:
+    def __init__(self, conversion: Converting, level: Level, net: Net, counting: Counting) -> None:
         self.ends: list[End] = net.ends
         self.sources: list[str] = []
         self.sinks: list[str] = []
@@ -44,11 +44,10 @@ class _Line:
             found = conversion.end(level, end)
             if found is not None and found[0] not in (self.sources if found[1] else self.sinks):
                 (self.sources if found[1] else self.sinks).append(found[0])
-        self.shared = self._is_shared(conversion, level)
+        self.shared = self._is_shared(conversion, level, counting)
 
-    def _is_shared(self, conversion: Conversion, level: Level) -> bool:
+    def _is_shared(self, conversion: Converting, level: Level, counts: Counting) -> bool:
         """Whether it has to be said that all of it is one channel."""
-        counts = Counting(conversion)
         if counts.senders(level.entity, self.ends) > 1:
             return True
         if counts.receivers(level.entity, self.ends) < 2:
@@ -63,7 +62,7 @@ class _Line:
         return Flow({"from": one[0], "to": one[1], "shared": True})
 
 
-def _sends_by_channel(conversion: Conversion, level: Level, end: End) -> bool:
+def _sends_by_channel(conversion: Converting, level: Level, end: End) -> bool:
     """Whether this is an output of an actor of ours that has channels."""
     part = level.parts.get(end.actor)
     if part is None or part.row is None or end.port not in part.row.ports:
@@ -79,15 +78,25 @@ def _sends_by_channel(conversion: Conversion, level: Level, end: End) -> bool:
 class Counting:
     """How many actors' outputs lead into a net, and to how many inputs it leads, through the borders of composites."""
 
-    def __init__(self, conversion: Conversion) -> None:
+    def __init__(self, conversion: Converting) -> None:
         self._conversion = conversion
-        self._open: set[tuple[int, str, int, bool]] = set()
+        self._found: dict[tuple[int, str, int, bool], int] = {}  # 0 while it is looked for
 
     def senders(self, composite: Any, ends: list[End]) -> int:
-        return sum(self._beyond(composite, end, senders=True) for end in ends)
+        """How many outputs of actors lead to some ends of a net; 2 stands for several."""
+        return self._all(composite, ends, senders=True)
 
     def receivers(self, composite: Any, ends: list[End]) -> int:
-        return sum(self._beyond(composite, end, senders=False) for end in ends)
+        """To how many inputs of actors they lead."""
+        return self._all(composite, ends, senders=False)
+
+    def _all(self, composite: Any, ends: list[End], *, senders: bool) -> int:
+        found = 0
+        for end in ends:
+            found += self._beyond(composite, end, senders=senders)
+            if found > 1:
+                break
+        return min(found, 2)
 
     def _beyond(self, composite: Any, end: End, *, senders: bool) -> int:
         """How many there are behind one end; 2 stands for several."""
@@ -111,21 +120,17 @@ class Counting:
         if is_machine(inside):  # whose refinements are joined with its ports by their names
             return 1
         key = (id(inside), port, end.channel, senders)
-        if key in self._open:
-            return 0
-        self._open.add(key)
-        try:
-            found = 0
+        if key not in self._found:
+            self._found[key] = 0
             for net in conversion.nets_of(inside):
                 here = [each for each in net.ends if f"{each.actor}.{each.port}".lstrip(".") == port]
                 if any(each.channel == end.channel for each in here):
-                    found += sum(self._beyond(inside, each, senders=senders) for each in net.ends if each not in here)
-            return min(found, 2)
-        finally:
-            self._open.discard(key)
+                    others = [each for each in net.ends if each not in here]
+                    self._found[key] = min(self._found[key] + self._all(inside, others, senders=senders), 2)
+        return self._found[key]
 
 
-def _ordered(lines: list[_Line], conversion: Conversion, level: Level) -> list[_Line]:
+def _ordered(lines: list[_Line], conversion: Converting, level: Level) -> list[_Line]:
     """The lines in their order, but as the channels of every multiport ask for."""
     channels: dict[str, list[tuple[int, int, int]]] = {}
     for number, line in enumerate(lines):
@@ -138,7 +143,7 @@ def _ordered(lines: list[_Line], conversion: Conversion, level: Level) -> list[_
     before = dict.fromkeys(after, 0)
     for taken in channels.values():
         order = [number for _, _, number in sorted(taken)]
-        for one, other in zip(order, order[1:], strict=False):
+        for one, other in pairwise(order):
             if one != other and other not in after[one]:
                 after[one].add(other)
                 before[other] += 1

@@ -68,7 +68,9 @@ def block(value: Mapping[str, object], indent: int = 0) -> Iterable[str]:
             yield from block(each, indent + 2)
         elif isinstance(each, Flow) and len(head) + 1 + len(line(each)) > WIDTH and len(each) > 1:
             yield head
-            yield from block({key: Flow(part) if isinstance(part, Mapping) else part for key, part in each.items()}, indent + 2)
+            yield from block(
+                {key: Flow(part) if isinstance(part, Mapping) else part for key, part in each.items()}, indent + 2
+            )
         elif isinstance(each, (list, tuple)) and each and _is_long(head, each):
             yield head
             for item in each:

@@ -40,7 +40,9 @@ def port(name: str, *flags: str, inner: str = "") -> str:
 
 def wires(*nets: str) -> str:
     """Relations: ``"a.output b.input c.input"``, each with the ports that it joins."""
-    made = "".join(f'<relation name="r{number}" class="ptolemy.actor.TypedIORelation"/>\n' for number in range(len(nets)))
+    made = "".join(
+        f'<relation name="r{number}" class="ptolemy.actor.TypedIORelation"/>\n' for number in range(len(nets))
+    )
     links = (f'<link port="{each}" relation="r{number}"/>\n' for number, net in enumerate(nets) for each in net.split())
     return made + "".join(links)
 

@@ -70,7 +70,10 @@ def test_what_is_no_model(tmp_path: Path, text: str, message: str) -> None:
 
 
 def test_what_is_too_large(tmp_path: Path) -> None:
-    assert refusal(tmp_path, b" " * 20_000_001) == "m.xml has more than 20,000,000 bytes, which is more than any model needs"
+    assert (
+        refusal(tmp_path, b" " * 20_000_001)
+        == "m.xml has more than 20,000,000 bytes, which is more than any model needs"
+    )
     many = '<entity name="m">' + "<a/>" * 300_000 + "</entity>"
     assert refusal(tmp_path, many) == "m.xml: more than 300,000 elements, which is more than any model needs"
 
@@ -87,7 +90,10 @@ def test_classes_in_classes_are_counted_before_they_are_made(tmp_path: Path) -> 
 def test_texts_that_java_wrote_in_latin_1(tmp_path: Path) -> None:
     text = model("<doc>f\u00fcr alle</doc>").encode("latin-1")
     (tmp_path / "m.xml").write_bytes(text)
-    assert "doc: für alle\n" in import_moml(tmp_path / "m.xml").text or "f\u00fcr alle" in import_moml(tmp_path / "m.xml").text
+    assert (
+        "doc: für alle\n" in import_moml(tmp_path / "m.xml").text
+        or "f\u00fcr alle" in import_moml(tmp_path / "m.xml").text
+    )
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:

@@ -34,7 +34,12 @@ from tests.moml.moml_parts import (
 QUEUE = model(
     prop("_windowProperties", "{bounds={0, 22, 834, 762}}", "ptolemy.actor.gui.WindowPropertiesAttribute"),
     prop("interval", "2"),
-    entity("Customers", f"{LIB}DiscreteClock", prop("_location", "[1, 2]", "ptolemy.kernel.util.Location"), period="interval / 2"),
+    entity(
+        "Customers",
+        f"{LIB}DiscreteClock",
+        prop("_location", "[1, 2]", "ptolemy.kernel.util.Location"),
+        period="interval / 2",
+    ),
     entity("The queue!", f"{DE}Queue", capacity="0"),
     entity("Server", f"{DE}Server", serviceTime="interval * 0.75"),
     entity("Display", f"{LIB}gui.Display"),
@@ -42,11 +47,13 @@ QUEUE = model(
     '<entity name="Annotation" class="ptolemy.vergil.kernel.attributes.TextAttribute"/>',
     wires("Customers.output Server.input", "Server.output Display.input Test.input"),
     stop="4 * 1",
-).replace("The queue!", "unused")  # fmt: skip
+).replace("The queue!", "unused")
 
 
 def test_a_model_as_a_person_would_have_written_it(tmp_path: Path) -> None:
-    assert imported(tmp_path, QUEUE).text == """\
+    assert (
+        imported(tmp_path, QUEUE).text
+        == """\
 # Imported from m.xml, a model of Ptolemy II; left out: layout, 1 view.
 # - unused is left out: it never fires, for nothing sends to its input
 # - Annotation is a ptolemy.vergil.kernel.attributes.TextAttribute, has no counterpart, and is left out: nothing is connected to it
@@ -62,6 +69,7 @@ connections:
   - Server.output -> Test.input
 run: {stop: 4 s}
 """
+    )
 
 
 def test_classes_and_what_instances_change(tmp_path: Path) -> None:
@@ -74,9 +82,14 @@ def test_classes_and_what_instances_change(tmp_path: Path) -> None:
     actors += f'<entity name="two" class="Heir"/><entity name="three" class="Heir">{prop("gain", "2 * 2 + 1")}</entity>'
     actors += f'<entity name="four" class="Base">{entity("Scale", "Scale", factor=10)}</entity>'
     sinks = "".join(entity(f"r_{each}", "Recorder") for each in ("one", "two", "three", "four"))
-    joined = wires("Clock.output one.in two.in three.in four.in", *(f"{each}.out r_{each}.input" for each in ("one", "two", "three", "four")))
+    joined = wires(
+        "Clock.output one.in two.in three.in four.in",
+        *(f"{each}.out r_{each}.input" for each in ("one", "two", "three", "four")),
+    )
     text = written(tmp_path, model(base, actors, sinks, joined, stop=0))
-    assert text == """\
+    assert (
+        text
+        == """\
 model: m
 director: {like: ptolemy}
 composites:
@@ -115,11 +128,18 @@ connections:
   - four.out -> r_four.input
 run: {stop: 0 s}
 """
+    )
 
 
 def test_parameters_of_outer_composites_are_known_inside(tmp_path: Path) -> None:
-    inner = composite("inner", port("out", "output"), prop("own", "outer + 1"), entity("Clock", "DiscreteClock", values="{own, deep}"),
-                      wires("Clock.output out"), director=True)  # fmt: skip
+    inner = composite(
+        "inner",
+        port("out", "output"),
+        prop("own", "outer + 1"),
+        entity("Clock", "DiscreteClock", values="{own, deep}"),
+        wires("Clock.output out"),
+        director=True,
+    )
     outer = composite("outside", port("out", "output"), prop("deep", "outer * 10"), inner, wires("inner.out out"))
     text = model(prop("outer", 4), outer, entity("Recorder", "Recorder"), wires("outside.out Recorder.input"), stop=1)
     assert 'values: "${[own, 40]}"' in written(tmp_path, text)
@@ -134,9 +154,21 @@ def test_names_that_are_none_here(tmp_path: Path) -> None:
 
 
 def test_what_has_no_counterpart_is_told(tmp_path: Path) -> None:
-    ramp = entity("Ramp", f"{LIB}Ramp", port("trigger", "input", "multiport", inner=prop("defaultValue", 3)), firingCountLimit=5, odd='"x"')
+    ramp = entity(
+        "Ramp",
+        f"{LIB}Ramp",
+        port("trigger", "input", "multiport", inner=prop("defaultValue", 3)),
+        firingCountLimit=5,
+        odd='"x"',
+    )
     extra = prop("own", "1") + prop("strange", java="ptolemy.actor.StrangeAttribute")
-    text = model(entity("Clock", "DiscreteClock"), ramp, entity("Recorder", "Recorder"), extra, wires("Clock.output Ramp.trigger", "Ramp.output Recorder.input"))
+    text = model(
+        entity("Clock", "DiscreteClock"),
+        ramp,
+        entity("Recorder", "Recorder"),
+        extra,
+        wires("Clock.output Ramp.trigger", "Ramp.output Recorder.input"),
+    )
     assert notes(tmp_path, text) == [
         "Ramp.trigger.defaultValue = '3': has no counterpart",
         "Ramp.firingCountLimit = '5': has no counterpart",
@@ -154,31 +186,46 @@ def refusal(tmp_path: Path, text: str) -> str:
 def test_all_that_cannot_be_said_is_told_at_once(tmp_path: Path) -> None:
     inner = composite("inner", port("out", "output"), entity("Magic", f"{LIB}MagicSource"), wires("Magic.output out"))
     actors = entity("Python", "ptolemy.actor.lib.python.PythonScript", port("in", "input"), port("out", "output"))
-    actors += entity("Expression", "Expression", port("x", "input"), expression="x + random()") + entity("Clock", "DiscreteClock", period="unheard")
-    nets = wires("inner.out Python.in", "Python.out Recorder.input", "Clock.output Expression.x", "Expression.output Recorder.input")
-    assert refusal(tmp_path, model(inner, actors, entity("Recorder", "Recorder"), nets)) == """\
+    actors += entity("Expression", "Expression", port("x", "input"), expression="x + random()") + entity(
+        "Clock", "DiscreteClock", period="unheard"
+    )
+    nets = wires(
+        "inner.out Python.in",
+        "Python.out Recorder.input",
+        "Clock.output Expression.x",
+        "Expression.output Recorder.input",
+    )
+    assert (
+        refusal(tmp_path, model(inner, actors, entity("Recorder", "Recorder"), nets))
+        == """\
 m.xml cannot be imported:
    - inner.Magic is a ptolemy.actor.lib.MagicSource, which has no counterpart
    - Python is a ptolemy.actor.lib.python.PythonScript, which has no counterpart
    - Expression: expression: the function 'random' is not known here
    - Clock.period = 'unheard': 'unheard' is not known"""
+    )
 
 
 def test_another_director_is_refused(tmp_path: Path) -> None:
-    text = model(entity("Clock", "DiscreteClock")).replace(DIRECTOR, "ptolemy.domains.continuous.kernel.ContinuousDirector")
+    text = model(entity("Clock", "DiscreteClock")).replace(
+        DIRECTOR, "ptolemy.domains.continuous.kernel.ContinuousDirector"
+    )
     expected = "DE Director is a ptolemy.domains.continuous.kernel.ContinuousDirector, which has no counterpart"
     assert refusal(tmp_path, text) == f"m.xml cannot be imported:\n   - {expected}"
 
 
 def test_a_result_that_does_not_load_is_refused_with_the_reason(tmp_path: Path) -> None:
     text = model(entity("Scale", "Scale"), wires("Scale.output Scale.input"))
-    assert refusal(tmp_path, text) == """\
+    assert (
+        refusal(tmp_path, text)
+        == """\
 m.xml cannot be imported: what comes of it is no valid model
 m.yaml:7:5: error: a loop without delay: Scale -> Scale
     7 |   - Scale.output -> Scale.input
       |     ^^^^^^^^^^^^
    help: Scale.output -> Scale.input (m.yaml:7)
    help: give one of these connections a delay, best the one that leads back: {from: Scale.output, to: Scale.input, delay: ...}"""
+    )
 
 
 class Strange(Actor):
@@ -208,34 +255,52 @@ def test_a_strict_test_of_several_channels(tmp_path: Path) -> None:
     good = entity("Test", "Test", correctValues="{{1, 3}, {2, 4}}")
     run(tmp_path, model(actors, good, wires("a.output Test.input", "b.output Test.input"), stop=1))
     bad = model(actors, good.replace("{2, 4}", "{2, 5}"), wires("a.output Test.input", "b.output Test.input"), stop=1)
-    with pytest.raises(Exception, match=r"Test failed in fire\(\) at \(1 s, 1\): token 1 is \[2, 4\], expected \[2, 5\]"):
+    with pytest.raises(
+        Exception, match=r"Test failed in fire\(\) at \(1 s, 1\): token 1 is \[2, 4\], expected \[2, 5\]"
+    ):
         run(tmp_path, bad)
 
 
 def test_a_test_in_training_checks_nothing(tmp_path: Path) -> None:
-    text = model(entity("a", "DiscreteClock"), entity("Test", "Test", correctValues="{7}", trainingMode="true"), wires("a.output Test.input"))
+    text = model(
+        entity("a", "DiscreteClock"),
+        entity("Test", "Test", correctValues="{7}", trainingMode="true"),
+        wires("a.output Test.input"),
+    )
     assert notes(tmp_path, text) == ["Test is in training mode: it checks nothing"]
     assert "  Test: {type: Recorder}\n" in written(tmp_path, text)
 
 
 def test_an_expression_has_the_ports_that_somebody_added(tmp_path: Path) -> None:
     actors = entity("Clock", "DiscreteClock", values="{1, 2}") + entity("Recorder", "Recorder")
-    actors += entity("E", "Expression", port("in", "input"), port("also", "input"), expression="in * n + time > 4 ? -in : in")
+    actors += entity(
+        "E", "Expression", port("in", "input"), port("also", "input"), expression="in * n + time > 4 ? -in : in"
+    )
     text = model(prop("n", 3), actors, wires("Clock.output E.in E.also", "E.output Recorder.input"), stop=1)
-    assert "expression: \"[-in_ if in_ * 3 + time > 4 else in_, also][0]\"" in written(tmp_path, text)
+    assert 'expression: "[-in_ if in_ * 3 + time > 4 else in_, also][0]"' in written(tmp_path, text)
     assert [token for _, _, token in recorded(tmp_path, text)] == [1, -2]
 
 
 def test_texts(tmp_path: Path) -> None:
     const = entity("Const", f"{LIB}StringConst", prop("value", "n is $n, ${n}$$", TEXT))
-    text = model(prop("n", 3), entity("Clock", "DiscreteClock"), const, entity("Recorder", "Recorder"),
-                 wires("Clock.output Const.trigger", "Const.output Recorder.input"), stop=0)  # fmt: skip
+    text = model(
+        prop("n", 3),
+        entity("Clock", "DiscreteClock"),
+        const,
+        entity("Recorder", "Recorder"),
+        wires("Clock.output Const.trigger", "Const.output Recorder.input"),
+        stop=0,
+    )
     assert recorded(tmp_path, text) == [(0.0, 1, "n is 3, 3$")]
 
 
 def test_a_parameter_that_a_set_variable_sets(tmp_path: Path) -> None:
     setter = entity("Set", f"{LIB}SetVariable", prop("variableName", "P", "ptolemy.kernel.util.StringAttribute"))
-    actors = entity("Clock", "DiscreteClock", values="{10, 20}") + entity("Const", "Const", value="P + 1") + entity("Recorder", "Recorder")
+    actors = (
+        entity("Clock", "DiscreteClock", values="{10, 20}")
+        + entity("Const", "Const", value="P + 1")
+        + entity("Recorder", "Recorder")
+    )
     delay = entity("Delay", "TimeDelay", delay=0.5)
     nets = wires("Clock.output Set.input Delay.input", "Delay.output Const.trigger", "Const.output Recorder.input")
     text = model(prop("P", 1), setter, actors, delay, nets, stop=2)
@@ -244,9 +309,20 @@ def test_a_parameter_that_a_set_variable_sets(tmp_path: Path) -> None:
 
 
 def test_a_port_parameter_of_a_composite(tmp_path: Path) -> None:
-    inner = composite("C", port("in", "input"), port("out", "output"), prop("p", 1, "ptolemy.actor.parameters.PortParameter"),
-                      entity("Const", "Const", value="p"), wires("in Const.trigger", "Const.output out"), director=True)  # fmt: skip
-    actors = entity("Values", "DiscreteClock", values="{5, 6}") + entity("Ask", "DiscreteClock", offsets="{0.5}") + entity("Recorder", "Recorder")
+    inner = composite(
+        "C",
+        port("in", "input"),
+        port("out", "output"),
+        prop("p", 1, "ptolemy.actor.parameters.PortParameter"),
+        entity("Const", "Const", value="p"),
+        wires("in Const.trigger", "Const.output out"),
+        director=True,
+    )
+    actors = (
+        entity("Values", "DiscreteClock", values="{5, 6}")
+        + entity("Ask", "DiscreteClock", offsets="{0.5}")
+        + entity("Recorder", "Recorder")
+    )
     text = model(inner, actors, wires("Values.output C.p", "Ask.output C.in", "C.out Recorder.input"), stop=2)
     assert [token for _, _, token in recorded(tmp_path, text)] == [5, 6]
 
@@ -279,7 +355,9 @@ def test_the_command_prints_what_it_does_not_write(tmp_path: Path, capsys: pytes
 
 
 def test_a_refused_model_is_not_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "m.xml").write_text(model(entity("A", f"{LIB}Magic"), entity("B", "Recorder"), wires("A.output B.input")))
+    (tmp_path / "m.xml").write_text(
+        model(entity("A", f"{LIB}Magic"), entity("B", "Recorder"), wires("A.output B.input"))
+    )
     out = tmp_path / "m.yaml"
     assert main(["import", str(tmp_path / "m.xml"), "-o", str(out)]) == 2
     assert capsys.readouterr().err == (
@@ -291,6 +369,8 @@ def test_a_refused_model_is_not_written(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_help_does_not_load_much() -> None:
-    code = "import sys; from epicycle.runner.cli import main\ntry:\n main(['import', '--help'])\nexcept SystemExit: pass\n"
+    code = (
+        "import sys; from epicycle.runner.cli import main\ntry:\n main(['import', '--help'])\nexcept SystemExit: pass\n"
+    )
     code += "assert 'numpy' not in sys.modules and 'epicycle.runner.moml' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)

@@ -7,7 +7,20 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner.moml import MomlError
-from tests.moml.moml_parts import DIRECTOR, MODAL, composite, entity, imported, model, notes, port, prop, recorded, wires, written
+from tests.moml.moml_parts import (
+    DIRECTOR,
+    MODAL,
+    composite,
+    entity,
+    imported,
+    model,
+    notes,
+    port,
+    prop,
+    recorded,
+    wires,
+    written,
+)
 
 TEXT = "ptolemy.kernel.util.StringAttribute"
 
@@ -17,10 +30,16 @@ def state(name: str, refinement: str = "", **flags: object) -> str:
     return entity(name, f"{MODAL}kernel.State", inner, **flags)
 
 
-def transition(name: str, source: str, target: str, guard: str = "true", output: str = "", set_: str = "", **flags: object) -> str:
+def transition(
+    name: str, source: str, target: str, guard: str = "true", output: str = "", set_: str = "", **flags: object
+) -> str:
     said = prop("guardExpression", guard, TEXT) + prop("outputActions", output, f"{MODAL}kernel.OutputActionsAttribute")
-    said += prop("setActions", set_, f"{MODAL}kernel.CommitActionsAttribute") + "".join(prop(key, value) for key, value in flags.items())
-    links = f'<link port="{source}.outgoingPort" relation="{name}"/><link port="{target}.incomingPort" relation="{name}"/>'
+    said += prop("setActions", set_, f"{MODAL}kernel.CommitActionsAttribute") + "".join(
+        prop(key, value) for key, value in flags.items()
+    )
+    links = (
+        f'<link port="{source}.outgoingPort" relation="{name}"/><link port="{target}.incomingPort" relation="{name}"/>'
+    )
     return f'<relation name="{name}" class="{MODAL}kernel.Transition">{said}</relation>\n{links}\n'
 
 
@@ -34,7 +53,9 @@ def machine(*inner: str, java: str = f"{MODAL}kernel.FSMActor") -> str:
 def modal(controller: str, *refinements: str) -> str:
     """A modal model as Vergil writes it: with wires between its ports, its controller and the refinements."""
     own = entity("_Controller", f"{MODAL}modal.ModalController", PORTS, controller)
-    return entity("M", f"{MODAL}modal.ModalModel", PORTS, own, *refinements, wires("in _Controller.in", "out _Controller.out"))
+    return entity(
+        "M", f"{MODAL}modal.ModalModel", PORTS, own, *refinements, wires("in _Controller.in", "out _Controller.out")
+    )
 
 
 def around(made: str, values: str = "{1, 2, 3, 4}", stop: float = 3, **parameters: object) -> str:
@@ -50,7 +71,9 @@ def test_a_state_machine(tmp_path: Path) -> None:
         transition("t3", "idle", "end", "count > limit", nondeterministic="true", immediate="true"),
     ]  # fmt: skip
     text = around(machine(*parts), limit=1)
-    assert written(tmp_path, text) == """\
+    assert (
+        written(tmp_path, text)
+        == """\
 model: m
 director: {like: ptolemy}
 actors:
@@ -69,12 +92,18 @@ connections:
   - M.out -> Recorder.input
 run: {stop: 3 s}
 """
+    )
     assert recorded(tmp_path, text) == [(1.0, 1, 20), (1.5, 1, -1), (2.0, 1, 30), (2.5, 1, -2)]
 
 
 @pytest.mark.parametrize(
     ("version", "flags", "history"),
-    [("10.0.devel", {}, False), ("10.0", {"history": "true"}, True), ("8.0.1", {}, True), ("8.0.1", {"reset": "true"}, False)],
+    [
+        ("10.0.devel", {}, False),
+        ("10.0", {"history": "true"}, True),
+        ("8.0.1", {}, True),
+        ("8.0.1", {"reset": "true"}, False),
+    ],
 )
 def test_refinements_and_their_history(tmp_path: Path, version: str, flags: dict[str, str], history: bool) -> None:
     """Up to version 9.0 a transition was one with history unless it said 'reset'."""
@@ -92,11 +121,21 @@ def test_refinements_and_their_history(tmp_path: Path, version: str, flags: dict
 def test_machines_in_machines(tmp_path: Path) -> None:
     """A refinement that is a modal model, and one that is a state machine."""
     innermost = transition("t", "a", "b", "in == 1", "out = 100") + transition("u", "b", "a", "in > 1", "out = 200")
-    inner = entity("one", f"{MODAL}modal.ModalController", PORTS, state("a", isInitialState="true"), state("b"), innermost)
-    controller = state("one", "one", isInitialState="true") + state("two") + transition("t1", "one", "two", "in == 3", "out = 300")
+    inner = entity(
+        "one", f"{MODAL}modal.ModalController", PORTS, state("a", isInitialState="true"), state("b"), innermost
+    )
+    controller = (
+        state("one", "one", isInitialState="true")
+        + state("two")
+        + transition("t1", "one", "two", "in == 3", "out = 300")
+    )
     text = around(modal(controller, inner))
-    assert "  one:\n    inputs: [in_]\n    outputs: [out]\n    modes: [a, b]\n    transitions:\n" in written(tmp_path, text)
-    assert [token for _, _, token in recorded(tmp_path, text)] == [100, 200, 200, 300][:2] + recorded_rest(tmp_path, text)
+    assert "  one:\n    inputs: [in_]\n    outputs: [out]\n    modes: [a, b]\n    transitions:\n" in written(
+        tmp_path, text
+    )
+    assert [token for _, _, token in recorded(tmp_path, text)] == [100, 200, 200, 300][:2] + recorded_rest(
+        tmp_path, text
+    )
 
 
 def recorded_rest(tmp_path: Path, text: str) -> list[object]:
@@ -110,12 +149,18 @@ def test_the_machine_of_former_versions(tmp_path: Path) -> None:
              prop("initialStateName", "b", TEXT), prop("finalStateNames", "", TEXT),
              transition("t", "b", "a", "true", "out(0) = 7", defaultTransition="true")]  # fmt: skip
     text = around(machine(*parts, java=old))
-    assert "  M: {type: StateMachine, modes: [a, b], initial: b, transitions: [b -> a else do out = 7]}\n" in written(tmp_path, text)
+    assert "  M: {type: StateMachine, modes: [a, b], initial: b, transitions: [b -> a else do out = 7]}\n" in written(
+        tmp_path, text
+    )
     assert notes(tmp_path, text) == ["M: in is called in_", "M: in is left out: nothing reads it"]
 
 
 def test_words_that_could_be_mistaken(tmp_path: Path) -> None:
-    parts = state("a", isInitialState="true") + state("b") + transition("t", "a", "b", "after > 2", "out = 'on; when'", after=1)
+    parts = (
+        state("a", isInitialState="true")
+        + state("b")
+        + transition("t", "a", "b", "after > 2", "out = 'on; when'", after=1)
+    )
     text = around(machine(prop("after", 1), parts, transition("u", "b", "a", set_="after = after + 1")))
     found = written(tmp_path, text)
     assert "      - {from: a, to: b, when: after > 2, do: \"out = 'on; when'\"}\n" in found
@@ -123,7 +168,11 @@ def test_words_that_could_be_mistaken(tmp_path: Path) -> None:
 
 
 def test_what_of_machines_has_no_counterpart(tmp_path: Path) -> None:
-    parts = state("a", isInitialState="true") + state("b") + transition("t", "a", "b", "in > 1", "other = 1; out = 1", "b.gain = 2; nonsense")
+    parts = (
+        state("a", isInitialState="true")
+        + state("b")
+        + transition("t", "a", "b", "in > 1", "other = 1; out = 1", "b.gain = 2; nonsense")
+    )
     text = around(machine(parts))
     assert notes(tmp_path, text) == [
         "M: t: the action 'nonsense' is not understood, and left out",
