@@ -15,9 +15,9 @@ MAX_ROUNDS = 200
 def leave_out_idle(conversion: Converting) -> None:
     """Leave out what can never fire, and then what nothing is left for."""
     for _ in range(MAX_ROUNDS):
-        idle = [
-            (composite, each) for composite in conversion.model.everything() for each in _idle(conversion, composite)
-        ]
+        counting = Counting(conversion)
+        composites = list(conversion.model.everything())
+        idle = [(each, found) for each in composites for found in _idle(conversion, each, counting)]
         if not idle:
             return
         for composite, (child, port) in idle:
