@@ -323,6 +323,8 @@ class Conversion:
             for port, links in level.entity.links.items()
             if port.startswith(f"{child.name}.") and links
         ]
+        if not linked and is_layout(child):
+            return
         if not linked:
             self.notes.note(
                 f"{told} is a {child.java}, has no counterpart, and is left out: nothing is connected to it"

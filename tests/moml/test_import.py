@@ -56,7 +56,6 @@ def test_a_model_as_a_person_would_have_written_it(tmp_path: Path) -> None:
         == """\
 # Imported from m.xml, a model of Ptolemy II; left out: layout, 1 view.
 # - unused is left out: it never fires, for nothing sends to its input
-# - Annotation is a ptolemy.vergil.kernel.attributes.TextAttribute, has no counterpart, and is left out: nothing is connected to it
 model: m
 parameters: {interval: 2}
 director: {like: ptolemy}
@@ -224,7 +223,8 @@ m.yaml:7:5: error: a loop without delay: Scale -> Scale
     7 |   - Scale.output -> Scale.input
       |     ^^^^^^^^^^^^
    help: Scale.output -> Scale.input (m.yaml:7)
-   help: give one of these connections a delay, best the one that leads back: {from: Scale.output, to: Scale.input, delay: ...}"""
+   help: give one of these connections a delay, best the one that leads back: \
+{from: Scale.output, to: Scale.input, delay: ...}"""
     )
 
 
