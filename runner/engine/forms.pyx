@@ -107,6 +107,7 @@ cdef class PoissonForm(Ticking):
     cdef bint take(self) except -1:
         self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
         return Ticking.take(self)
+        return self.actor.generator is None and not self.actor.trigger.width and Ticking.take(self)
 
     cpdef fire(self):
         cdef long long following
@@ -307,9 +308,8 @@ cdef class RecorderForm(Native):
 
 # What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
 SOURCES = (
-    ("accumulation.py", "Counter", "06c4e0e155cd5a54"),
-    ("accumulation.py", "Integrator", "31017c9ef3dda5b7"),
-    ("arithmetic.py", "AddSubtract", "c0e44508fa3ae047"),
+    "AddSubtract", "Counter", "Integrator", "06c4e0e155cd5a54", "31017c9ef3dda5b7", "511f83c57109ba7d",
+    "a12ab980076fc006", "c0e44508fa3ae047", "d542b33b8ebab49e",
     ("distributions.py", "Constant", "e6f123317132cd9d"),
     ("distributions.py", "Gamma", "561c0e5a4a78963b"),
     ("distributions.py", "Normal", "41b7f712051a423b"),
@@ -328,10 +328,9 @@ SOURCES = (
     ("distributions.py", "Exponential", "f14ea8a70640a74a"),
     ("queues.py", "Server", "2445f4d1853973a9"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
-    ("sources.py", "Clock", "4ed40b10da22b8e9"),
-    ("sources.py", "PoissonClock", "3d48035a29d3f078"),
+    "Clock", "PoissonClock", "3d48035a29d3f078", "47664d47db418e38", "4ed40b10da22b8e9", "e8869bd338027fbd",
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
-    ("arithmetic.py", "Scale", "3aafcbc1e5e5c3de"),
+    ("arithmetic.py", "Scale", "78d3f6e01e9157d2"),
     ("timing.py", "TimeDelay", "2525e8b2de82467c"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),
