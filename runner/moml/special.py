@@ -243,11 +243,29 @@ def colt_exponential(actor: Actor) -> None:
 
 
 def colt_gamma(actor: Actor) -> None:
-    """Its alpha is the shape, its lambda the rate; there are no numbers of Java's for it."""
+    """Its alpha is the shape, its lambda the rate."""
     shape, rate = actor.get("alpha", 1.0), actor.get("lambda", 1.0)
-    actor.get("seed")
     actor.values["distribution"] = {"type": "Gamma", "shape": shape, "mean": shape / rate}
-    actor.notes.note(f"{actor.path}: its random numbers are others than in Ptolemy")
+    generator(actor)
+
+
+def colt_negative_binomial(actor: Actor) -> None:
+    """Its p is the probability of what is not counted."""
+    probability = 1.0 - actor.get("p", 0.5)
+    actor.values["distribution"] = {
+        "type": "NegativeBinomial",
+        "successes": actor.get("n", 1),
+        "probability": probability,
+    }
+    generator(actor)
+
+
+def colt_breit_wigner(actor: Actor) -> None:
+    """Its gamma is the width at half the height."""
+    found = {"type": "Cauchy", "median": actor.get("mean", 1.0), "scale": actor.get("gamma", 1.0) / 2.0}
+    cut = actor.get("cut", 1.0)
+    actor.values["distribution"] = found if math.isinf(cut) else {**found, "cut": cut}
+    generator(actor)
 
 
 def fields(direction: str) -> Special:

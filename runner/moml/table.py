@@ -81,6 +81,13 @@ _RANDOM: Mapping[str, Counterpart] = {
     "CoinFlip": _COIN,
     "Triangular": _random("min max mode", how.random("Triangular", low="min=0.0", high="max=1.0", mode="mode=0.5")),
     "DiscreteRandomSource": _random("", how.random("Choice", values="values={0, 1}", weights="pmf={0.5, 0.5}")),
+    "ColtPoisson": _random("mean", how.random("Poisson", mean="mean=1.0")),
+    "ColtBinomial": _random("n p", how.random("Binomial", trials="n=1", probability="p=0.5")),
+    "ColtNegativeBinomial": _random("n p", how.colt_negative_binomial),
+    "ColtChiSquare": _random("freedom", how.random("ChiSquare", freedom="freedom=1.0")),
+    "ColtStudentT": _random("freedom", how.random("StudentT", freedom="freedom=1.0")),
+    "ColtBreitWigner": _random("mean gamma cut", how.colt_breit_wigner),
+    "ColtVonMises": _random("freedom", how.random("VonMises", concentration="freedom=1.0")),
     "ColtExponential": _random("lambda", how.colt_exponential),
     "ColtGamma": _random("alpha lambda", how.colt_gamma),
 }
