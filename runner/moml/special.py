@@ -7,6 +7,9 @@ import re
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from epicycle import actors
+from epicycle.actors import declared_parameters
+
 from .names import Names
 from .scope import is_text
 from .syntax import ExpressionError
@@ -201,7 +204,8 @@ def random(law: str, **parameters: str) -> Special:
             if actor.widths.get(name, 0):
                 actor.notes.error(f"{actor.path}.{name}: a distribution that changes in a run has no counterpart")
             value = actor.get(name, actor.scope.value(default))
-            if value != actor.scope.value(default) or ours in ("values", "weights"):
+            parameter = declared_parameters(getattr(actors, law))[ours]
+            if parameter.required or parameter.default != value:
                 found[ours] = value
         actor.values["distribution"] = found
         generator(actor)
