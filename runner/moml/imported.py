@@ -16,6 +16,7 @@ from .composites import Conversion
 from .directors import director_of, said_of
 from .document import MomlError, read_document
 from .entities import Builder, Entity
+from .former import rename_former
 from .names import Names
 from .notes import Notes
 from .writing import Flow, block
@@ -58,6 +59,7 @@ def _refusal(name: str, reasons: list[str]) -> str:
 
 
 def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]) -> str:
+    rename_former(model)
     join_channels(model, notes)
     conversion = Conversion(model, notes, own)
     level = conversion.level(model, "")

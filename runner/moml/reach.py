@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from epicycle.actors import InputPort, declared_ports
 
 from ..catalogue import built_in
@@ -39,8 +41,9 @@ def _idle(conversion: Converting, composite: Entity, counting: Counting) -> list
             found.append((child, " and ".join(sorted(row.needs))))
             continue
         declared = declared_ports(kind)
+        several = Counter(said.ours for said in row.ports.values())
         for name, said in row.ports.items():
-            port = declared.get(said.ours)
+            port = declared.get(said.ours) if several[said.ours] == 1 else None
             if (
                 isinstance(port, InputPort)
                 and port.required
