@@ -370,6 +370,10 @@ class Conversion:
                 entry["priority"] = inner.scope.value_of(said)
         return Part(name, entry)
 
+    def class_name(self, name: str) -> str:
+        """A name like this for a further class."""
+        return self._class_names.fresh(name)
+
     def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow:
         """The entry of an instance; its class is one that is there already, if that says the same."""
         # A parameter takes values of the kind of its default.

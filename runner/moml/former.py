@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from .entities import Entity, kind
 
 _NAMES = {
@@ -16,9 +18,13 @@ def rename_former(model: Entity) -> None:
     for composite in model.everything():
         for child in composite.entities.values():
             for former, name in _NAMES.get(kind(child), {}).items():
-                for known in (child.properties, child.ports):
-                    if former in known and name not in known:
-                        known[name] = known.pop(former)  # type: ignore[index, arg-type, call-overload]
-                        known[name].name = name
+                _rename(child.properties, former, name)
+                _rename(child.ports, former, name)
                 if links := composite.links.pop(f"{child.name}.{former}", None):
                     composite.links.setdefault(f"{child.name}.{name}", []).extend(links)
+
+
+def _rename(known: dict[str, Any], former: str, name: str) -> None:
+    if former in known and name not in known:
+        known[name] = known.pop(former)
+        known[name].name = name

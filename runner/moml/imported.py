@@ -71,11 +71,15 @@ def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]
     said: dict[str, Any] = {}
     if (director := director_of(model)) is not None:
         said = said_of(director, director.name, level.scope, notes, of_model=True)
+    start = _start(said)
     if (stop := said.pop("stop", None)) is not None:
-        run["stop"] = seconds(max(stop - _start(said), 0.0))
+        run["stop"] = seconds(max(stop - start, 0.0))
     if parameters := conversion.parameters(level):
         sections["parameters"] = Flow(parameters)
-    sections["director"] = Flow({**LIKE, **said})
+    sections["director"] = Flow(LIKE)
+    if said:
+        notes.note("its time is not that of a run: it is a composite with a director of its own")
+        body = _inside(sections["model"], body, sections.pop("parameters", None), said, conversion)
     for key in ("inputs", "outputs"):
         if body.pop(key, None):
             notes.note(f"the {key} of the model lead nowhere, and are left out")
@@ -85,6 +89,16 @@ def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]
     sections["run"] = Flow(run)
     lines = [*_comment(file, notes), *block(sections)]
     return "\n".join(lines) + "\n"
+
+
+def _inside(
+    name: str, body: dict[str, Any], parameters: object, said: dict[str, Any], conversion: Conversion
+) -> dict[str, Any]:
+    """The body of a model that has one composite, which has all in it and a clock of its own."""
+    kind = conversion.class_name(name)
+    head = {"parameters": parameters} if parameters is not None else {}
+    conversion.classes[kind] = {**head, "director": Flow(said), **body}
+    return {"actors": {kind: Flow({"type": kind})}}
 
 
 def _start(said: Mapping[str, Any]) -> float:

@@ -89,11 +89,11 @@ def _test(actor: Actor, *, strict: bool) -> None:
         _records(actor)
         return
     values = values if isinstance(values, list) else [values]
-    nested = bool(values) and all(isinstance(each, list) for each in values)
-    if strict and nested and actor.widths.get("input", 1) == 1 and all(len(each) == 1 for each in values):
-        values = [each[0] for each in values]
-    elif strict and nested:
+    by_channel = strict and bool(values) and all(type(each) is list for each in values)
+    if by_channel and actor.widths.get("input", 1) > 1:
         actor.values["together"] = True
+    elif by_channel and all(len(each) == 1 for each in values):
+        values = [each[0] for each in values]
     actor.values = {"values": values, **actor.values}
 
 

@@ -53,6 +53,10 @@ CONSTANTS: Mapping[str, object] = {
 Scope = Callable[[str], object]
 
 
+class Rows(list[Any]):
+    """A matrix: a list of its rows, which is no array of arrays."""
+
+
 def evaluate(tree: Tree, scope: Scope) -> Any:
     """The value; ``scope`` finds that of a name, or raises ``KeyError``.  Raises ``ExpressionError``."""
     try:
@@ -106,10 +110,10 @@ def _value(tree: Tree, scope: Scope) -> Any:
         case Record(fields):
             return {name: _value(each, scope) for name, each in fields}
         case Matrix(rows):
-            return [[_value(each, scope) for each in row] for row in rows]
+            return Rows([_value(each, scope) for each in row] for row in rows)
         case Steps(first, step, last):
             one, by, end = (_value(each, scope) for each in (first, step, last))
-            return [_limited(_stepped(one, by, end))]
+            return Rows([_limited(_stepped(one, by, end))])
     raise ExpressionError("it is not understood")
 
 

@@ -10,7 +10,7 @@ import pytest
 from epicycle.actors.expression import evaluate as own_evaluate
 from runner.moml.syntax import ExpressionError, parse
 from runner.moml.translate import translated
-from runner.moml.values import evaluate
+from runner.moml.values import Rows, evaluate
 
 PARAMETERS: dict[str, Any] = {
     "n": 3,
@@ -65,8 +65,8 @@ def value(text: str) -> Any:
         ('{a = 1, b = "x"}', {"a": 1, "b": "x"}),
         ("{1, 2} + {3, 4}", [4, 6]),
         ("2 * {1, 2}", [2, 4]),
-        ("[1, 2; 3, 4]", [[1, 2], [3, 4]]),
-        ("[0 : 2 : 5]", [[0, 2, 4]]),
+        ("[1, 2; 3, 4]", Rows([[1, 2], [3, 4]])),
+        ("[0 : 2 : 5]", Rows([[0, 2, 4]])),
         ("items(1)", 2),
         ("items.get(2)", 3),
         ("items.length()", 3),

@@ -374,3 +374,16 @@ def test_help_does_not_load_much() -> None:
     )
     code += "assert 'numpy' not in sys.modules and 'epicycle.runner.moml' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+def test_a_model_whose_time_does_not_begin_at_0(tmp_path: Path) -> None:
+    actors = (
+        entity("Clock", "DiscreteClock", values="{n}") + entity("Time", "CurrentTime") + entity("Recorder", "Recorder")
+    )
+    text = model(prop("n", 2), actors, wires("Clock.output Time.trigger", "Time.output Recorder.input"), stop=4)
+    text = text.replace(
+        '<property name="stopTime"',
+        '<property name="startTime" class="x.Parameter" value="2.5"/><property name="stopTime"',
+    )
+    assert written(tmp_path, text).endswith("actors:\n  m: {type: m}\nrun: {stop: 1.5 s}\n")
+    assert recorded(tmp_path, text, "m.Recorder") == [(2.5, 1, 2.5), (3.5, 1, 3.5)]
