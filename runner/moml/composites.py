@@ -9,6 +9,7 @@ from typing import Any
 
 from epicycle.actors import Actor as OwnActor
 
+from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
 from .counterpart import Counterpart, counterpart_of_type
@@ -41,7 +42,8 @@ class Conversion:
         self.notes = notes
         self.classes: dict[str, dict[str, Any]] = {}
         self._known: dict[str, str] = {}  # the class of a body
-        self._class_names = Names()
+        known = installed()
+        self._class_names = Names([*known.actors, *known.aspects, *own])
         self.rows: dict[int, Counterpart | None] = {}
         for each in model.everything():
             is_row = not is_composite(each) and not is_machine(each)

@@ -387,3 +387,42 @@ def test_a_model_whose_time_does_not_begin_at_0(tmp_path: Path) -> None:
     )
     assert written(tmp_path, text).endswith("actors:\n  m: {type: m}\nrun: {stop: 1.5 s}\n")
     assert recorded(tmp_path, text, "m.Recorder") == [(2.5, 1, 2.5), (3.5, 1, 3.5)]
+
+
+def test_a_composite_that_is_called_as_an_actor_is(tmp_path: Path) -> None:
+    inner = composite("Queue", port("out", "output"), entity("Clock", "DiscreteClock"), wires("Clock.output out"))
+    text = model(inner, entity("Recorder", "Recorder"), wires("Queue.out Recorder.input"), stop=0)
+    assert "  Queue: {type: Queue_2}\n" in written(tmp_path, text)
+
+
+def test_names_of_former_versions(tmp_path: Path) -> None:
+    actors = (
+        entity("Clock", "DiscreteClock")
+        + entity("Server", f"{DE}Server", newServiceTime=2)
+        + entity("Recorder", "Recorder")
+    )
+    text = model(actors, wires("Clock.output Server.input Server.newServiceTime", "Server.output Recorder.input"))
+    assert "  Server: {type: Server, service_time: 2 s}\n" in written(tmp_path, text)
+    assert "  - Clock.output -> Server.input, Server.service_time\n" in written(tmp_path, text)
+
+
+def test_an_sdf_composite(tmp_path: Path) -> None:
+    """What nothing triggers fires in each iteration there."""
+    inner = composite(
+        "C",
+        prop("SDF", java="ptolemy.domains.sdf.kernel.SDFDirector", inner=prop("iterations", 1)),
+        port("in", "input"),
+        port("out", "output"),
+        entity("Const", "Const", value=5),
+        entity("Add", "AddSubtract"),
+        wires("in Add.plus", "Const.output Add.plus", "Add.output out"),
+    )
+    text = model(
+        entity("Clock", "DiscreteClock"),
+        inner,
+        entity("Recorder", "Recorder"),
+        wires("Clock.output C.in", "C.out Recorder.input"),
+        stop=1,
+    )
+    assert notes(tmp_path, text) == ["C.SDF, a SDFDirector: what is inside fires by the rules of DE"]
+    assert recorded(tmp_path, text) == [(0.0, 1, 6), (1.0, 1, 6)]
