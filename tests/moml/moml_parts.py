@@ -86,6 +86,20 @@ def run(tmp_path: Path, text: str) -> Simulation:
     return simulation
 
 
+def sent(tmp_path: Path, text: str) -> list[tuple[float, int, str, int, Any]]:
+    """What is sent, but by checks: time, microstep, port, channel, value."""
+    file = tmp_path / "m.yaml"
+    file.write_text(imported(tmp_path, text).text, encoding="utf-8")
+    model = load_model(file)
+    checks = {path for path, actor in model.graph.actors.items() if type(actor).__name__ == "Test"}
+    records = Simulation(model, keep_log=True).run().log.records
+    return [
+        (each.tag.seconds, each.tag.microstep, f"{each.actor}.{each.port}", each.channel or 0, each.value)
+        for each in records
+        if each.event == "send" and each.actor not in checks
+    ]
+
+
 def recorded(tmp_path: Path, text: str, path: str = "Recorder") -> list[tuple[float, int, Any]]:
     """What a Recorder has heard, with time and microstep."""
     sink = run(tmp_path, text)[path]
