@@ -12,7 +12,7 @@ from epicycle.actors import Actor as OwnActor
 from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
-from .counterpart import Counterpart, counterpart_of_type
+from .counterpart import UNSAID, Counterpart, counterpart_of_type
 from .directors import director_of, fires_whole, said_of
 from .entities import Entity, Property, kind
 from .modes import is_machine, machine_part
@@ -102,7 +102,10 @@ class Conversion:
         waiting = [(entity, around)]
         while waiting:
             each, outer = waiting.pop()
-            scope = self._scopes[id(each)] = Scope(each, outer, {})
+            row = self.rows.get(id(each))
+            said = {} if row is None else row.parameters
+            defaults = {name: one.default for name, one in said.items() if one.default is not UNSAID}
+            scope = self._scopes[id(each)] = Scope(each, outer, defaults)
             waiting += [(child, scope) for child in each.entities.values()]
 
     def path_of(self, composite: Entity, child: Entity) -> str:

@@ -30,6 +30,10 @@ def controller_of(entity: Entity) -> Entity | None:
     """The machine of an entity: itself, or what is inside of a modal model; None if it has none."""
     if kind(entity) in MACHINES:
         return entity
+    director = director_of(entity)
+    if director is not None and (named := (director.text("controllerName") or "").strip().strip('"')):
+        found = entity.entities.get(named)
+        return found if found is not None and kind(found) in MACHINES else None
     return next(
         (each for each in entity.entities.values() if kind(each) in MACHINES and each.name == "_Controller"), None
     )
@@ -108,9 +112,20 @@ class _Machine:
             found["transitions"] = transitions
         if not modes:
             self.conversion.notes.error(f"{self.path} has no states")
+        self._tell_readers()
         for name, ours in {**self.ports.renamed(), **self.states.renamed()}.items():
             self.tell(f"{name} is called {ours}")
         return found
+
+    def _tell_readers(self) -> None:
+        """What in refinements is computed of variables, and would change with them."""
+        for name in self.variables:
+            pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
+            for child in self.entity.entities.values() if self.entity is not self.controller else ():
+                for each in child.everything() if child is not self.controller else ():
+                    for said in each.properties.values():
+                        if is_variable(said) and pattern.search(said.value or ""):
+                            self.tell(f"{each.name}.{said.name} goes by what {name} is at the start")
 
     def _states(self) -> list[Entity]:
         return list(self.controller.entities.values())

@@ -187,3 +187,36 @@ def test_what_of_machines_has_no_counterpart(tmp_path: Path) -> None:
 
 
 __all__ = ["DIRECTOR"]
+
+
+def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
+    """A composite whose director is that of a modal model; what goes by a variable is told."""
+    controller = state("one", "one", isInitialState="true") + transition(
+        "t", "one", "one", "in == 2", "out = k", "k = k + 1"
+    )
+    inner = composite(
+        "one", PORTS, entity("Scale", "Scale", factor="k * 10"), wires("in Scale.input", "Scale.output out")
+    )
+    director = prop("D", java="ptolemy.domains.fsm.kernel.FSMDirector", inner=prop("controllerName", "Ctrl", TEXT))
+    made = entity(
+        "M",
+        "ptolemy.actor.TypedCompositeActor",
+        director,
+        PORTS,
+        prop("k", 1),
+        inner,
+        entity("Ctrl", "ptolemy.domains.fsm.kernel.FSMActor", PORTS, controller),
+    )
+    text = around(made)
+    assert "M: Scale.factor goes by what k is at the start" in notes(tmp_path, text)
+    assert sorted(token for _, _, token in recorded(tmp_path, text)) == [1, 10, 20, 30, 40]
+
+
+def test_a_default_that_an_expression_names(tmp_path: Path) -> None:
+    text = model(
+        entity("Clock", "DiscreteClock", offsets="{0.0, period / 4}", values="{1, 2}"),
+        entity("Recorder", "Recorder"),
+        wires("Clock.output Recorder.input"),
+        stop=1,
+    )
+    assert [time for time, _, _ in recorded(tmp_path, text)] == [0.0, 0.25, 1.0]
