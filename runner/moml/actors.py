@@ -55,6 +55,7 @@ class Actor:
     own_names: Mapping[str, str]  # parameters of the model around it, by our names
     full_name: str = ""  # in Java, which random numbers hang on
     seed: object = 0  # of all random actors of the model
+    whole: frozenset[str] = frozenset()  # ports at which only whole numbers come, as far as that is known
     widths: Mapping[str, int] = field(default_factory=dict)  # how many channels its ports have
     values: dict[str, Any] = field(default_factory=dict)  # what is written
     ports: dict[str, str] = field(default_factory=dict)  # ours, for those of its ports that the row does not know

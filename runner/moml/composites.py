@@ -25,6 +25,7 @@ from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
 from .table import counterpart_of
 from .variables import Variables
+from .whole import whole_ports
 from .writing import Flow
 
 COMPOSITES = frozenset({
@@ -298,7 +299,7 @@ class Conversion:
             return None
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
-            f".{self.model.name}.{level.told(child.name)}", self._seed(),
+            f".{self.model.name}.{level.told(child.name)}", self._seed(), whole_ports(self, level.entity, child),
             {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
         )  # fmt: skip
         actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)

@@ -115,7 +115,8 @@ def expression(actor: Actor) -> None:
         actor.notes.note(f"{actor.path}.{name} is called {ours}")
     try:
         tree = actor.scope.tree(text)
-        ours = translated(tree, {**actor.ports, "time": "time", "iteration": "iteration"}, actor.scope)
+        known = {**actor.ports, "time": "time", "iteration": "iteration"}
+        ours = translated(tree, known, actor.scope, {*actor.whole, "iteration"})
     except ExpressionError as error:
         actor.notes.error(f"{actor.path}: expression: {error}")
         return

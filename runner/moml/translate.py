@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from .syntax import Array, Binary, Call, Choice, Const, ExpressionError, Matrix, Method, Name, Record, Tree, Unary
 from .values import Scope, evaluate
@@ -45,10 +45,13 @@ _CASTS: Mapping[str, str] = {"int": "int", "long": "int", "double": "float", "st
 Said = tuple[str, int]
 
 
-def translated(tree: Tree, names: Mapping[str, str], scope: Scope) -> str:
-    """The expression, in which ``names`` stand for what is known in the run alone; raises ``ExpressionError``."""
+def translated(tree: Tree, names: Mapping[str, str], scope: Scope, whole: Collection[str] = ()) -> str:
+    """The expression, in which ``names`` stand for what is known in the run alone; raises ``ExpressionError``.
+
+    Those in ``whole`` stand for whole numbers, whose quotients are whole in Ptolemy, too.
+    """
     try:
-        return _Translation(names, scope).said(tree)[0]
+        return _Translation(names, scope, whole).said(tree)[0]
     except RecursionError:
         raise ExpressionError("it is nested too deeply") from None
 
@@ -92,9 +95,10 @@ def names_of(tree: Tree) -> set[str]:
 
 
 class _Translation:
-    def __init__(self, names: Mapping[str, str], scope: Scope) -> None:
+    def __init__(self, names: Mapping[str, str], scope: Scope, whole: Collection[str]) -> None:
         self._names = names
         self._scope = scope
+        self._whole = whole
 
     def said(self, tree: Tree) -> Said:
         """The text, and how tightly it holds together."""
@@ -148,9 +152,24 @@ class _Translation:
         word, level = _SIGNS[sign]
         if sign == "+" and (self._is_text(left) or self._is_text(right)):
             return f"{self._text(left)} + {self._text(right)}", _SUM
+        if sign == "/" and self._is_whole(left) and self._is_whole(right):
+            return f"int({self._held(left, level)} / {self._held(right, level + 1)})", _ATOM
         beside = 1 if level in (_COMPARE, _SUM, _PRODUCT, _POWER) else 0
         first = self._held(left, level + (1 if level in (_COMPARE, _POWER) else 0))
         return f"{first} {word} {self._held(right, level + beside)}", level
+
+    def _is_whole(self, tree: Tree) -> bool:
+        """Whether this is known to be a whole number."""
+        match tree:
+            case Name(name) if name in self._names:
+                return name in self._whole
+            case Unary("-", operand):
+                return self._is_whole(operand)
+            case Binary("+" | "-" | "*" | "/" | "%", left, right):
+                return self._is_whole(left) and self._is_whole(right)
+        if names_of(tree) & self._names.keys():
+            return False
+        return type(evaluate(tree, self._scope)) is int
 
     def _is_text(self, tree: Tree) -> bool:
         """Whether this is known to be a text."""

@@ -426,3 +426,15 @@ def test_an_sdf_composite(tmp_path: Path) -> None:
     )
     assert notes(tmp_path, text) == ["C.SDF, a SDFDirector: what is inside fires by the rules of DE"]
     assert recorded(tmp_path, text) == [(0.0, 1, 6), (1.0, 1, 6)]
+
+
+def test_a_quotient_of_whole_numbers_is_whole(tmp_path: Path) -> None:
+    actors = (
+        entity("Clock", "DiscreteClock", values="{7, -7}")
+        + entity("Half", "DiscreteClock", values="{0.5}")
+        + entity("Recorder", "Recorder")
+    )
+    actors += entity("E", "Expression", port("x", "input"), port("y", "input"), expression="x / n + y / n")
+    text = model(prop("n", 2), actors, wires("Clock.output E.x", "Half.output E.y", "E.output Recorder.input"), stop=1)
+    assert "  E: {type: Expression, expression: int(x / 2) + y / 2}\n" in written(tmp_path, text)
+    assert [token for _, _, token in recorded(tmp_path, text)] == [3.25, -2.75]
