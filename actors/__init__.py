@@ -25,13 +25,35 @@ from .distributions import (
 )
 from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
 from .functions import Expression, Function, LookupTable
-from .logic import Comparator, LogicGate
+from .logic import Comparator, Equals, LogicGate
+from .passing import (
+    BooleanSelect,
+    Commutator,
+    Filter,
+    FirstOfInstant,
+    Inhibit,
+    IsPresent,
+    Previous,
+    Register,
+)
 from .queues import Queue, Server
 from .replay import Replay, ReplayError
 from .sinks import Display, Histogram, Recorder, Stop, Test
-from .sources import Clock, Const, CurrentMicrostep, CurrentTime, PoissonClock, Ramp, Random, Sequence, SingleEvent
+from .sources import (
+    Clock,
+    Const,
+    CurrentMicrostep,
+    CurrentTime,
+    PoissonClock,
+    Pulse,
+    Ramp,
+    Random,
+    Sequence,
+    SingleEvent,
+)
 from .statistics import MovingAverage, MovingStatistics
-from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
+from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
+from .variables import SetVariable, Variable
 
 if TYPE_CHECKING:
     from .continuous import ODE
@@ -45,29 +67,31 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",
-    "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier", "Batch",
-    "Bernoulli", "BodyState", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "ChannelError", "Choice",
-    "CircularMotion", "Clock", "Comparator", "Configurable", "Const", "Constant", "Context", "Counter",
-    "CurrentMicrostep", "CurrentTime", "DeadZone", "Difference", "DiscreteFilter", "Display", "DistanceMonitor",
-    "Distribution", "Emitter", "EpicycleError", "Estimate", "Exponential", "Expression", "FilterDesign", "FilterError",
-    "FilterPyEstimator", "FirstOrder", "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor",
-    "Inform", "InputPort", "Integrator", "Latest", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable",
-    "Machine", "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment",
-    "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "NetworkSwitch", "Normal", "Objective",
-    "OutputPort", "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "Pool", "PortError",
-    "PortParameter", "Pose", "Process", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger",
+    "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier",
+    "Batch", "Bernoulli", "BodyState", "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi",
+    "ChannelError", "Choice", "CircularMotion", "Clock", "Commutator", "Comparator", "Configurable", "Const",
+    "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DeadZone", "Difference", "DiscreteFilter",
+    "Display", "DistanceMonitor", "Distribution", "Emitter", "EpicycleError", "Equals", "Estimate", "Exponential",
+    "Expression", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder",
+    "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort",
+    "Integrator", "IsPresent", "Latest", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine",
+    "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent",
+    "MovingAverage", "MovingStatistics", "MultiplyDivide", "NetworkSwitch", "Normal", "Objective", "OutputPort",
+    "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "Pool", "PortError", "PortParameter", "Pose",
+    "Previous", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger",
     "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder",
-    "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select",
-    "Sensor", "SeparationMonitor", "Sequence", "Server", "SetFields", "SingleEvent", "Solver", "StateMachine",
-    "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer",
-    "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator",
-    "Vehicle", "WaitingLine", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter",
-    "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
-    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest",
-    "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit",
-    "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
-    "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
-    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
+    "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale",
+    "Select", "Sensor", "SeparationMonitor", "Sequence", "Server", "SetFields", "SetVariable", "SingleEvent", "Solver",
+    "StateMachine", "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeCompare",
+    "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform",
+    "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "WaitingLine", "WaitingTime", "Wake", "Way",
+    "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
+    "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
+    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
+    "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
+    "visible_character", "visible_lines",
 ]  # fmt: skip
 
 

@@ -74,7 +74,10 @@ cdef class ClockForm(Ticking):
     cdef public long long period
 
     cdef bint take(self) except -1:
-        if self.actor.start.width or self.actor.stop.width or not Ticking.take(self):
+        actor = self.actor
+        if actor.start.width or actor.stop.width or actor.trigger.width or not Ticking.take(self):
+            return False
+        if actor.cycles is not None or actor.period == float("inf"):
             return False
         self.period = nanoseconds_of(self.actor.period)
         self.offsets = self.actor._offsets
@@ -132,6 +135,8 @@ cdef class ServerForm(Native):
 
     cdef bint take(self) except -1:
         actor = self.actor
+        if actor.one_at_a_time:
+            return False
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.size, self.rejected = self.sender("size"), self.sender("rejected")
         self.line, self.waiting = actor._served._line, actor._waiting
@@ -200,7 +205,7 @@ cdef class RandomForm(Native):
     cdef bint take(self) except -1:
         self.trigger, self.output, self.stream = self.input_port("trigger"), self.sender("output"), self.actor.random
         self.drawing = drawing_of(self.actor.distribution, self.stream)
-        return self.output is not None
+        return self.output is not None and self.trigger.width == 1
 
     cpdef fire(self):
         for _ in range(count_of(self.trigger)):
@@ -220,7 +225,7 @@ cdef class MergeForm(Native):
     cdef bint take(self) except -1:
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.waiting, self.discards = self.actor._waiting, self.actor.discard
-        return self.output is not None
+        return self.output is not None and not self.actor.whole_channel
 
     cpdef fire(self):
         cdef list tokens = tokens_of(self.input)
@@ -253,6 +258,8 @@ cdef class QueueForm(Native):
 
     cdef bint take(self) except -1:
         actor = self.actor
+        if actor.one_at_a_time:
+            return False
         self.input, self.trigger, self.output = self.input_port("input"), self.input_port("trigger"), self.sender("output")
         self.size, self.rejected = self.sender("size"), self.sender("rejected")
         self.waiting, self.persists = actor._tokens, actor.persistent_trigger
@@ -312,10 +319,10 @@ SOURCES = (
     ("distributions.py", "Gamma", "561c0e5a4a78963b"),
     ("distributions.py", "Normal", "41b7f712051a423b"),
     ("distributions.py", "Uniform", "623cbec8bb43eb2b"),
-    ("flow.py", "Merge", "213360ad97d7f8e2"),
-    ("functions.py", "Expression", "2dfff6b191d7d6c7"),
-    ("queues.py", "Queue", "8c16cd6b83a476a1"),
-    ("sources.py", "Random", "606d80f45d45a9e4"),
+    ("flow.py", "Merge", "2870aac0ebfab367"),
+    ("functions.py", "Expression", "66f2e2198e6143d8"),
+    ("queues.py", "Queue", "de9384977ec688db"),
+    ("sources.py", "Random", "ad10cd2882b330d9"),
     ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
     ("core/laws.py", "gamma", "da1afffdbd29a311"),
@@ -324,9 +331,9 @@ SOURCES = (
     ("core/port_parameter.py", "ParameterPort", "db98994b759143f6"),
     ("core/elementary/sums.py", "total", "dc84358727c0bc10"),
     ("distributions.py", "Exponential", "f14ea8a70640a74a"),
-    ("queues.py", "Server", "2445f4d1853973a9"),
+    ("queues.py", "Server", "5c6f05b6bbdac75d"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
-    ("sources.py", "Clock", "4ed40b10da22b8e9"),
+    ("sources.py", "Clock", "e8869bd338027fbd"),
     ("sources.py", "PoissonClock", "3d48035a29d3f078"),
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
     ("arithmetic.py", "Scale", "3aafcbc1e5e5c3de"),
