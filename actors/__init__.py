@@ -7,7 +7,7 @@ from .compiled import CORE, CORE_MODULES, CORE_REASON
 
 # isort: split
 # What comes before decides what all imports behind find: compiled modules, or their sources.
-from .accumulation import Accumulator, Counter, Difference, Integrator
+from .accumulation import Accumulator, Counter, Derivative, Difference, Integrator, TimeAverage
 from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
 from .core import *
 from .distributions import (
@@ -70,28 +70,28 @@ __all__ = [
     "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier",
     "Batch", "Bernoulli", "BodyState", "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi",
     "ChannelError", "Choice", "CircularMotion", "Clock", "Commutator", "Comparator", "Configurable", "Const",
-    "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DeadZone", "Difference", "DiscreteFilter",
-    "Display", "DistanceMonitor", "Distribution", "Emitter", "EpicycleError", "Equals", "Estimate", "Exponential",
-    "Expression", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder",
-    "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort",
-    "Integrator", "IsPresent", "Latest", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine",
-    "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent",
-    "MovingAverage", "MovingStatistics", "MultiplyDivide", "NetworkSwitch", "Normal", "Objective", "OutputPort",
-    "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "Pool", "PortError", "PortParameter", "Pose",
-    "Previous", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger",
-    "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder",
-    "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale",
-    "Select", "Sensor", "SeparationMonitor", "Sequence", "Server", "SetFields", "SetVariable", "SingleEvent", "Solver",
-    "StateMachine", "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeCompare",
-    "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform",
-    "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "WaitingLine", "WaitingTime", "Wake", "Way",
-    "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
-    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
-    "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
-    "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
-    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
-    "visible_character", "visible_lines",
+    "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DeadZone", "Derivative", "Difference",
+    "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter", "EpicycleError", "Equals", "Estimate",
+    "Exponential", "Expression", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant",
+    "FirstOrder", "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor", "Inform", "Inhibit",
+    "InputPort", "Integrator", "IsPresent", "Latest", "Limiter", "Line", "Link", "LogNormal", "LogicGate",
+    "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode",
+    "Moment", "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "NetworkSwitch", "Normal",
+    "Objective", "OutputPort", "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "Pool", "PortError",
+    "PortParameter", "Pose", "Previous", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random",
+    "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler",
+    "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer",
+    "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor", "Sequence", "Server",
+    "SetFields", "SetVariable", "SingleEvent", "Solver", "StateMachine", "StateSpace", "Station", "Stop", "Stream",
+    "Switch", "Synchronizer", "Tag", "Test", "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times",
+    "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable",
+    "Vehicle", "WaitingLine", "WaitingTime", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts",
+    "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters",
+    "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep",
+    "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular",
+    "parse_unit", "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds",
+    "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
+    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip
 
 

@@ -31,12 +31,15 @@ class AddSubtract(Actor):
 class MultiplyDivide(Actor):
     """The product of what comes at ``multiply``, divided by all that comes at ``divide``.
 
-    Channels without a token at this tag do not count.  Ptolemy: ``MultiplyDivide``.
+    Channels without a token at this tag do not count.  With ``whole``, as in Ptolemy, whole numbers are divided without
+    remainder, towards zero.  Ptolemy: ``MultiplyDivide``.
     """
 
     multiply = InputPort(float, multi=True, required=False, doc="the factors; their product is 1 if there are none")
     divide = InputPort(float, multi=True, required=False, doc="the divisors")
     output = OutputPort(float, doc="prod(multiply) / prod(divide)")
+
+    whole = Parameter(bool, False, ptolemy=True, doc="whether a quotient of whole numbers is one, too")
 
     def fire(self) -> None:
         for multiply, divide in rounds(self.multiply, self.divide):
@@ -44,7 +47,11 @@ class MultiplyDivide(Actor):
             for divisor in present(divide):
                 if divisor == 0:
                     raise EpicycleError(f"{product!r} is to be divided by {divisor!r}")
-                product /= divisor
+                if self.whole and isinstance(product, int) and isinstance(divisor, int):
+                    sign = 1 if (product < 0) == (divisor < 0) else -1
+                    product = sign * (abs(product) // abs(divisor))
+                else:
+                    product /= divisor
             self.output.send(product)
 
 

@@ -197,7 +197,7 @@ class Replace(MeasurementAspect):
     """Replaces what passes, of whatever kind, by an expression of it, of the time and of what ports have sent last.
 
     At a parameter it lets it go by a variable of the model: ``to: limit.value + 1``.  Nothing is replaced as long as
-    one of the ports has sent nothing.  Event: ``replaced``, with the new value.
+    one of the ports has sent nothing, and NaN stays as it is.  Event: ``replaced``, with the new value.
     """
 
     events: ClassVar[tuple[str, ...]] = ("replaced",)
@@ -211,8 +211,10 @@ class Replace(MeasurementAspect):
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         assert self.to is not None
-        new = point.value_of(self.to, value=operand(token), time=point.now)
-        if new is not None and not (type(new) is type(token) and new == token):
+        given = operand(token)
+        is_nan = isinstance(given, float) and math.isnan(given)
+        new = None if is_nan else point.value_of(self.to, value=given, time=point.now)
+        if new is not None and (type(new) is not type(given) or new != given):
             point.act("replaced", token, new)
             token = new
         point.forward(token)

@@ -313,7 +313,7 @@ cdef class RecorderForm(Native):
 # What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
 SOURCES = (
     ("accumulation.py", "Counter", "06c4e0e155cd5a54"),
-    ("accumulation.py", "Integrator", "31017c9ef3dda5b7"),
+    ("accumulation.py", "Integrator", "a12ab980076fc006"),
     ("arithmetic.py", "AddSubtract", "c0e44508fa3ae047"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),
     ("distributions.py", "Gamma", "561c0e5a4a78963b"),
