@@ -65,8 +65,8 @@ class Integrator(Actor):
     exact for queue lengths and other step signals.  ``trapezoid``: it runs straight from token to token,
     ``sum((x[k] + x[k+1]) / 2 * (t[k+1] - t[k]))``.  Before the first token the signal is 0.  The integral up to now is
     sent for each token, and for each ``trigger``, where the signal is taken to hold its latest value.
-    The unit is that of the input times s.  Ptolemy: ``Integrator`` of its DE library (``trapezoid``); for the other, which
-    is continuous, see ``ODE``.
+    The unit is that of the input times s.  Ptolemy: ``Integrator`` of its DE library (``trapezoid``); for the other,
+    which is continuous, see ``ODE``.
     """
 
     input = InputPort(float, doc="the signal")

@@ -25,6 +25,7 @@ from .core import (
     token_type,
 )
 from .distributions import Distribution
+from .generators import Generator
 
 
 class _Ticking(Actor):
@@ -191,13 +192,21 @@ class PoissonClock(_Ticking):
 
     mean_interval = Parameter(float, 1.0, unit="s", above=0, doc="mean time between two ticks")
     fire_at_start = Parameter(bool, True, doc="whether the first tick comes at the start")
+    generator: Parameter[Generator | None] = Parameter(
+        Generator, None, doc="another program's generator, if it is to give the numbers"
+    )
+
+    def check(self) -> None:
+        super().check()
+        self._numbers = None if self.generator is None else self.generator.numbers()
 
     def initialize(self) -> None:
         self._tick = 0
         self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
     def _interval(self) -> int:
-        return to_nanoseconds(self.random.exponential(self.mean_interval))
+        numbers = self.random if self._numbers is None else self._numbers
+        return to_nanoseconds(numbers.exponential(self.mean_interval))
 
     def fire(self) -> None:
         self._send(self._tick)
@@ -385,13 +394,18 @@ class Random(Actor):
     output = OutputPort(doc="the token drawn")
 
     distribution: Parameter[Distribution] = Parameter(Distribution, doc="what is drawn from")
+    generator: Parameter[Generator | None] = Parameter(
+        Generator, None, doc="another program's generator, if it is to give the numbers"
+    )
 
     def check(self) -> None:
         self.output.type = self.distribution.token_type
+        self._numbers = None if self.generator is None else self.generator.numbers()
 
     def fire(self) -> None:
+        numbers: Any = self.random if self._numbers is None else self._numbers
         for _ in range(_times(self.trigger)):
-            self.output.send(self.distribution.draw(self.random))
+            self.output.send(self.distribution.draw(numbers))
 
 
 class CurrentTime(Actor):

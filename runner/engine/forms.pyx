@@ -107,7 +107,7 @@ cdef class PoissonForm(Ticking):
 
     cdef bint take(self) except -1:
         self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
-        return Ticking.take(self)
+        return self.actor.generator is None and Ticking.take(self)
 
     cpdef fire(self):
         cdef long long following
@@ -205,7 +205,7 @@ cdef class RandomForm(Native):
     cdef bint take(self) except -1:
         self.trigger, self.output, self.stream = self.input_port("trigger"), self.sender("output"), self.actor.random
         self.drawing = drawing_of(self.actor.distribution, self.stream)
-        return self.output is not None and self.trigger.width == 1
+        return self.output is not None and self.trigger.width == 1 and self.actor.generator is None
 
     cpdef fire(self):
         for _ in range(count_of(self.trigger)):
@@ -322,7 +322,7 @@ SOURCES = (
     ("flow.py", "Merge", "2870aac0ebfab367"),
     ("functions.py", "Expression", "66f2e2198e6143d8"),
     ("queues.py", "Queue", "de9384977ec688db"),
-    ("sources.py", "Random", "ad10cd2882b330d9"),
+    ("sources.py", "Random", "638494c834d75368"),
     ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
     ("core/laws.py", "gamma", "da1afffdbd29a311"),
@@ -334,7 +334,7 @@ SOURCES = (
     ("queues.py", "Server", "5c6f05b6bbdac75d"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
     ("sources.py", "Clock", "e8869bd338027fbd"),
-    ("sources.py", "PoissonClock", "3d48035a29d3f078"),
+    ("sources.py", "PoissonClock", "419d9e74087ecaa4"),
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
     ("arithmetic.py", "Scale", "3aafcbc1e5e5c3de"),
     ("timing.py", "TimeDelay", "b8778dbbc9a75614"),

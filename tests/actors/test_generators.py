@@ -1,0 +1,109 @@
+"""Generators of other programs, against what these gave."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scipy import stats
+
+from epicycle.actors import DRand, JavaRandom
+from epicycle.runner.engine import ActorError
+from tests.actors.feeding import feed
+from tests.actors.library_parts import behave, problem, tokens
+
+SENDS = Path(__file__).parents[1] / "conformance/sends/QueueAndServer.csv"
+
+
+def java_hash(text: str) -> int:
+    """What Java's ``String.hashCode`` gives."""
+    found = 0
+    for letter in text:
+        found = (31 * found + ord(letter)) % 2**32
+    return found - 2**32 if found >= 2**31 else found
+
+
+def sent_in_ptolemy(port: str) -> list[tuple[float, str]]:
+    """What a port sent in real Ptolemy, with seed 1."""
+    with SENDS.open(encoding="utf-8", newline="") as file:
+        return [(float(row["time"]), row["token"]) for row in csv.DictReader(file) if row["port"] == port]
+
+
+@pytest.mark.parametrize("name", ["PoissonClock", "PoissonClock2"])
+def test_a_poisson_clock_of_ptolemy(name: str) -> None:
+    """Its seed is added to the hash of its name; its times are multiples of 1e-10 s."""
+    clock = {
+        "type": "PoissonClock",
+        "generator": {"type": "JavaRandom", "seed": 1 + java_hash(f".QueueAndServer.{name}")},
+        "fire_at_start": name == "PoissonClock",
+    }
+    _, sent, _ = feed(clock, {}, until=50)
+    expected = [time for time, _ in sent_in_ptolemy(f"{name}.output")]
+    assert len(expected) > 30
+    assert [time for time, _ in sent["output"]] == pytest.approx(expected, abs=1e-7)
+
+
+def test_an_exponential_of_colt() -> None:
+    expected = [float(value) for _, value in sent_in_ptolemy("ColtExponential.output")]
+    seed = 1 + java_hash(".QueueAndServer.ColtExponential")
+    actor = f"{{type: Random, distribution: {{type: Exponential}}, generator: {{type: DRand, seed: {seed}}}}}"
+    sends = behave(actor, [("trigger", [[n, 0] for n in range(len(expected))])])
+    assert len(expected) > 30
+    assert tokens(sends) == pytest.approx(expected, abs=1e-12)
+
+
+def test_numbers_that_the_documentation_of_java_gives() -> None:
+    """The first numbers of ``new Random(42)`` are widely known."""
+    numbers = JavaRandom(seed=42).numbers()
+    assert [numbers.random() for _ in range(3)] == [0.7275636800328681, 0.6832234717598454, 0.30871945533265976]
+    numbers = JavaRandom(seed=42).numbers()
+    assert [numbers.normal() for _ in range(3)] == pytest.approx(
+        [1.1419053154730547, 0.9194079489827879, -0.9498666368908959], rel=1e-14
+    )
+    assert JavaRandom(seed=-1).numbers().random() == JavaRandom(seed=2**64 - 1).numbers().random()
+
+
+@pytest.mark.parametrize("generator", [JavaRandom(seed=3), DRand(seed=3)], ids=repr)
+def test_laws(generator: Any) -> None:
+    """1e-3: one of a thousand seeds would fail."""
+    numbers = generator.numbers()
+    drawn = {
+        "uniform": [numbers.uniform(1.0, 3.0) for _ in range(4000)],
+        "normal": [numbers.normal(1.0, 2.0) for _ in range(4000)],
+        "expon": [numbers.exponential(2.0) for _ in range(4000)],
+        "triang": [numbers.triangular(1.0, 1.5, 3.0) for _ in range(4000)],
+        "lognorm": [numbers.lognormal(0.0, 0.5) for _ in range(4000)],
+    }
+    laws = {
+        "uniform": stats.uniform(1, 2), "normal": stats.norm(1, 2), "expon": stats.expon(scale=2),
+        "triang": stats.triang(0.25, 1, 2), "lognorm": stats.lognorm(0.5),
+    }  # fmt: skip
+    for name, law in laws.items():
+        assert stats.kstest(drawn[name], law.cdf).pvalue > 1e-3, name
+
+
+def test_choices_and_truth_values() -> None:
+    given = "generator: {type: JavaRandom, seed: 42}}"
+    triggers = [("trigger", [[n, 0] for n in range(3)])]
+    one = behave(f"{{type: Random, distribution: {{type: Bernoulli, probability: 0.7}}, {given}", triggers)
+    assert tokens(one) == [False, True, True]
+    law = "{type: Choice, values: [a, b, c], weights: [0.3, 0.4, 0.3]}"
+    assert tokens(behave(f"{{type: Random, distribution: {law}, {given}", triggers)) == ["c", "b", "b"]
+
+
+def test_the_seed_of_the_run_does_not_matter_then() -> None:
+    actor = "{type: PoissonClock, generator: {type: DRand, seed: 5}}"
+    assert behave(actor, [], until=20, seed=1) == behave(actor, [], until=20, seed=2)
+    assert not math.isnan(behave(actor, [], until=20)[-1][0])
+
+
+def test_messages() -> None:
+    drawn = "{type: Random, distribution: {type: Gamma}, generator: {type: DRand, seed: 5}}"
+    with pytest.raises(ActorError) as caught:
+        behave(drawn, [("trigger", [[0, 0]])])
+    assert caught.value.reason == "a generator of another program has no 'gamma': leave 'generator' out"
+    wrong = "{type: PoissonClock, generator: {type: Java, seed: 5}}"
+    assert problem(wrong) == "it.generator: 'Java' is not one of DRand, JavaRandom"
