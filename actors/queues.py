@@ -131,6 +131,7 @@ class Server(Actor):
         self._waiting: deque[tuple[Any, float]] = deque()
         self._size = 0  # those that wait and those that are served
         self._free: int | None = None  # when the one is done that is served, one at a time
+        self._rest = 0.0
 
     def fire(self) -> None:
         if self.one_at_a_time and self.servers == 1:
@@ -161,14 +162,16 @@ class Server(Actor):
             self.rejected.send(token)
         elif token is not ABSENT:
             self._waiting.append((token, self._draw()))
+        rest = 0.0
         if self._waiting and self._free == self.tag.time:
-            self._free = None
+            self._free, rest = None, self._rest
             self.output.send(self._waiting.popleft()[0])
         self.size.send(len(self._waiting))
         if self._waiting and self._free is None:
-            time = self._waiting[0][1]
+            time = self._waiting[0][1] + rest
             self._free = self.tag.time + to_nanoseconds(time)
             self.wake_in(time)
+            self._rest = time - to_seconds(to_nanoseconds(time))
 
     def _serve(self, token: Any, time: float) -> None:
         # What whole nanoseconds leave over is added to the next service, or it would add up while the server is busy.

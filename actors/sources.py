@@ -22,6 +22,7 @@ from .core import (
     array_parameter,
     rounds,
     to_nanoseconds,
+    to_seconds,
     token_type,
 )
 from .distributions import Distribution
@@ -202,11 +203,16 @@ class PoissonClock(_Ticking):
 
     def initialize(self) -> None:
         self._tick = 0
+        self._rest = 0.0
         self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
     def _interval(self) -> int:
-        numbers = self.random if self._numbers is None else self._numbers
-        return to_nanoseconds(numbers.exponential(self.mean_interval))
+        if self._numbers is None:
+            return to_nanoseconds(self.random.exponential(self.mean_interval))
+        # What whole nanoseconds leave over is added to the next, or it would add up against the other program.
+        interval = self._numbers.exponential(self.mean_interval) + self._rest
+        self._rest = interval - to_seconds(to_nanoseconds(interval))
+        return to_nanoseconds(interval)
 
     def fire(self) -> None:
         self._send(self._tick)

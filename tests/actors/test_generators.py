@@ -11,8 +11,8 @@ import pytest
 from scipy import stats
 
 from epicycle.actors import DRand, JavaRandom
-from epicycle.runner.engine import ActorError
-from tests.actors.feeding import feed
+from epicycle.runner.engine import ActorError, Simulation
+from tests.actors.feeding import feed, load
 from tests.actors.library_parts import behave, problem, tokens
 
 SENDS = Path(__file__).parents[1] / "conformance/sends/QueueAndServer.csv"
@@ -53,6 +53,47 @@ def test_an_exponential_of_colt() -> None:
     sends = behave(actor, [("trigger", [[n, 0] for n in range(len(expected))])])
     assert len(expected) > 30
     assert tokens(sends) == pytest.approx(expected, abs=1e-12)
+
+
+QUEUE_AND_SERVER = """
+model: QueueAndServer
+director: {{like: ptolemy}}
+actors:
+  Queue: {{type: Queue}}
+  PoissonClock: {{type: PoissonClock, values: [1, 0], generator: {{type: JavaRandom, seed: {PoissonClock}}}}}
+  Ramp: {{type: Ramp}}
+  PoissonClock2:
+    type: PoissonClock
+    values: [1, 0]
+    fire_at_start: false
+    generator: {{type: JavaRandom, seed: {PoissonClock2}}}
+  ColtExponential:
+    type: Random
+    distribution: {{type: Exponential}}
+    generator: {{type: DRand, seed: {ColtExponential}}}
+  Server: {{type: Server}}
+connections:
+  - Ramp.output -> Queue.input, ColtExponential.trigger, Server.input
+  - PoissonClock2.output -> Queue.trigger
+  - PoissonClock.output -> Ramp.trigger
+  - ColtExponential.output -> Server.service_time
+"""
+
+
+def test_queue_and_server() -> None:
+    """All that Ptolemy's model of this name sent, port by port, to the nanosecond."""
+    names = ("PoissonClock", "PoissonClock2", "ColtExponential")
+    text = QUEUE_AND_SERVER.format(**{name: 1 + java_hash(f".QueueAndServer.{name}") for name in names})
+    records = Simulation(load(text), keep_log=True).run(until=50).log.records
+    found: dict[str, list[Any]] = {}
+    for r in records:
+        if r.event == "send":
+            found.setdefault(f"{r.actor}.{r.port}", []).append((r.tag.seconds, r.value))
+    assert len(found) == 8
+    for port, sends in found.items():
+        expected = [(time, float(value)) for time, value in sent_in_ptolemy(port)]
+        assert [time for time, _ in sends] == pytest.approx([time for time, _ in expected], abs=1e-9), port
+        assert [value for _, value in sends] == pytest.approx([value for _, value in expected], abs=1e-12), port
 
 
 def test_numbers_that_the_documentation_of_java_gives() -> None:
