@@ -8,7 +8,7 @@ from .compiled import CORE, CORE_MODULES, CORE_REASON
 # isort: split
 # What comes before decides what all imports behind find: compiled modules, or their sources.
 from .accumulation import Accumulator, Counter, Derivative, Difference, Integrator, TimeAverage
-from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
+from .arithmetic import AddSubtract, Extreme, MathFunction, MultiplyDivide, Scale
 from .core import *
 from .distributions import (
     Bernoulli,
@@ -30,12 +30,14 @@ from .logic import Comparator, Equals, LogicGate
 from .passing import (
     BooleanSelect,
     Commutator,
+    Default,
     Filter,
     FirstOfInstant,
     Inhibit,
     IsPresent,
     Previous,
     Register,
+    Sequencer,
 )
 from .queues import Queue, Server
 from .replay import Replay, ReplayError
@@ -59,7 +61,7 @@ from .variables import SetVariable, Variable
 if TYPE_CHECKING:
     from .continuous import ODE
     from .control import *
-    from .entities import Batch, Match, RecordAssembler, RecordDisassembler, SetFields, Unbatch
+    from .entities import Batch, Collect, Match, RecordAssembler, RecordDisassembler, SetFields, Spread, Unbatch
     from .links import ArqReceiver, ArqSender, Link, NetworkSwitch
     from .modes import *
     from .resources import Machine, Pool, Station, WaitingLine
@@ -70,10 +72,10 @@ __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",
     "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier",
     "Batch", "Bernoulli", "BodyState", "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi",
-    "ChannelError", "Choice", "CircularMotion", "Clock", "Commutator", "Comparator", "Configurable", "Const",
-    "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DRand", "DeadZone", "Derivative",
+    "ChannelError", "Choice", "CircularMotion", "Clock", "Collect", "Commutator", "Comparator", "Configurable", "Const",
+    "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DRand", "DeadZone", "Default", "Derivative",
     "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter", "EpicycleError", "Equals",
-    "Estimate", "Exponential", "Expression", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator",
+    "Estimate", "Exponential", "Expression", "Extreme", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator",
     "FirstOfInstant", "FirstOrder", "Function", "Gamma", "Generator", "GoalMonitor", "Histogram", "Hysteresis",
     "InertialSensor", "Inform", "Inhibit", "InputPort", "Integrator", "IsPresent", "JavaRandom", "Latest", "Limiter",
     "Line", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction",
@@ -83,16 +85,16 @@ __all__ = [
     "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner",
     "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay",
     "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor",
-    "SeparationMonitor", "Sequence", "Server", "SetFields", "SetVariable", "SingleEvent", "Solver", "StateMachine",
-    "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeAverage", "TimeCompare",
-    "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform",
-    "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "WaitingLine", "WaitingTime", "Wake", "Way",
-    "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
-    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
-    "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
-    "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
-    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
+    "SeparationMonitor", "Sequence", "Sequencer", "Server", "SetFields", "SetVariable", "SingleEvent", "Solver",
+    "Spread", "StateMachine", "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test",
+    "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch",
+    "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "WaitingLine", "WaitingTime",
+    "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
+    "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
+    "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",
+    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
+    "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
     "visible_character", "visible_lines",
 ]  # fmt: skip
 
@@ -105,7 +107,9 @@ _LATER = {
         "PID", "Butterworth", "DeadZone", "DiscreteFilter", "FilterDesign", "FirstOrder", "Hysteresis", "Limiter",
         "Quantizer", "StateSpace", "TransferFunction",
     ),
-    ".entities": ("Batch", "Match", "RecordAssembler", "RecordDisassembler", "SetFields", "Unbatch"),
+    ".entities": (
+        "Batch", "Collect", "Match", "RecordAssembler", "RecordDisassembler", "SetFields", "Spread", "Unbatch",
+    ),
     ".links": ("ArqReceiver", "ArqSender", "Link", "NetworkSwitch"),
     ".modes": ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"),
     ".resources": ("Machine", "Pool", "Station", "WaitingLine"),

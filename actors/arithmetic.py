@@ -1,4 +1,4 @@
-"""Arithmetic on tokens: AddSubtract, MultiplyDivide, Scale, MathFunction.
+"""Arithmetic on tokens: AddSubtract, MultiplyDivide, Extreme, Scale, MathFunction.
 
 Integers stay integers where arithmetic keeps them.  A result that is no real number (a division by zero, the root of
 a negative number) ends the run with an error.
@@ -10,7 +10,18 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter, elementary, present, rounds
+from .core import (
+    ABSENT,
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    PortParameter,
+    elementary,
+    present,
+    rounds,
+)
 
 
 class AddSubtract(Actor):
@@ -53,6 +64,28 @@ class MultiplyDivide(Actor):
                 else:
                     product /= divisor
             self.output.send(product)
+
+
+class Extreme(Actor):
+    """The greatest or the least of what comes together, and the channel on which it came; of equals, the first.
+
+    Channels without a token at this tag do not count.  Ptolemy: ``Maximum`` (``maximumValue``, ``channelNumber``),
+    ``Minimum``.
+    """
+
+    input = InputPort(float, multi=True, doc="what is compared")
+    value = OutputPort(float, doc="the greatest or the least")
+    channel = OutputPort(int, doc="where it came, from 0")
+
+    take = Parameter(str, choices=("greatest", "least"), doc="which of them")
+
+    def fire(self) -> None:
+        for (tokens,) in rounds(self.input):
+            there = [channel for channel, token in enumerate(tokens) if token is not ABSENT]
+            best = max if self.take == "greatest" else min
+            channel = best(there, key=tokens.__getitem__)
+            self.value.send(tokens[channel])
+            self.channel.send(channel)
 
 
 class Scale(Actor):

@@ -1,5 +1,5 @@
 """What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Previous, Register, BooleanSelect, Commutator,
-IsPresent."""
+Sequencer, Default, IsPresent."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from .core import ABSENT, Actor, EpicycleError, InputPort, OutputPort, Parameter, brief, present, rounds
 from .expression import FormulaParameter, of_token
 from .flow import ByChannel, MostRecent
+from .matching import matched
 
 
 class Filter(ByChannel):
@@ -146,6 +147,47 @@ class Commutator(Actor):
             for _ in range(self.block):
                 self.output.send(queue.popleft())
             self._next = (self._next + 1) % len(self._waiting)
+
+
+class Sequencer(Actor):
+    """Hands tokens on in the order of their numbers, which count up from ``first``; each waits until it is its turn.
+
+    The k-th token has the k-th number.  Ptolemy: ``Sequencer``, where the number is called ``sequenceNumber``.
+    """
+
+    input = InputPort(keep=True, doc="the tokens")
+    number = InputPort(int, keep=True, doc="the place of each in the sequence")
+    output = OutputPort(doc="the tokens in the order of their numbers")
+
+    first = Parameter(int, 0, doc="the first number")
+
+    def initialize(self) -> None:
+        self._waiting: dict[int, Any] = {}
+        self._next = self.first
+
+    def fire(self) -> None:
+        for values in matched([self.input, self.number]):
+            if values["number"] >= self._next:
+                self._waiting[values["number"]] = values["input"]
+        while self._next in self._waiting:
+            self.output.send(self._waiting.pop(self._next))
+            self._next += 1
+
+
+class Default(Actor):
+    """Hands on what comes at ``preferred``, and otherwise, if nothing does, what comes at ``alternate``.
+
+    Ptolemy: ``Default``.
+    """
+
+    preferred = InputPort(doc="what goes before")
+    alternate = InputPort(doc="what is handed on at tags at which nothing comes at 'preferred'")
+    output = OutputPort(ptolemy={"depends_on": ("preferred",)}, doc="one or the other")
+
+    def fire(self) -> None:
+        for preferred, alternate in rounds(self.preferred, self.alternate):
+            for token in (present(preferred) or present(alternate))[:1]:
+                self.output.send(token)
 
 
 class IsPresent(ByChannel):
