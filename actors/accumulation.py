@@ -4,16 +4,18 @@ Difference."""
 from __future__ import annotations
 
 from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
+from .matching import taken
 
 
 class Counter(Actor):
     """Counts tokens of any kind: up for each at ``increment``, down for each at ``decrement``.
 
-    The number is sent once per tag at which it was counted.  Ptolemy: ``Counter``.
+    The number is sent once per tag at which it was counted; where the ports keep their tokens, as in Ptolemy, once for
+    those that come first on each channel, and so on.  Ptolemy: ``Counter``.
     """
 
-    increment = InputPort(multi=True, required=False, doc="each token counts one up")
-    decrement = InputPort(multi=True, required=False, doc="each token counts one down")
+    increment = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one up")
+    decrement = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one down")
     reset = InputPort(required=False, doc="sets the number back, before the tag is counted")
     output = OutputPort(int, doc="the number")
 
@@ -25,7 +27,10 @@ class Counter(Actor):
     def fire(self) -> None:
         if self.reset.present:
             self._number = self.initial
-        self._number += len(self.increment.tokens) - len(self.decrement.tokens)
+        if self.increment.keep:
+            self._number += taken(self.increment) - taken(self.decrement)
+        else:
+            self._number += len(self.increment.tokens) - len(self.decrement.tokens)
         self.output.send(self._number)
 
 

@@ -65,18 +65,21 @@ class Expression(Actor):
         doc="what the value is; a truth value for a comparison and otherwise a number if left out",
     )
     hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+    iteration = Parameter(bool, False, doc="whether the name 'iteration' is the number of the evaluation, from 1")
 
     def check(self) -> None:
         self._kind = self.gives or ("truth value" if self.expression.is_condition else "number")
         self.output.type = _KINDS[self._kind]
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
-        names = [name for name in self.expression.names if name != "time"]
+        known = ("time", "iteration") if self.iteration else ("time",)
+        names = [name for name in self.expression.names if name not in known]
         return {name: InputPort(ptolemy={"keep": True}, doc="a name of the expression") for name in names}
 
     def initialize(self) -> None:
         self._ports = list(self.inputs.values())
         self._latest = Latest(self._ports, hold=self.hold)
+        self._count = 0
 
     def fire(self) -> None:
         keeps = any(port.keep for port in self._ports)
@@ -85,6 +88,9 @@ class Expression(Actor):
 
     def _value(self, values: dict[str, Any]) -> Any:
         formula, values["time"] = self.expression, self.now
+        if self.iteration:
+            self._count += 1
+            values["iteration"] = self._count
         value = formula.of_floats(*map(values.get, formula.names))
         if value is None:
             value = formula({name: operand(token) for name, token in values.items()})

@@ -16,3 +16,9 @@ def matched(ports: Sequence[InputPort[Any]]) -> Iterator[dict[str, Any]]:
     connected = [port for port in ports if port.width]
     if all(port.present for port in connected):
         yield {port.name: port.get() for port in connected}
+
+
+def taken(port: InputPort[Any]) -> int:
+    """Take the first token of each channel out of a port that keeps them; how many there were."""
+    found = [port.get(channel) for channel in range(port.width) if port.waiting(channel)]
+    return len(found)

@@ -314,7 +314,7 @@ cdef class RecorderForm(Native):
 
 # What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
 SOURCES = (
-    ("accumulation.py", "Counter", "06c4e0e155cd5a54"),
+    ("accumulation.py", "Counter", "511f83c57109ba7d"),
     ("accumulation.py", "Integrator", "a12ab980076fc006"),
     ("arithmetic.py", "AddSubtract", "c0e44508fa3ae047"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),
@@ -322,7 +322,7 @@ SOURCES = (
     ("distributions.py", "Normal", "41b7f712051a423b"),
     ("distributions.py", "Uniform", "623cbec8bb43eb2b"),
     ("flow.py", "Merge", "2870aac0ebfab367"),
-    ("functions.py", "Expression", "66f2e2198e6143d8"),
+    ("functions.py", "Expression", "b1687473183ecb2d"),
     ("queues.py", "Queue", "de9384977ec688db"),
     ("sources.py", "Random", "638494c834d75368"),
     ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),

@@ -72,6 +72,10 @@ def there(actor: str, feeds: Feeds, until: float = 100, outputs: int = 0, direct
          [(0, 1, "output", False), (0, 1, "output", True)]),
         ("Expression, expression: a - b", [("a", [[0, 5], [0, 6]]), ("b", [[1, 1], [2, 2], [2, 3]])],
          [(1, 1, "output", 4), (2, 1, "output", 4)]),
+        ("Expression, expression: a + iteration, iteration: true", [("a", [[0, 10], [0, 20], [1, 30]])],
+         [(0, 1, "output", 11), (0, 1, "output", 22), (1, 1, "output", 33)]),
+        ("Counter", [("increment", [[0, 0], [0, 0], [1, 0]]), ("increment", [[0, 0]]), ("decrement", [[1, 0], [1, 0]])],
+         [(0, 1, "output", 2), (0, 1, "output", 3), (1, 1, "output", 3), (1, 1, "output", 2)]),
         ("Expression, expression: 'a[1:]'", [("a", [[0, [1, 2, 3]]])], [(0, 1, "output", [2, 3])]),
         # What is not chosen waits; a number of no channel chooses none.
         ("Select", [("input", [[0, "a"], [3, "b"]]), ("input", [[0, "x"], [1, "y"]]), ("control",
