@@ -6,6 +6,7 @@ from typing import Any
 
 from .core import Configurable, EpicycleError, Parameter, ParameterError, Stream, array_parameter, counted, token_type
 from .core.choices import cumulated, weighted
+from .generators import Numbers
 
 
 class Distribution(Configurable):
@@ -153,6 +154,9 @@ class Choice(Distribution):
             )
 
     def draw(self, random: Stream) -> Any:
+        numbers: Any = random
+        if isinstance(numbers, Numbers):
+            return self.values[numbers.weighted(self._sums)]
         return self.values[weighted(random, self._sums)]
 
 

@@ -6,6 +6,8 @@ Everybody else takes the numbers of the actor's own stream, which depend on the 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
+from collections.abc import Sequence
 from typing import Any
 
 from .core import Configurable, EpicycleError, Parameter, elementary
@@ -24,9 +26,9 @@ class Numbers:
         """Uniform in [0, 1)."""
         raise NotImplementedError
 
-    def word(self) -> int:
-        """What ``random`` gives, as 64 bits."""
-        return int(self.random() * 2**53) << 11
+    def weighted(self, sums: Sequence[float]) -> int:
+        """An index, as likely as its weight; ``sums`` are those of the weights up to each."""
+        return min(bisect_left(sums, self.random() * sums[-1]), len(sums) - 1)
 
     def uniform(self, low: float = 0.0, high: float = 1.0) -> float:
         """Uniform in [low, high)."""
