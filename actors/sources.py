@@ -1,7 +1,7 @@
 """Where tokens begin: Clock, PoissonClock and SingleEvent of their own accord, and what answers a trigger: Const, Ramp,
 Sequence, Pulse, Random, CurrentTime, CurrentMicrostep.
 
-Triggers that come together, one at each connection, are one trigger.
+Triggers that come together, one at each connection, are one trigger, but for CurrentTime.
 """
 
 from __future__ import annotations
@@ -415,7 +415,7 @@ class Random(Actor):
 
 
 class CurrentTime(Actor):
-    """Sends the present time for each trigger.
+    """Sends the present time for each trigger, those that come together included.
 
     Ptolemy: ``CurrentTime``.
     """
@@ -424,7 +424,7 @@ class CurrentTime(Actor):
     output = OutputPort(float, doc="the time in s")
 
     def fire(self) -> None:
-        for _ in range(_times(self.trigger)):
+        for _ in self.trigger.tokens:
             self.output.send(self.now)
 
 

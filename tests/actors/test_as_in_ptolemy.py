@@ -151,6 +151,8 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         ("Ramp, init: 3, step: 2", [("trigger", [[0, 0], [1, 0]])], [3, 5]),
         # Triggers that come together, one on each channel, are one.
         ("Ramp", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0], [2, 0], [2, 0]])], [0, 1, 2, 3]),
+        ("CurrentTime", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0]])], [0.0, 1.0, 1.0]),
+        ("CurrentMicrostep", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0]])], [1, 1]),
         ("Sequence, values: [1, 2], hold: true", [("trigger", [[n, 0] for n in range(4)])], [1, 2, 2, 2]),
         ("MultiplyDivide", [("multiply", [[0, 7], [1, -7], [2, 7.0]]), ("divide", [[n, 2] for n in range(3)])], [3,
          -3, 3.5]),
