@@ -273,8 +273,11 @@ class Model(Scope, Tabled):
     def _tables(self) -> list[Table]:
         actors = []
         for path, actor in self.graph.actors.items():
-            values = {name: getattr(actor, name) for name in declared_parameters(type(actor))}
-            given = (f"{name}={short(value)}" for name, value in values.items() if value is not None)
+            declared = declared_parameters(type(actor)).items()
+            values = [(name, getattr(actor, name), parameter) for name, parameter in declared]
+            # What is there to be as in Ptolemy is worth a word where it is.
+            plain = {name for name, value, each in values if each.differs and short(value) == short(each.default_value)}
+            given = (f"{name}={short(value)}" for name, value, _ in values if value is not None and name not in plain)
             actors.append((path, type(actor).__name__, ", ".join(given)))
         connections = [
             (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")
