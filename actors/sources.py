@@ -188,8 +188,12 @@ class Clock(_Ticking):
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    Ptolemy: ``PoissonClock``.
+    A trigger lets one come at once, from which the time to the next is drawn anew.  Ptolemy: ``PoissonClock``.
     """
+
+    is_source: ClassVar[bool] = True
+
+    trigger = InputPort(multi=True, required=False, doc="lets a tick come at once")
 
     mean_interval = Parameter(float, 1.0, unit="s", above=0, doc="mean time between two ticks")
     fire_at_start = Parameter(bool, True, doc="whether the first tick comes at the start")
@@ -204,7 +208,7 @@ class PoissonClock(_Ticking):
     def initialize(self) -> None:
         self._tick = 0
         self._rest = 0.0
-        self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
+        self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
     def _interval(self) -> int:
         if self._numbers is None:
@@ -215,9 +219,11 @@ class PoissonClock(_Ticking):
         return to_nanoseconds(interval)
 
     def fire(self) -> None:
+        if self._wake is not None and not self._wake.due:
+            self._wake.cancel()
         self._send(self._tick)
         self._tick += 1
-        self._wake_at(self.tag.time + self._interval())
+        self._wake = self._wake_at(self.tag.time + self._interval())
 
 
 class SingleEvent(Actor):
@@ -286,16 +292,19 @@ class Ramp(Actor):
 
     init: Parameter[float] = Parameter(int | float, 0, doc="the first number")
     step: PortParameter[float] = PortParameter(int | float, 1, doc="what is added from one to the next")
+    late_step = Parameter(bool, False, ptolemy=True, doc="whether a step counts behind the next number, not before it")
 
     def check(self) -> None:
         self.output.type = int if isinstance(self.init, int) and isinstance(self.step, int) else float
 
     def initialize(self) -> None:
         self._last: float | None = None
+        self._step: float = 0  # behind the last number
 
     def fire(self) -> None:
         for _ in range(_times(self.trigger)):
-            self._last = self.init if self._last is None else self._last + self.step
+            step = self._step if self.late_step else self.step
+            self._last, self._step = self.init if self._last is None else self._last + step, self.step
             if self.output.type is int and not isinstance(self._last, int):
                 raise EpicycleError(
                     f"init and step are whole numbers, and so is what is sent, but a step of {self.step!r} has come; "

@@ -109,7 +109,7 @@ cdef class PoissonForm(Ticking):
 
     cdef bint take(self) except -1:
         self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
-        return self.actor.generator is None and Ticking.take(self)
+        return self.actor.generator is None and not self.actor.trigger.width and Ticking.take(self)
 
     cpdef fire(self):
         cdef long long following
@@ -316,7 +316,7 @@ cdef class RecorderForm(Native):
 SOURCES = (
     ("accumulation.py", "Counter", "511f83c57109ba7d"),
     ("accumulation.py", "Integrator", "a12ab980076fc006"),
-    ("arithmetic.py", "AddSubtract", "c0e44508fa3ae047"),
+    ("arithmetic.py", "AddSubtract", "d542b33b8ebab49e"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),
     ("distributions.py", "Gamma", "561c0e5a4a78963b"),
     ("distributions.py", "Normal", "41b7f712051a423b"),
@@ -336,9 +336,9 @@ SOURCES = (
     ("queues.py", "Server", "b1b76d0c79386ea5"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
     ("sources.py", "Clock", "e8869bd338027fbd"),
-    ("sources.py", "PoissonClock", "d1e2771249ada83c"),
+    ("sources.py", "PoissonClock", "47664d47db418e38"),
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
-    ("arithmetic.py", "Scale", "3aafcbc1e5e5c3de"),
+    ("arithmetic.py", "Scale", "78d3f6e01e9157d2"),
     ("timing.py", "TimeDelay", "2525e8b2de82467c"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),

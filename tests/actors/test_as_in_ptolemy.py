@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -11,7 +12,7 @@ from epicycle.actors import Clock, Tag
 from epicycle.actors.testing import Harness
 from epicycle.runner.engine import ActorError, Simulation
 from tests.actors.feeding import load
-from tests.actors.library_parts import Feeds, text
+from tests.actors.library_parts import Feeds, behave, problem, text
 from tests.engine.engine_parts import Probe
 
 
@@ -154,6 +155,15 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         ("CurrentTime", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0]])], [0.0, 1.0, 1.0]),
         ("CurrentMicrostep", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0]])], [1, 1]),
         ("Sequence, values: [1, 2], hold: true", [("trigger", [[n, 0] for n in range(4)])], [1, 2, 2, 2]),
+        ("AddSubtract", [("plus", [[0, "a"]]), ("plus", [[0, 2.5]]), ("plus", [[0, True]])], ["a2.5true"]),
+        ("AddSubtract", [("plus", [[0, [1, 2]], [1, {"x": 1, "y": 2}]]), ("plus", [[0, 1], [1, {"y": 3}]]),
+                         ("minus", [[0, [1, 1]]])], [[1, 2], {"y": 5}]),
+        ("Scale, factor: 2", [("input", [[0, [1, 2.5]], [1, 3]])], [[2, 5.0], 6]),
+        ("Scale, factor: 2, offset: 1", [("input", [[0, [1, 2]]])], [[3, 5]]),
+        # A new step counts behind the number that comes next.
+        ("Ramp", [("trigger", [[n, 0] for n in range(4)]), ("step", [[0.5, 10], [2, 100]])], [0, 1, 11, 111]),
+        ("Ramp, late_step: false", [("trigger", [[n, 0] for n in range(4)]), ("step", [[0.5, 10], [2, 100]])],
+         [0, 10, 110, 210]),
         ("MultiplyDivide", [("multiply", [[0, 7], [1, -7], [2, 7.0]]), ("divide", [[n, 2] for n in range(3)])], [3,
          -3, 3.5]),
         ("Accumulator", [("input", [[0, 1], [1, 2], [2, 4]]), ("reset", [[1, False], [2, True], [3, False]])], [1,
@@ -248,3 +258,47 @@ def test_checks(test: str, feeds: Feeds, message: str) -> None:
     with pytest.raises(ActorError) if message else nullcontext() as caught:
         there(f"Test, {test}", feeds)
     assert (caught.value.reason if caught else "") == message
+
+
+@pytest.mark.parametrize(
+    ("actor", "feeds", "message"),
+    [
+        ("AddSubtract", [("plus", [[0, [1]]]), ("plus", [[0, [1, 2]]])], "[1] has 1 items and [1, 2] has 2"),
+        ("AddSubtract", [("plus", [[0, 1]]), ("minus", [[0, "a"]])], "1 and 'a' do not go together"),
+        ("Scale, factor: 2", [("input", [[0, "a"]])], "'a' and 2 do not go together"),
+        ("Filter", [("input", [[0, 1]])], "'token' gives 1 for 1, not true or false"),
+        ("Ramp", [("trigger", [[0, 0], [1, 0], [2, 0]]), ("step", [[0, 0.5]])],
+         ("init and step are whole numbers, and so is what is sent, but a step of 0.5 has come; write 'init: 0.0' for "
+          "numbers that are not whole")),
+        ("Derivative", [("input", [[0, 1], [0, 2]])], "1 and 2 come at one time: a jump has no slope"),
+    ],
+)  # fmt: skip
+def test_messages(actor: str, feeds: Feeds, message: str) -> None:
+    with pytest.raises(ActorError) as caught:
+        there(actor, feeds)
+    assert caught.value.reason == message
+
+
+@pytest.mark.parametrize(
+    ("actor", "message"),
+    [
+        ("Pulse, indexes: [1, 0]", "indexes: [1, 0] is not an ascending list of whole numbers from 0 on"),
+        ("Pulse, indexes: [0]", "there are 2 values for 1 indexes"),
+        ("Sequence, values: [1], repeat: true, hold: true",
+         "repeat and hold cannot both be true: after the last value comes the first, or itself"),
+        ("Test, values: [1], together: true", "values: value 0 is 1, no list of a token on each channel"),
+    ],
+)  # fmt: skip
+def test_parameters_that_do_not_go_together(actor: str, message: str) -> None:
+    assert problem(f"{{type: {actor}}}", [("input" if "Test" in actor else "trigger", [])]) == f"it: {message}"
+
+
+def test_a_trigger_of_a_poisson_clock() -> None:
+    """It ticks at once, and waits anew: the tick that was to come does not."""
+    clock = "{type: PoissonClock, mean_interval: 5 s, values: [a, b]}"
+    alone, with_trigger = behave(clock, [], until=200), behave(clock, [("trigger", [[0.05, 0]])], until=200)
+    (first, *_), gaps = alone, [after[0] - before[0] for before, after in pairwise(alone)]
+    assert with_trigger[0] == first
+    assert with_trigger[1] == (0.05, 1, "output", "b")
+    later = [after[0] - before[0] for before, after in pairwise(with_trigger[1:])]
+    assert later[:5] == pytest.approx(gaps[1:6])
