@@ -130,7 +130,7 @@ class Scale(Actor):
     Ptolemy: ``Scale``, ``AddSubtract`` with a constant.
     """
 
-    input = InputPort(float, ptolemy={"type": Any}, doc="what is multiplied")
+    input: InputPort[Any] = InputPort(float, ptolemy={"type": Any}, doc="what is multiplied")
     output = OutputPort(float, ptolemy={"type": Any}, doc="factor * input + offset")
 
     factor: PortParameter[float] = PortParameter(int | float, 1, doc="what it is multiplied by")

@@ -338,7 +338,7 @@ SOURCES = (
     ("sources.py", "Clock", "e8869bd338027fbd"),
     ("sources.py", "PoissonClock", "47664d47db418e38"),
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
-    ("arithmetic.py", "Scale", "78d3f6e01e9157d2"),
+    ("arithmetic.py", "Scale", "d30f43b614b1f20e"),
     ("timing.py", "TimeDelay", "2525e8b2de82467c"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),
