@@ -302,3 +302,24 @@ def test_a_trigger_of_a_poisson_clock() -> None:
     assert with_trigger[1] == (0.05, 1, "output", "b")
     later = [after[0] - before[0] for before, after in pairwise(with_trigger[1:])]
     assert later[:5] == pytest.approx(gaps[1:6])
+
+
+EVERY = [
+    (actor.partition(",")[0], number, actor, feeds)
+    for test in (test_one_at_a_time, test_tokens, test_channels)
+    for number, (actor, feeds, *_) in enumerate(test.pytestmark[0].args[1])  # type: ignore[attr-defined]
+]
+
+
+@pytest.mark.parametrize(("kind", "number", "actor", "feeds"), EVERY)
+def test_snapshots_and_crashes(kind: str, number: int, actor: str, feeds: Feeds) -> None:
+    """A run that goes on from a snapshot is the whole one; after a crash that costs the state the actor begins anew."""
+    outputs = 2 if kind in ("Spread", "Switch", "IsPresent") or (len(feeds) == 3 and kind == "Inhibit") else 0
+    model = f"model: m\ndirector: {{like: ptolemy}}\n{text(f'{{type: {actor}}}', feeds, outputs)}\n"
+    whole = Simulation(load(model, [Probe]), keep_log=True).run(until=20).digest
+    cut = Simulation(load(model, [Probe]), keep_log=True)
+    cut.advance(1.0)
+    assert cut.fork().run(until=20).digest == whole
+    crash = "aspects: {crash: {type: CrashRestart, at: it, times: [1.25 s], repair: 0.125 s}}"
+    results = Simulation(load(model + crash, [Probe]), keep_log=True).run(until=20)
+    assert [record.event for record in results.log.records if record.aspect == "crash"][:2] == ["crashed", "restarted"]
