@@ -307,7 +307,7 @@ def test_a_trigger_of_a_poisson_clock() -> None:
 EVERY = [
     (actor.partition(",")[0], number, actor, feeds)
     for test in (test_one_at_a_time, test_tokens, test_channels)
-    for number, (actor, feeds, *_) in enumerate(test.pytestmark[0].args[1])  # type: ignore[attr-defined]
+    for number, (actor, feeds, *_) in enumerate(test.pytestmark[0].args[1])
 ]
 
 
