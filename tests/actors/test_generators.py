@@ -126,6 +126,74 @@ def test_laws(generator: Any) -> None:
         assert stats.kstest(drawn[name], law.cdf).pvalue > 1e-3, name
 
 
+LAWS = {
+    "gamma of 0.5": (lambda n: n.gamma(0.5, 2.0), stats.gamma(0.5, scale=2)),
+    "gamma of 1": (lambda n: n.gamma(1.0), stats.gamma(1)),
+    "gamma of 5": (lambda n: n.gamma(5.0), stats.gamma(5)),
+    "gamma of 20": (lambda n: n.gamma(20.0), stats.gamma(20)),
+    "chisquare of 1": (lambda n: n.chisquare(1.0), stats.chi2(1)),
+    "chisquare of 4": (lambda n: n.chisquare(4.0), stats.chi2(4)),
+    "t": (lambda n: n.standard_t(3.0), stats.t(3)),
+    "cauchy": (lambda n: n.standard_cauchy(), stats.cauchy),
+    "vonmises": (lambda n: n.vonmises(0.0, 2.0), stats.vonmises(2)),
+}
+WHOLE = {
+    "poisson": (lambda n: n.poisson(3.5), stats.poisson(3.5)),
+    "binomial": (lambda n: n.binomial(12, 0.3), stats.binom(12, 0.3)),
+    "binomial of many": (lambda n: n.binomial(12, 0.8), stats.binom(12, 0.8)),
+    "negative binomial": (lambda n: n.negative_binomial(2.0, 0.6), stats.nbinom(2, 0.6)),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_of_colt(name: str) -> None:
+    draw, law = LAWS[name]
+    numbers = DRand(seed=11).numbers()
+    assert stats.kstest([draw(numbers) for _ in range(4000)], law.cdf).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_laws_of_colt_of_whole_numbers(name: str) -> None:
+    draw, law = WHOLE[name]
+    numbers = DRand(seed=12).numbers()
+    drawn = [draw(numbers) for _ in range(8000)]
+    few = range(int(law.mean() + 3 * law.std()))
+    expected = [8000 * law.pmf(k) for k in few] + [8000 * law.sf(few[-1])]
+    counts = [drawn.count(k) for k in few] + [sum(k > few[-1] for k in drawn)]
+    kept = [(n, e) for n, e in zip(counts, expected, strict=True) if e > 5]
+    total = sum(e for _, e in kept) / sum(n for n, _ in kept)
+    assert stats.chisquare([n for n, _ in kept], [e / total for _, e in kept]).pvalue > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("distribution", "law"),
+    [
+        ("{type: ChiSquare, freedom: 3}", stats.chi2(3)),
+        ("{type: StudentT, freedom: 4}", stats.t(4)),
+        ("{type: Cauchy, median: 1, scale: 2}", stats.cauchy(1, 2)),
+        ("{type: VonMises, mean: 1, concentration: 3}", stats.vonmises(3, loc=1)),
+    ],
+)
+def test_distributions(distribution: str, law: Any) -> None:
+    sends = behave(f"{{type: Random, distribution: {distribution}}}", [("trigger", [[0, 0]] * 2000)], seed=2)
+    assert stats.kstest(tokens(sends), law.cdf).pvalue > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("distribution", "law"),
+    [
+        ("{type: Poisson, mean: 20}", stats.poisson(20)),
+        ("{type: Binomial, trials: 30, probability: 0.4}", stats.binom(30, 0.4)),
+        ("{type: NegativeBinomial, successes: 3, probability: 0.25}", stats.nbinom(3, 0.25)),
+    ],
+)
+def test_distributions_of_whole_numbers(distribution: str, law: Any) -> None:
+    sends = behave(f"{{type: Random, distribution: {distribution}}}", [("trigger", [[0, 0]] * 2000)], seed=2)
+    drawn = tokens(sends)
+    assert all(type(each) is int for each in drawn)
+    assert abs(sum(drawn) / 2000 - law.mean()) < 4 * law.std() / math.sqrt(2000)
+
+
 def test_choices_and_truth_values() -> None:
     given = "generator: {type: JavaRandom, seed: 42}}"
     triggers = [("trigger", [[n, 0] for n in range(3)])]
@@ -142,9 +210,13 @@ def test_the_seed_of_the_run_does_not_matter_then() -> None:
 
 
 def test_messages() -> None:
-    drawn = "{type: Random, distribution: {type: Gamma}, generator: {type: DRand, seed: 5}}"
+    drawn = "{type: Random, distribution: {type: Gamma}, generator: {type: JavaRandom, seed: 5}}"
     with pytest.raises(ActorError) as caught:
         behave(drawn, [("trigger", [[0, 0]])])
     assert caught.value.reason == "a generator of another program has no 'gamma': leave 'generator' out"
     wrong = "{type: PoissonClock, generator: {type: Java, seed: 5}}"
     assert problem(wrong) == "it.generator: 'Java' is not one of DRand, JavaRandom"
+    many = "{type: Random, distribution: {type: Poisson, mean: 10}, generator: {type: DRand, seed: 5}}"
+    with pytest.raises(ActorError) as caught:
+        behave(many, [("trigger", [[0, 0]])])
+    assert caught.value.reason == ("DRand draws Poisson numbers whose mean is below 10, not 10: leave 'generator' out")
