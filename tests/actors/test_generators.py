@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -126,7 +127,7 @@ def test_laws(generator: Any) -> None:
         assert stats.kstest(drawn[name], law.cdf).pvalue > 1e-3, name
 
 
-LAWS = {
+LAWS: dict[str, tuple[Callable[[Any], Any], Any]] = {
     "gamma of 0.5": (lambda n: n.gamma(0.5, 2.0), stats.gamma(0.5, scale=2)),
     "gamma of 1": (lambda n: n.gamma(1.0), stats.gamma(1)),
     "gamma of 5": (lambda n: n.gamma(5.0), stats.gamma(5)),
@@ -137,7 +138,7 @@ LAWS = {
     "cauchy": (lambda n: n.standard_cauchy(), stats.cauchy),
     "vonmises": (lambda n: n.vonmises(0.0, 2.0), stats.vonmises(2)),
 }
-WHOLE = {
+WHOLE: dict[str, tuple[Callable[[Any], Any], Any]] = {
     "poisson": (lambda n: n.poisson(3.5), stats.poisson(3.5)),
     "binomial": (lambda n: n.binomial(12, 0.3), stats.binom(12, 0.3)),
     "binomial of many": (lambda n: n.binomial(12, 0.8), stats.binom(12, 0.8)),
