@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Configurable, EpicycleError, Parameter, ParameterError, Stream, array_parameter, counted, token_type
+from .core import (
+    Configurable,
+    EpicycleError,
+    Parameter,
+    ParameterError,
+    Stream,
+    array_parameter,
+    counted,
+    elementary,
+    token_type,
+)
 from .core.choices import cumulated, weighted
 from .generators import Numbers
 
@@ -112,10 +122,14 @@ class Cauchy(Distribution):
     """The Cauchy distribution, which has no mean; in physics that of Breit and Wigner."""
 
     median = Parameter(float, 0.0, doc="the median")
-    scale = Parameter(float, 1.0, min=0, doc="half the width at half the height")
+    scale = Parameter(float, 1.0, above=0, doc="half the width at half the height")
+    cut: Parameter[float | None] = Parameter(float, None, above=0, doc="how far from the median it ends, if it does")
 
     def draw(self, random: Stream) -> float:
-        return self.median + self.scale * random.standard_cauchy()
+        if self.cut is None:
+            return self.median + self.scale * random.standard_cauchy()
+        angle = random.uniform(-1.0, 1.0) * elementary.atan(self.cut / self.scale)
+        return self.median + self.scale * elementary.tan(angle)
 
 
 class VonMises(Distribution):

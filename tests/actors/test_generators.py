@@ -195,6 +195,16 @@ def test_distributions_of_whole_numbers(distribution: str, law: Any) -> None:
     assert abs(sum(drawn) / 2000 - law.mean()) < 4 * law.std() / math.sqrt(2000)
 
 
+def test_a_cauchy_distribution_that_is_cut_off() -> None:
+    sends = behave(
+        "{type: Random, distribution: {type: Cauchy, median: 1, scale: 2, cut: 3}}", [("trigger", [[0, 0]] * 2000)]
+    )
+    law, drawn = stats.cauchy(1, 2), tokens(sends)
+    low, high = law.cdf(-2.0), law.cdf(4.0)
+    assert stats.kstest(drawn, lambda x: (law.cdf(x) - low) / (high - low)).pvalue > 1e-3
+    assert -2.0 <= min(drawn) < -1.9 < 3.9 < max(drawn) <= 4.0
+
+
 def test_choices_and_truth_values() -> None:
     given = "generator: {type: JavaRandom, seed: 42}}"
     triggers = [("trigger", [[n, 0] for n in range(3)])]
