@@ -150,6 +150,10 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         # The trigger that begins anew is answered only if a value is due at once.
         ("Pulse, repeat: true, values: [7], indexes: [1]", [("trigger", [[n, 0] for n in range(5)])], [0, 7, 7]),
         ("Ramp, init: 3, step: 2", [("trigger", [[0, 0], [1, 0]])], [3, 5]),
+        ("Ramp, limit: 2", [("trigger", [[0, 0], [0, 0], [1, 0]])], [0, 1]),
+        ("Const, limit: 2, value: a", [("trigger", [[0, 0], [1, 0], [2, 0]])], ["a", "a"]),
+        ("Const, limit: 1", [], [1]),
+        ("Pulse, limit: 3", [("trigger", [[n, 0] for n in range(5)])], [1, 0, 0]),
         # Triggers that come together, one on each channel, are one.
         ("Ramp", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0], [2, 0], [2, 0]])], [0, 1, 2, 3]),
         ("CurrentTime", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0]])], [0.0, 1.0, 1.0]),
