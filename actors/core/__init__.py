@@ -24,6 +24,7 @@ from .moment import Moment, Wake, When, new_wake
 from .order import NEVER, Line, Ranks, Times
 from .parameter import (
     REQUIRED,
+    SAME,
     Configurable,
     Parameter,
     ParameterError,
@@ -46,7 +47,7 @@ from .units import UnitError, convert, parse_unit
 __all__ = [
     "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "REQUIRED", "Actor", "Configurable", "Context", "Emitter",
     "EpicycleError", "InputPort", "Latest", "Line", "MappingParameter", "Moment", "OutputPort", "Parameter",
-    "ParameterError", "Pending", "PortError", "PortParameter", "Process", "Quantity", "Ranks", "Stream", "Tag", "Times",
+    "ParameterError", "Pending", "PortError", "PortParameter", "Process", "Quantity", "Ranks", "SAME", "Stream", "Tag", "Times",
     "UnitError", "Wake", "Way", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert",
     "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
     "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",

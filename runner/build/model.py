@@ -9,7 +9,7 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..catalogue import take_problem
 from ..collection import without_collection
-from ..graph import Metric, ModelGraph, Watched, WovenAspect, check_processors, firing_order, is_within
+from ..graph import Metric, ModelGraph, Rules, Watched, WovenAspect, check_processors, firing_order, is_within
 from ..language import Values
 from ..shown import short
 from ..tables import Table, Tabled
@@ -18,7 +18,7 @@ from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .draft import Draft
-from .named import Port, raising
+from .named import Port, director_of, raising
 from .scope import Composite, Scope
 from .settle import nanoseconds
 from .watch import Watching, checked_seed
@@ -39,6 +39,7 @@ class Model(Scope, Tabled):
     {'ticks': 15}
 
     ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
+    ``ties="posted"`` and ``like="ptolemy"`` are what its director goes by, and the actors that are added then.
     A model that was loaded can be changed in the same way.  Its ``parameters`` are a record of how it was made:
     actors took their values from them then, so they are set with ``load_model(..., set=...)``, not here.
 
@@ -53,11 +54,16 @@ class Model(Scope, Tabled):
         stop: float | str | None = None,
         seed: int = 0,
         parameters: Mapping[str, object] | None = None,
+        ties: str | None = None,
+        like: str | None = None,
     ) -> None:
         super().__init__(self, "")
         self.name = name
         self.doc = doc
         self.draft = Draft()
+        with raising() as problems:
+            rules = director_of(name, {"ties": ties, "like": like}, call_site(), problems)
+        self.draft.graph.rules[""] = Rules().inside(rules.get("ties"), rules.get("like"))
         self.parameters: dict[str, object] = dict(parameters or {})
         self.declared: dict[str, tuple[str, str]] = {}  # unit and doc of the parameters
         self.aspects: list[WovenAspect] = []

@@ -9,12 +9,14 @@ cdef class Turn:
     cdef public object actor
     cdef public Form form
     cdef public long rank
-    cdef public list ports, later, wakes
+    cdef public list keeps, later, ports, wakes
     cdef public Wake wake
     cdef public bint is_wanted
     cpdef add(self, Wake wake)
     @cython.locals(wake=Wake, port=InputPort, due=cython.bint)
     cpdef bint use_wakes(self) except -1
+    @cython.locals(port=InputPort, found=Py_ssize_t)
+    cpdef Py_ssize_t kept(self) except -1
     @cython.locals(port=InputPort)
     cpdef hold(self)
     @cython.locals(port=InputPort)

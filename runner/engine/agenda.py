@@ -14,10 +14,11 @@ class Turn:
     """The place of an actor in the firing order: where it fires for its wake-ups, or for the tokens of some inputs.
 
     ``ports`` are these inputs, ``later`` those whose tokens are taken in a later turn of the same actor; ports that
-    nothing is connected to are left out.  ``wakes`` are the wake-ups of the present tag.
+    nothing is connected to are left out.  ``keeps`` are the actor's inputs that keep tokens, if it has any.  ``wakes``
+    are the wake-ups of the present tag.
     """
 
-    __slots__ = ("actor", "form", "is_wanted", "later", "ports", "rank", "wake", "wakes")
+    __slots__ = ("actor", "form", "is_wanted", "keeps", "later", "ports", "rank", "wake", "wakes")
 
     def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int]) -> None:
         self.actor = actor
@@ -26,6 +27,8 @@ class Turn:
         connected = [port for port in actor.inputs.values() if port.width]
         self.ports: list[InputPort[Any]] = [port for port in connected if ranks[port.path] == rank]
         self.later: list[InputPort[Any]] = [port for port in connected if ranks[port.path] > rank]
+        keeps = [port for port in self.ports if port.keep]
+        self.keeps: list[InputPort[Any]] | None = keeps or None
         self.is_wanted = False  # whether the actor is to have this turn at the present tag
         self.wake: Wake | None = None  # the first of those of the present tag
         self.wakes: list[Wake] | None = None  # the others
@@ -51,9 +54,16 @@ class Turn:
         self.wake = self.wakes = None
         if not due:
             for port in self.ports:
-                if port.arrived:
+                if len(port.arrived) > port.kept:
                     return True
         return due
+
+    def kept(self) -> int:
+        """How many tokens wait at ports that keep them."""
+        found = 0
+        for port in self.keeps or _NOTHING:
+            found += len(port.arrived)
+        return found
 
     def hold(self) -> None:
         """The actor fires: it does not see yet what is for a later turn."""
@@ -64,7 +74,10 @@ class Turn:
         """The actor has fired: what it has not read is gone."""
         for port in self.ports:
             if port.arrived:
-                port.clear()
+                if port.keep:
+                    port.kept = len(port.arrived)
+                else:
+                    port.clear()
         for port in self.later:
             port.shown = port.arrived
 

@@ -47,6 +47,8 @@ cdef class Director:
     cpdef _begin(self, Instant instant)
     cpdef bint use_wakes(self, Turn turn) except -1
     cpdef fire(self, Turn turn)
+    @cython.locals(waiting=Py_ssize_t, left=Py_ssize_t)
+    cpdef _fire_on(self, Turn turn)
     @cython.locals(
         times=Times, instant=Instant, queue=list, is_of_simpy=cython.bint, here=cython.longlong, now=cython.longlong,
         upcoming=cython.longlong, last_time=cython.longlong, last_step=cython.longlong,

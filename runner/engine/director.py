@@ -316,8 +316,24 @@ class Director:
             turn.hold()
         if turn.form is not None:
             turn.form.fire()
-        else:
+        elif turn.keeps is None:
             turn.actor.fire()
+        else:
+            self._fire_on(turn)
+
+    def _fire_on(self, turn: Turn) -> None:
+        """Let an actor fire as long as it takes tokens out of ports that keep them, and leaves others there."""
+        waiting = turn.kept()
+        turn.actor.fire()
+        left = turn.kept()
+        while 0 < left < waiting:
+            turn.clear()
+            if turn.later:
+                turn.hold()
+            self.firings += 1
+            waiting = left
+            turn.actor.fire()
+            left = turn.kept()
 
     def fail(self, turn: Turn, error: BaseException) -> NoReturn:
         """Tell the error of an actor in its turn; one of an aspect on the way of a token, say, has been told."""

@@ -106,7 +106,7 @@ class Execution:
             self._asked = [wake for wake in self._asked if not (wake.due or wake.cancelled)]
         for wake in due:
             wake.due = False
-        taken = {port: port.take() for port in turn.inputs.values() if port.present}
+        taken = {port: port.take() for port in turn.inputs.values() if port.has_new}
         job = Job(self.actor, turn.rank, self._director.last, taken, tuple(due), life=self._life)
         self._director.set_aside(job)
         return job

@@ -363,6 +363,8 @@ def attach(director, actors, besides):
             continue
         inputs = list(actor.inputs.values())
         varying = {each.name for each in inputs if type(each) is not InputPort and each.width}
+        if any(each.keep for each in inputs):
+            continue
         if actor.context is not director or not varying.issubset(getattr(kind, "varying", ())):
             continue
         form = kind()

@@ -4,10 +4,14 @@ from .clock import Clock
 from .digraph import find_loop, in_order
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
 from .ranks import Region, dependencies, firing_order
+from .rules import LIKE, PTOLEMY, TIES, Rules
 from .watched import Metric, Watched
 from .woven import AspectModel, WovenAspect, check_processors, extent
 
 __all__ = [
+    "LIKE",
+    "PTOLEMY",
+    "TIES",
     "AspectModel",
     "Clock",
     "Detour",
@@ -17,6 +21,7 @@ __all__ = [
     "ModelGraph",
     "PortNode",
     "Region",
+    "Rules",
     "Watched",
     "Wire",
     "WovenAspect",

@@ -16,6 +16,7 @@ from epicycle.aspects import Request
 
 from ..text import NORMAL, Limits, Position
 from .clock import Clock
+from .rules import Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +84,8 @@ class ModelGraph:
         self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
         # The composites with a director of their own, which are actors to the graph around them; "" is the model.
         self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
+        # What each of these directors goes by.
+        self.rules: dict[str, Rules] = {"": Rules() if inside is None else inside.rules[director]}
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
         self.modal: dict[str, Modal] = {}  # composites with modes, by their path
         self.priorities: dict[str, int] = {}
@@ -125,7 +128,7 @@ class ModelGraph:
         self._check_open()
         self.ports |= part.ports
         self.members[director] += part.members.pop("")
-        del part.clocks[""]
+        del part.clocks[""], part.rules[""]
         parts = part._parts
         part._parts = {path: each for path, each in parts.items() if path not in self._parts}
         for known, new in zip(self._by_path(), part._by_path(), strict=True):
@@ -138,6 +141,8 @@ class ModelGraph:
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         self._check_open()
+        if self.rules_at(actor.path).are_ptolemys:
+            actor.follow_ptolemy()
         actor.is_part = True
         self.actors[actor.path] = actor
         self._enrol(actor.path)
@@ -162,17 +167,29 @@ class ModelGraph:
         """The actors and composites in a composite, by their names: of an array all instances."""
         return self._parts.get(composite, {})
 
-    def add_director(self, path: str, start: int | None, drift: float) -> None:
-        """Give a composite a director of its own; ``start`` (ns) and ``drift`` are those of its clock."""
+    def add_director(
+        self,
+        path: str,
+        start: int | None = None,
+        drift: float = 1.0,
+        ties: str | None = None,
+        like: str | None = None,
+    ) -> None:
+        """Give a composite a director of its own: with this clock (``start`` in ns), and these rules if they are given."""
         self._check_open()
         outer = self.director_of(path)
         self.members[outer].append(path)
         self.members[path] = []
         self.clocks[path] = self.clocks[outer].inside(start, drift)
+        self.rules[path] = self.rules[outer].inside(ties, like)
+
+    def rules_at(self, path: str) -> Rules:
+        """What the director goes by that an actor or composite stands under."""
+        return self.rules[self.director_of(path)]
 
     def add_refinement(self, path: str) -> None:
         """Give a composite a director of its own, whose time goes on in one mode alone; clocks in it count by that."""
-        self.add_director(path, None, 1.0)
+        self.add_director(path)
         self.clocks[path] = Clock()
 
     def add_composite_port(
@@ -226,7 +243,7 @@ class ModelGraph:
         """What is known of parts, the actors first."""
         return (
             self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
-            self._borders, self._parts, self.modal,
+            self._borders, self._parts, self.modal, self.rules,
         )  # fmt: skip
 
     def remove(self, path: str) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from operator import attrgetter
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -209,15 +211,25 @@ def facts(reference: TypeReference) -> list[str]:
 
 
 def _port_row(port: PortReference) -> list[str]:
+    own, changes = _notes(port), dict[str, Any](port.ptolemy or {})
+    there = _notes(replace(port, **{option: value for option, value in changes.items() if option != "type"}))
+    notes = [note for note, holds in own.items() if holds]
+    notes += [f"{note} like Ptolemy" for note, holds in there.items() if holds and not own.get(note)]
+    notes += [f"not so like Ptolemy: {note}" for note, holds in own.items() if holds and not there.get(note)]
+    return [port.name, port.type, ", ".join(notes), port.doc]
+
+
+def _notes(port: PortReference) -> dict[str, bool]:
+    """What there is to say of a port, and whether it holds."""
     is_input, inputs = port.direction == "input", port.depends_on
-    notes = {
+    return {
         "optional": is_input and not port.required,
         "does not trigger": is_input and not port.triggers,
+        "keeps what is not taken": is_input and port.keep,
         # Such a port may stand in a loop.
         f"depends at once on {' and '.join(inputs or ()) or 'no input'}": not is_input and inputs is not None,
         "any number of connections": port.multi,
     }
-    return [port.name, port.type, ", ".join(note for note, holds in notes.items() if holds), port.doc]
 
 
 def _parameter_row(parameter: ParameterReference) -> list[str]:
@@ -229,4 +241,6 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
     else:
         kind += bounds_text(parameter.min, parameter.above, parameter.max, "{:g}".format)
     default = "required" if parameter.required else shown(parameter.default)
+    if parameter.differs:
+        default += f"; like Ptolemy {shown(parameter.ptolemy)}"
     return [parameter.name, kind, parameter.unit, default, parameter.doc]
