@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from typing import Any
 
 from .core import Actor, InputPort, OutputPort, Parameter, Pending, PortParameter, Tag, Wake, to_seconds, token_type
@@ -11,22 +12,45 @@ class TimeDelay(Actor):
     """Sends each token on after a delay; with delay 0 at the next microstep.
 
     A token is delayed by what ``delay`` is at its own tag, so one may overtake another.  The output does not depend
-    on the inputs at once: the actor may stand in a loop.  Ptolemy: ``TimeDelay``, ``TimedDelay``, ``VariableDelay``.
+    on the inputs at once: the actor may stand in a loop.  With ``steps`` a token keeps its microstep, and those that
+    are due at one time leave one by one, at successive microsteps.  Ptolemy: ``TimeDelay``, ``TimedDelay``,
+    ``VariableDelay``.
     """
 
     input = InputPort(doc="what is delayed")
     output = OutputPort(depends_on=(), doc="each token after its delay")
 
     delay = PortParameter(float, 1.0, unit="s", min=0, doc="how long each token is held")
+    steps = Parameter(bool, False, ptolemy=True, doc="whether tokens keep their microsteps and leave one by one")
 
     def initialize(self) -> None:
         self._held: Pending[Any] = Pending(self)
+        self._line: list[tuple[int, int, int, Any]] = []  # with their times, microsteps and numbers
+        self._number = 0
 
     def fire(self) -> None:
+        if self.steps:
+            self._step()
+            return
         for token in self._held.due():
             self.output.send(token)
         for token in self.input.tokens:
             self._held.put(token, self.delay)
+
+    def _step(self) -> None:
+        """Each token of the tag has a firing of its own, in which at most one leaves that is due."""
+        now = self.tag
+        tokens = self.input.tokens
+        for place in range(max(1, len(tokens))):
+            if self._line and self._line[0][:2] <= now:
+                self.output.send(heapq.heappop(self._line)[3])
+            if self._line and self._line[0][0] <= now.time:
+                self.wake_in(0)
+            if place < len(tokens):
+                wake = self.wake_in(self.delay)
+                microstep = now.microstep if wake.time > now.time else wake.microstep
+                heapq.heappush(self._line, (wake.time, microstep, self._number, tokens[place]))
+                self._number += 1
 
 
 class _Timing(Actor):

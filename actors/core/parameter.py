@@ -326,7 +326,7 @@ class Configurable:
 
     def follow_ptolemy(self) -> None:
         """Engine: parameters that were not given have the defaults that they have in Ptolemy."""
-        given: frozenset[str] = vars(self).get("_given", frozenset())
+        given: frozenset[str] = vars(self).get("_configured", frozenset())
         changed = [each for name, each in declared_parameters(type(self)).items() if each.differs and name not in given]
         for parameter in changed:
             parameter.store(self, parameter.ptolemy_value)
@@ -336,7 +336,7 @@ class Configurable:
     def _configure(self, values: Mapping[str, object]) -> None:
         declared = declared_parameters(type(self))
         if any(parameter.differs for parameter in declared.values()):
-            self._given = frozenset(values)
+            self._configured = frozenset(values)
         for name in values:
             if name not in declared:
                 message = unknown_parameter(type(self), name)

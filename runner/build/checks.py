@@ -208,7 +208,9 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
         # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
         blamed = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
         hints = [
-            f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
+            f"{path} has a director like Ptolemy's: all its outputs depend on all its inputs"
+            if graph.rules[path].are_ptolemys
+            else f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
             for path in dict.fromkeys(actors)
             if path in graph.clocks
         ]

@@ -9,7 +9,18 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..catalogue import take_problem
 from ..collection import without_collection
-from ..graph import Metric, ModelGraph, Rules, Watched, WovenAspect, check_processors, firing_order, is_within
+from ..graph import (
+    Metric,
+    ModelGraph,
+    Postings,
+    Rules,
+    Watched,
+    WovenAspect,
+    check_processors,
+    firing_order,
+    is_within,
+    postings,
+)
 from ..language import Values
 from ..shown import short
 from ..tables import Table, Tabled
@@ -77,7 +88,7 @@ class Model(Scope, Tabled):
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
         self._scopes: dict[str, Composite] = {}
-        self._order: dict[str, int] | None = None  # worked out since then
+        self._order: tuple[dict[str, int], Postings | None] | None = None  # worked out since then
         self.stop = stop
 
     @property
@@ -188,9 +199,16 @@ class Model(Scope, Tabled):
 
     def order(self) -> dict[str, int]:
         """Engine: the firing order of a model that has been checked; the same for all its runs."""
+        return self._ordered()[0]
+
+    def postings(self) -> Postings | None:
+        """Engine: where ties are as they were posted, if they are anywhere."""
+        return self._ordered()[1]
+
+    def _ordered(self) -> tuple[dict[str, int], Postings | None]:
         if self._order is None:
             with without_collection():
-                self._order = firing_order(self.graph)
+                self._order = firing_order(self.graph), postings(self.graph)
         return self._order
 
     # -- changes: what is called here has been found to be right --------------------------------------------------

@@ -11,10 +11,12 @@ cdef class Turn:
     cdef public long rank
     cdef public list keeps, later, ports, wakes
     cdef public Wake wake
-    cdef public bint is_wanted
+    cdef public bint fires_for_nothing, is_own, is_wanted, takes_all
     cpdef add(self, Wake wake)
-    @cython.locals(wake=Wake, port=InputPort, due=cython.bint)
+    @cython.locals(wake=Wake, due=cython.bint)
     cpdef bint use_wakes(self) except -1
+    @cython.locals(port=InputPort, found=Py_ssize_t)
+    cpdef Py_ssize_t new(self) except -1
     @cython.locals(port=InputPort, found=Py_ssize_t)
     cpdef Py_ssize_t kept(self) except -1
     @cython.locals(port=InputPort)

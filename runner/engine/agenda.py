@@ -14,19 +14,28 @@ class Turn:
     """The place of an actor in the firing order: where it fires for its wake-ups, or for the tokens of some inputs.
 
     ``ports`` are these inputs, ``later`` those whose tokens are taken in a later turn of the same actor; ports that
-    nothing is connected to are left out.  ``keeps`` are the actor's inputs that keep tokens, if it has any.  ``wakes``
-    are the wake-ups of the present tag.
+    nothing is connected to are left out.  ``keeps`` are those of its inputs that keep tokens, if there are any.
+    ``wakes`` are the wake-ups of the present tag.
+
+    An actor that takes ``all_at_once`` takes what waits at all its inputs in any of its turns; if that is true, it also
+    fires in a turn for tokens that it has taken before.
     """
 
-    __slots__ = ("actor", "form", "is_wanted", "keeps", "later", "ports", "rank", "wake", "wakes")
+    __slots__ = (
+        "actor", "fires_for_nothing", "form", "is_own", "is_wanted", "keeps", "later", "ports", "rank", "takes_all",
+        "wake", "wakes",
+    )  # fmt: skip
 
-    def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int]) -> None:
+    def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int], all_at_once: bool | None = None) -> None:
         self.actor = actor
         self.form: Form | None = None
         self.rank = rank
         connected = [port for port in actor.inputs.values() if port.width]
-        self.ports: list[InputPort[Any]] = [port for port in connected if ranks[port.path] == rank]
-        self.later: list[InputPort[Any]] = [port for port in connected if ranks[port.path] > rank]
+        self.takes_all = all_at_once is not None
+        self.fires_for_nothing = bool(all_at_once)
+        self.is_own = ranks.get(actor.path) == rank
+        self.ports: list[InputPort[Any]] = [p for p in connected if self.takes_all or ranks[p.path] == rank]
+        self.later: list[InputPort[Any]] = [p for p in connected if not self.takes_all and ranks[p.path] > rank]
         keeps = [port for port in self.ports if port.keep]
         self.keeps: list[InputPort[Any]] | None = keeps or None
         self.is_wanted = False  # whether the actor is to have this turn at the present tag
@@ -52,11 +61,14 @@ class Turn:
                 if not wake.cancelled:
                     wake.due = due = True
         self.wake = self.wakes = None
-        if not due:
-            for port in self.ports:
-                if len(port.arrived) > port.kept:
-                    return True
-        return due
+        return due or self.new() > 0
+
+    def new(self) -> int:
+        """How many tokens have come for it."""
+        found = 0
+        for port in self.ports:
+            found += len(port.arrived) - port.kept
+        return found
 
     def kept(self) -> int:
         """How many tokens wait at ports that keep them."""

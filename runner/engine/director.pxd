@@ -9,7 +9,7 @@ cdef long long _NOTICED
 
 
 cdef class Director:
-    cdef public object _environment, seed, crowd, ranks, _stop_after, _reason
+    cdef public object _all_at_once, _environment, seed, crowd, ranks, _stop_after, _reason
     cdef public list _queue, _recent, _turns
     cdef public Ranks _ready
     cdef public Times _times
@@ -31,6 +31,7 @@ cdef class Director:
     @cython.locals(wake=Wake)
     cpdef Wake _wake_at(self, Turn turn, Instant instant)
     cpdef Turn turn(self, actor, long rank)
+    cpdef Turn new_turn(self, actor, long rank)
     @cython.locals(now=Instant, instant=Instant)
     cpdef later(self, long long delay, way, token)
     cpdef Delivery hold(self, way, token)
@@ -43,6 +44,9 @@ cdef class Director:
     cpdef Instant _await(self, long long time, long microstep)
     @cython.locals(turn=Turn, delivery=Delivery, turns=list, ready=Ranks, place=cython.Py_ssize_t)
     cpdef _handle(self, Instant instant)
+    @cython.locals(is_to_fire=cython.bint, other=Turn)
+    cpdef bint _gather(self, Turn turn) except -1
+    cpdef bint _has_reason(self, Turn turn) except -1
     cpdef _wake_up(self, Turn turn, Wake wake)
     cpdef _begin(self, Instant instant)
     cpdef bint use_wakes(self, Turn turn) except -1

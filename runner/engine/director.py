@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from epicycle.actors import NEVER, InputPort, Moment, Process, Ranks, Tag, Times, Wake, Way, new_wake
+from epicycle.actors import NEVER, InputPort, Moment, Posts, Process, Ranks, Tag, Times, Wake, Way, new_wake
 
 from ..text import NORMAL, Limits, describe
 from . import errors
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from epicycle.actors import Actor
     from epicycle.aspects import Job
 
+    from ..graph import Postings
     from .pace import Pace
 
 REPORTED = 256  # tokens that come together at one port: so many at a time are counted
@@ -50,12 +51,14 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times",
-        "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent", "_stop_after", "_time",
-        "_times", "_turns", "crowd", "firings", "present", "ranks", "seed", "steps",
+        "_all_at_once", "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
+        "_most_times", "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent",
+        "_stop_after", "_time", "_times", "_turns", "crowd", "firings", "present", "ranks", "seed", "steps",
     )  # fmt: skip
 
-    def __init__(self, order: dict[str, int], seed: int, limits: Limits = NORMAL) -> None:
+    def __init__(
+        self, order: dict[str, int], seed: int, limits: Limits = NORMAL, postings: Postings | None = None
+    ) -> None:
         self._environment = Environment(initial_time=0)
         self._queue = self._environment.queue
         self._has_simpy = False  # whether somebody has seen the environment
@@ -75,6 +78,9 @@ class Director:
         # What is to be done: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
         # One entry per actor and tag, whatever the number of its tokens.
         self._ready = Ranks()
+        self._all_at_once = {} if postings is None else postings.actors  # who take all that waits for them
+        if postings is not None:
+            self._ready.posts = Posts(postings.places)
         self._next: Instant | None = None
         self._times = Times()
         self._rank = -1  # the rank of what is handled now
@@ -161,8 +167,12 @@ class Director:
         """The turn of a rank, which ``actor`` has: an actor of the model, or who stands in for it."""
         turn = self._turns[rank]
         if turn is None:
-            turn = self._turns[rank] = Turn(actor, rank, self.ranks)
+            turn = self._turns[rank] = self.new_turn(actor, rank)
         return turn
+
+    def new_turn(self, actor: Actor, rank: int) -> Turn:
+        """A turn of an actor, or who stands in for it, at a rank."""
+        return Turn(actor, rank, self.ranks, self._all_at_once.get(actor.path))
 
     def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
         """What puts tokens into a port at the present tag, and lets its actor fire, or who stands in for it."""
@@ -200,6 +210,12 @@ class Director:
         now = self.tag
         is_over = self.present is not None and self._rank >= rank
         return Tag(now.time, now.microstep + 1) if is_over else now
+
+    def is_to_come(self, first: int, last: int) -> bool:
+        """Whether any turn of these ranks is still to come at the present tag, and none of them is being taken."""
+        if self.present is None or first <= self._rank <= last:
+            return False
+        return any(turn is not None and turn.is_wanted for turn in self._turns[first : last + 1])
 
     def set_aside(self, job: Job) -> None:
         """A firing is put off: what it is for does not belong to the next one of its actor."""
@@ -253,6 +269,8 @@ class Director:
 
     def _handle(self, instant: Instant) -> None:
         turns, ready = self._turns, self._ready
+        if ready.posts is not None:
+            ready.posts.settle()
         if instant.turn is not None:
             self._wake_up(instant.turn, instant.wake)
         if instant.turns is not None and instant.wakes is not None:
@@ -271,7 +289,10 @@ class Director:
                 assert turn is not None
                 turn.is_wanted = False
                 self._rank = turn.rank
-                if turn.wake is not None and not self.use_wakes(turn):
+                if turn.takes_all:
+                    if not self._gather(turn):
+                        continue
+                elif turn.wake is not None and not self.use_wakes(turn):
                     continue
                 if self.present is not instant:
                     self._begin(instant)
@@ -284,8 +305,32 @@ class Director:
         if self._next is None:
             self.present = None
 
+    def _gather(self, turn: Turn) -> bool:
+        """Let an actor that takes all that waits have the turns of its own that come next, too.
+
+        False if it has nothing to fire for.
+        """
+        is_to_fire = self._has_reason(turn)
+        posts = self._ready.posts
+        while posts is not None and posts.first() >= 0:
+            other = self._turns[posts.first()]
+            assert other is not None
+            if other.actor is not turn.actor:
+                break
+            self._ready.pop()
+            other.is_wanted = False
+            is_to_fire = self._has_reason(other) or is_to_fire
+        return is_to_fire
+
+    def _has_reason(self, turn: Turn) -> bool:
+        if turn.wake is not None:
+            return self.use_wakes(turn)
+        return turn.is_own or turn.fires_for_nothing or turn.new() > 0
+
     def _wake_up(self, turn: Turn, wake: Wake | None) -> None:
         if wake is not None:
+            if wake.cancelled:
+                return
             turn.add(wake)
         if not turn.is_wanted:
             turn.is_wanted = True

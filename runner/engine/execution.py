@@ -37,7 +37,6 @@ class Execution:
         self.forget: Callable[[], None] = _nothing
         self.refinement: Refinement | None = None  # that it is in, if errors in there lead to a transition
         self.seed = director.seed
-        self.ranks = director.ranks
         self.environment = local.environment
         self.stop = local.stop
         self._director = director
@@ -45,8 +44,11 @@ class Execution:
         # An actor has a turn for each rank at which it takes tokens, and one for its wake-ups.
         self._turns: dict[int, _StandIn] = {}
         for port in actor.inputs.values():
-            self._turn_at(director.ranks[port.path]).inputs[port.name] = port
-        self._own = self._turn_at(director.ranks[actor.path])
+            self._stand_in(director.ranks[port.path]).inputs[port.name] = port
+        self._own = self._stand_in(director.ranks[actor.path])
+        if self.turn_at(self._own.rank).takes_all:
+            for turn in self._turns.values():
+                turn.inputs.update(actor.inputs)
         self._open: int | None = None  # the rank of its turn, while the actor itself does nothing
         self._asked: list[Wake] = []  # wake-ups that are to come
         self._ready: dict[Wake, Job] = {}  # what is to be executed, and by when
@@ -56,10 +58,14 @@ class Execution:
         self._held: list[Job] = []
         self._waiting: list[Job] = []
 
-    def _turn_at(self, rank: int) -> _StandIn:
+    def _stand_in(self, rank: int) -> _StandIn:
         if rank not in self._turns:
             self._turns[rank] = _StandIn(self, rank)
         return self._turns[rank]
+
+    def turn_at(self, rank: int) -> Turn:
+        """A turn as the actor itself would have it."""
+        return self._director.new_turn(self.actor, rank)
 
     # -- as the actor's context -----------------------------------------------------------------------------------
 
@@ -211,7 +217,7 @@ class _StandIn(Actor):
     def of_actor(self) -> Turn:
         """The turn as the actor itself would have it."""
         if self._of_actor is None:
-            self._of_actor = Turn(self._execution.actor, self.rank, self._execution.ranks)
+            self._of_actor = self._execution.turn_at(self.rank)
         return self._of_actor
 
     def fire(self) -> None:

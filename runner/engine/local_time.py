@@ -14,7 +14,7 @@ from simpy.events import NORMAL, Event, EventPriority
 
 from epicycle.actors import Actor, Tag, Wake, Way
 
-from ..graph import Clock
+from ..graph import Clock, is_within
 from .agenda import Delivery
 from .director import Director
 from .refinement import Refinement
@@ -84,7 +84,8 @@ class LocalEnvironment(simpy.Environment):
 class Passage(Actor):
     """A port of a composite with a director of its own: at each tag it lets one token of each channel through.
 
-    What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.
+    What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.  With
+    a ``border`` it lets one token through in each firing of the composite.
     """
 
     def __init__(self, path: str, director: Director | Refinement) -> None:
@@ -92,11 +93,14 @@ class Passage(Actor):
         self.enter(director)
         self.gate: Refinement | None = None  # behind it, which may be closed: what comes then is lost
         self.beside: Actor | None = None  # who fires when something has come through
+        self.border: Border | None = None
+        self.requests: deque[Delivery] = deque()  # to an aspect that is a model, which wait for its turn
         self._director = director
         self._lanes: dict[object, _Lane] = {}
 
     def clear(self) -> None:
         """Forget what waits."""
+        self.requests.clear()
         for lane in self._lanes.values():
             lane.waiting.clear()
 
@@ -111,6 +115,9 @@ class Passage(Actor):
         return Call(arrive)
 
     def fire(self) -> None:
+        if self.border is not None:
+            self._let_through(self.border)
+            return
         now = self.tag
         if self.gate is not None and not self.gate.is_open:
             self.clear()
@@ -120,8 +127,70 @@ class Passage(Actor):
             if lane.waiting and lane.passed != now:
                 lane.passed = now
                 lane.waiting.popleft().arrive()
-        if any(lane.waiting for lane in self._lanes.values()):
+        if self.is_waited_for:
             self.wake_in(0)
+
+    @property
+    def is_waited_for(self) -> bool:
+        """Whether tokens wait."""
+        return any(lane.waiting for lane in self._lanes.values())
+
+    def _let_through(self, border: Border) -> None:
+        while self.requests:
+            self.requests.popleft().arrive()
+        for lane in self._lanes.values():
+            if lane.waiting:
+                lane.waiting.popleft().arrive()
+        if self.is_waited_for:
+            border.go_on(self)
+
+    def await_turn(self, onward: Way) -> Way:
+        """Where a request goes that waits until the composite fires; all of them go on then."""
+        border, waiting = self.border, self.requests
+        assert border is not None
+
+        def arrive(token: Any) -> None:
+            waiting.append(self._director.hold(onward, token))
+            if border.is_to_come:
+                self._director.trigger(self)
+            else:
+                self.wake_in(0)
+
+        return Call(arrive)
+
+
+class Border(Actor):
+    """The end of a composite whose director is like Ptolemy's: as long as tokens wait at its inputs, it fires again.
+
+    In each of its firings one token of each channel passes its ports.
+    """
+
+    def __init__(self, path: str, director: Director, outside: Director | Refinement) -> None:
+        super().__init__(path)
+        self.enter(outside)
+        self.inputs_before: list[Passage] = []
+        self.outputs_behind: list[Passage] = []
+        self._director = director
+        self._outside = outside
+        ranks = [rank for each, rank in director.ranks.items() if is_within(each, path)]
+        self._first, self._last = min(ranks), max(ranks)
+
+    @property
+    def is_to_come(self) -> bool:
+        """Whether the composite is yet to fire at the present tag."""
+        return self._director.is_to_come(self._first, self._last)
+
+    def go_on(self, passage: Passage) -> None:
+        """Tokens are left at a port."""
+        if passage in self.inputs_before:
+            self._outside.trigger(self)
+        else:
+            passage.wake_in(0)
+
+    def fire(self) -> None:
+        for passage in (*self.inputs_before, *self.outputs_behind):
+            if passage.is_waited_for:
+                self._outside.trigger(passage)
 
 
 class _Lane:

@@ -58,7 +58,9 @@ class Run:
         order, limits = model.order(), model.graph.limits
         self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
         self.director = (
-            Director(order, seed, limits) if tracer is None else TracingDirector(order, seed, tracer, limits)
+            Director(order, seed, limits, model.postings())
+            if tracer is None
+            else TracingDirector(order, seed, tracer, limits, model.postings())
         )
         self.log.crowd = self.director.crowd.add
         self.signals = {name: Signal(name) for name in model.recorded}

@@ -35,7 +35,7 @@ from .aspect_context import EngineContext
 from .director import Director
 from .errors import ActorError, LoopError
 from .execution import Execution
-from .local_time import LocalDirector, Passage
+from .local_time import Border, LocalDirector, Passage
 from .parameters import VaryingParameter
 from .refinement import Conductor, Refinement
 from .requests import Requests
@@ -119,6 +119,8 @@ class Ways:
         outside = self._base(self.graph.director_of(composite)) if composite else self.director
         for paths in self.graph.borders(composite):
             self._passages.update({path: Passage(path, outside) for path in paths})
+        if self.graph.refires(composite):
+            self._add_border(composite, outside)
         self._directors[composite] = self._made_director(composite, clock)
         if composite in self.graph.modal:
             machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
@@ -127,6 +129,16 @@ class Ways:
             if machine.is_preemptive:
                 for path in self.graph.borders(composite)[0]:
                     self._passages[path].beside = conductor
+
+    def _add_border(self, composite: str, outside: Director | Refinement) -> None:
+        """Let a composite fire again as long as tokens wait at its inputs."""
+        border = Border(composite, self.director, outside)
+        for paths, passages in zip(
+            self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
+        ):
+            passages += (self._passages[path] for path in paths)
+            for passage in passages:
+                passage.border = border
 
     def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
         if not composite or self.graph.refinement_of(composite) != composite:
@@ -246,7 +258,11 @@ class Ways:
                 if path not in ways:
                     ways[path] = all_of(self._branches(path, ()))
                 passage = self._passages.get(path)
-                onward = ways[path] if passage is None else passage.lane(place, ways[path])
+                onward = ways[path]
+                if passage is not None and passage.border is not None:
+                    onward = passage.await_turn(requests.told(place, onward))
+                elif passage is not None:
+                    onward = passage.lane(place, onward)
                 requests.entries[place] = self._woven(path, path, onward).go
 
     def _heard(self, path: str) -> list[Way]:

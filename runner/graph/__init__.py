@@ -3,7 +3,7 @@
 from .clock import Clock
 from .digraph import find_loop, in_order
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
-from .ranks import Region, dependencies, firing_order
+from .ranks import Postings, Region, dependencies, firing_order, postings
 from .rules import LIKE, PTOLEMY, TIES, Rules
 from .watched import Metric, Watched
 from .woven import AspectModel, WovenAspect, check_processors, extent
@@ -20,6 +20,7 @@ __all__ = [
     "Modal",
     "ModelGraph",
     "PortNode",
+    "Postings",
     "Region",
     "Rules",
     "Watched",
@@ -32,4 +33,5 @@ __all__ = [
     "firing_order",
     "in_order",
     "is_within",
+    "postings",
 ]

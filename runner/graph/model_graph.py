@@ -47,10 +47,11 @@ class Detour(Hop):
     """A part of the way that tokens take through an aspect that is a model, within the tag: it orders firings.
 
     Tokens go from where they are sent to the composite's request port, and from its response port to where they were
-    going.
+    going.  Where it ``waits`` for the composite's turn, it orders nothing.
     """
 
     aspect: str
+    waits: bool = False
 
 
 @dataclass(frozen=True)
@@ -175,7 +176,7 @@ class ModelGraph:
         ties: str | None = None,
         like: str | None = None,
     ) -> None:
-        """Give a composite a director of its own: with this clock (``start`` in ns), and these rules if they are given."""
+        """Give a composite a director of its own, with this clock (``start`` in ns) and these rules if given."""
         self._check_open()
         outer = self.director_of(path)
         self.members[outer].append(path)
@@ -186,6 +187,12 @@ class ModelGraph:
     def rules_at(self, path: str) -> Rules:
         """What the director goes by that an actor or composite stands under."""
         return self.rules[self.director_of(path)]
+
+    def refires(self, director: str) -> bool:
+        """Whether a composite fires again at a tag as long as tokens wait at its inputs, as in Ptolemy."""
+        if not director or director not in self.rules or director in self.modal:
+            return False
+        return self.rules[director].are_ptolemys and self.refinement_of(director) != director
 
     def add_refinement(self, path: str) -> None:
         """Give a composite a director of its own, whose time goes on in one mode alone; clocks in it count by that."""

@@ -207,11 +207,20 @@ def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
 
 # -- composite classes --------------------------------------------------------------------------------------------
 
-_RULES = {
-    key: Key(node_as(schema_of(each)), f"{each.doc[:1].upper()}{each.doc[1:]} (default: as around it).")
-    for key, each in (("ties", TIES), ("like", LIKE))
-}
-MODEL_DIRECTOR = Construct("What the director of the model goes by, and those inside that say nothing else.", _RULES)
+
+def _rules(**defaults: str) -> dict[str, Key]:
+    """What a director goes by."""
+    said = {"ties": TIES, "like": LIKE}
+    return {
+        key: Key(node_as(schema_of(each)), f"{each.doc[:1].upper()}{each.doc[1:]} (default: {defaults[key]}).")
+        for key, each in said.items()
+    }
+
+
+MODEL_DIRECTOR = Construct(
+    "What the director of the model goes by, and those inside that say nothing else.",
+    _rules(ties="declared", like="epicycle"),
+)
 DIRECTOR = Construct(
     "A director of its own, with a local clock.",
     {
@@ -219,7 +228,7 @@ DIRECTOR = Construct(
             node_as(computed("number", unit="s")), "The local time when the run begins (default: as around it)."
         ),
         "drift": Key(node_as(computed("number", unit="1")), "How fast local time goes, 1 being as fast as around it."),
-        **_RULES,
+        **_rules(ties="as around it", like="as around it"),
     },
 )
 DOC = Key(TEXT, "What it shows or does.")
