@@ -24,33 +24,42 @@ class TimeDelay(Actor):
     steps = Parameter(bool, False, ptolemy=True, doc="whether tokens keep their microsteps and leave one by one")
 
     def initialize(self) -> None:
-        self._held: Pending[Any] = Pending(self)
-        self._line: list[tuple[int, int, int, Any]] = []  # with their times, microsteps and numbers
-        self._number = 0
+        self._held: Pending[Any] | _Steps = _Steps(self) if self.steps else Pending(self)
 
     def fire(self) -> None:
-        if self.steps:
-            self._step()
-            return
         for token in self._held.due():
             self.output.send(token)
         for token in self.input.tokens:
             self._held.put(token, self.delay)
 
-    def _step(self) -> None:
-        """Each token of the tag has a firing of its own, in which at most one leaves that is due."""
-        now = self.tag
-        tokens = self.input.tokens
-        for place in range(max(1, len(tokens))):
-            if self._line and self._line[0][:2] <= now:
-                self.output.send(heapq.heappop(self._line)[3])
-            if self._line and self._line[0][0] <= now.time:
-                self.wake_in(0)
-            if place < len(tokens):
-                wake = self.wake_in(self.delay)
-                microstep = now.microstep if wake.time > now.time else wake.microstep
-                heapq.heappush(self._line, (wake.time, microstep, self._number, tokens[place]))
-                self._number += 1
+
+class _Steps:
+    """What a delay holds that keeps microsteps: as in Ptolemy, where an actor has a firing for each token that comes.
+
+    In each of them one leaves at most that is due, and what is left is looked at again at the next microstep.
+    """
+
+    def __init__(self, actor: TimeDelay) -> None:
+        self._actor = actor
+        self._line: list[tuple[int, int, int, Any]] = []  # tokens with their times, microsteps and numbers
+        self._number = 0
+
+    def put(self, token: Any, delay: float) -> None:
+        """Keep a token for ``delay`` seconds; 0 is the next microstep."""
+        now, wake = self._actor.tag, self._actor.wake_in(delay)
+        microstep = now.microstep if wake.time > now.time else wake.microstep
+        heapq.heappush(self._line, (wake.time, microstep, self._number, token))
+        self._number += 1
+
+    def due(self) -> list[Any]:
+        """Take out what leaves now."""
+        now, found = self._actor.tag, list[Any]()
+        most = max(1, len(self._actor.input.tokens))
+        while self._line and self._line[0][:2] <= now and len(found) < most:
+            found.append(heapq.heappop(self._line)[3])
+        if self._line and self._line[0][0] <= now.time:
+            self._actor.wake_in(0)
+        return found
 
 
 class _Timing(Actor):

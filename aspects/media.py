@@ -97,9 +97,9 @@ class Bus(Medium):
     The carriage of a message takes ``factor`` * length.  It arrives when that is over, and when that is at once it
     leaves no trace, or, with ``steps``, takes a microstep.  At the output of its sender a broadcast is carried once, at
     the inputs of its receivers once for each.  Events: ``delayed``, when it arrives, with the seconds since it came;
-    ``dropped``, for want of a place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share in
-    which the bus carries; ``mean_wait``, the mean time from coming to the begin of carriage; ``mean_queue``, the mean
-    number that wait.
+    ``dropped``, for want of a place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share
+    in which the bus carries; ``mean_wait``, the mean time from coming to the begin of carriage; ``mean_queue``, the
+    mean number that wait.
 
     With Poisson arrivals at rate a and a constant carriage s it is M/D/1: utilisation r = a s and
     mean_wait = r s / (2 (1 - r)) (Pollaczek-Khinchine); with priorities, mean_wait of class k is

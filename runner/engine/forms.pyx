@@ -32,10 +32,12 @@ cdef class DelayForm(Native):
     cdef public long long delay
 
     cdef bint take(self) except -1:
+        if self.actor.steps:
+            return False
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.line = self.actor._held._line
         self.delay = nanoseconds_of(self.actor.delay)
-        return self.output is not None and not self.actor.steps
+        return self.output is not None
 
     cpdef fire(self):
         cdef Py_ssize_t place
@@ -330,7 +332,7 @@ SOURCES = (
     ("sources.py", "PoissonClock", "3d48035a29d3f078"),
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
     ("arithmetic.py", "Scale", "3aafcbc1e5e5c3de"),
-    ("timing.py", "TimeDelay", "be4d4e586dc83cd1"),
+    ("timing.py", "TimeDelay", "2525e8b2de82467c"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),
     ("core/tag.py", "to_nanoseconds", "150cad21f6cd87f7"),

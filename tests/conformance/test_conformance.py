@@ -4,6 +4,9 @@
 ``time_delay``.  ``sends/`` holds what Ptolemy II 11.0-devel sent.  Cleared sends ("null" there), which do nothing, are
 left out on both sides; so are the actors that only check values (``Test``, ``NonStrictTest``), for the comparison takes
 their place.
+
+``like_ptolemy/`` holds models once more that depart from Ptolemy's where they stand in ``models/``, or are not quite
+Ptolemy's there: with ``director: {like: ptolemy}`` they are.  All others match with it as they do without it.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import csv
 import json
 import re
 from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import pytest
@@ -72,8 +76,21 @@ def recorded(case: str) -> Sends:
         ]
 
 
-def load(case: str) -> Model:
-    return load_model(HERE / "models" / f"{case}.yaml", types=TYPES)
+def load(case: str, folder: str = "models") -> Model:
+    return load_model(HERE / folder / f"{case}.yaml", types=TYPES)
+
+
+def load_like_ptolemy(case: str, folder: Path) -> Model:
+    """The same model, and nothing else, with Ptolemy's rules and defaults."""
+    if (HERE / "like_ptolemy" / f"{case}.yaml").is_file():
+        return load(case, "like_ptolemy")
+    file = folder / f"{case}.yaml"
+    file.write_text(
+        (HERE / "models" / file.name).read_text(encoding="utf-8") + "director: {like: ptolemy}\n", encoding="utf-8"
+    )
+    if (HERE / "models" / case).is_dir():  # what it reads
+        copytree(HERE / "models" / case, folder / case)
+    return load_model(file, types=TYPES)
 
 
 def sends(model: Model) -> Sends:
@@ -129,7 +146,16 @@ CASES = [
 
 @pytest.mark.parametrize("case", CASES)
 def test_sends_as_ptolemy(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = load(case)
+    compare(load(case), case, monkeypatch)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_sends_like_ptolemy(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compare(load_like_ptolemy(case, tmp_path), case, monkeypatch)
+
+
+def compare(model: Model, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """See that a model sends what Ptolemy sent."""
     monkeypatch.setattr(TestActorPortDepth, "depths", depths(model.graph, "", dependencies(model.graph)[""]))
     found, expected = sends(model), recorded(case)
     same = slice(2 if case in OTHER_MICROSTEPS else 1, 4)
@@ -162,6 +188,30 @@ def test_an_aspect_that_is_a_model() -> None:
         return time, microstep + late, port, channel, value
 
     assert sorted(map(ptolemys, found), key=repr) == sorted(expected, key=repr)
+    assert sorted(map(ptolemys, requests(model))) == sorted(inside)
+
+
+def test_an_aspect_that_is_a_model_like_ptolemy() -> None:
+    """Requests wait for the turn of the aspect: all is as there, what comes in by its request ports, too."""
+    model = load(QUANTITY_MANAGER, "like_ptolemy")
+    expected, inside = came_in(model, recorded(QUANTITY_MANAGER))
+    assert [(*send[:4], requested(send[4])) for send in sends(model)] == expected
+    assert sorted(requests(model)) == sorted(inside)
+
+
+def test_aspects_that_are_models_like_ptolemy() -> None:
+    """All is as there but for the microstep at which the first firing is asked for.
+
+    There, what is asked of an aspect for firings goes by the microstep that its director had last: it had none before.
+    """
+    model = load(REFIRING, "like_ptolemy")
+    expected, inside = came_in(model, recorded(REFIRING))
+
+    def ptolemys(send: tuple[float, int, str, int, Any]) -> tuple[float, int, str, int, Any]:
+        time, microstep, port, channel, value = send
+        return time, microstep - (time == 1 and port.startswith("execution.")), port, channel, value
+
+    assert [ptolemys((*send[:4], requested(send[4]))) for send in sends(model)] == expected
     assert sorted(map(ptolemys, requests(model))) == sorted(inside)
 
 
