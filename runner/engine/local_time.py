@@ -136,6 +136,9 @@ class Passage(Actor):
         return any(lane.waiting for lane in self._lanes.values())
 
     def _let_through(self, border: Border) -> None:
+        if not border.lets_pass(self):
+            self.wake_in(0)
+            return
         while self.requests:
             self.requests.popleft().arrive()
         for lane in self._lanes.values():
@@ -162,7 +165,8 @@ class Passage(Actor):
 class Border(Actor):
     """The end of a composite whose director is like Ptolemy's: as long as tokens wait at its inputs, it fires again.
 
-    In each of its firings one token of each channel passes its ports.
+    In each of its firings one token of each channel passes its ports.  What an actor sends whose firing was put off
+    from outside leaves at the next microstep, unless the composite fires at this tag for what comes in.
     """
 
     def __init__(self, path: str, director: Director, outside: Director | Refinement) -> None:
@@ -174,11 +178,25 @@ class Border(Actor):
         self._outside = outside
         ranks = [rank for each, rank in director.ranks.items() if is_within(each, path)]
         self._first, self._last = min(ranks), max(ranks)
+        self._came_in: Tag | None = None  # when something did
+        self._resumed: Tag | None = None  # when a firing was executed that had been put off
 
     @property
     def is_to_come(self) -> bool:
         """Whether the composite is yet to fire at the present tag."""
         return self._director.is_to_come(self._first, self._last)
+
+    def resume(self) -> None:
+        """An actor inside fires now whose firing was put off from outside."""
+        self._resumed = self.tag
+
+    def lets_pass(self, passage: Passage) -> bool:
+        """Whether what waits at a port may pass it now."""
+        now = self.tag
+        if passage in self.inputs_before:
+            self._came_in = now
+            return True
+        return self._resumed != now or self._came_in == now
 
     def go_on(self, passage: Passage) -> None:
         """Tokens are left at a port."""

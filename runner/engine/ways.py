@@ -96,6 +96,7 @@ class Ways:
         self._directors: dict[str, Director | LocalDirector | Refinement] = {}
         self._conductors: dict[str, Conductor] = {}
         self._passages: dict[str, Passage] = {}
+        self._borders: dict[str, Border] = {}
         self._refinements: dict[str, Refinement] = {}
         for composite, clock in self.graph.clocks.items():
             self._add_director(composite, clock)
@@ -111,6 +112,9 @@ class Ways:
             if self._is_caught(path):
                 refinement = self._refinements[self.graph.refinement_of(path)]
                 execution.refinement = refinement
+            around = self.graph.director_of(path)
+            if any(self.graph.director_of(woven.name) != around for woven in self._woven_at.get(path, ())):
+                execution.border = self._borders.get(around)
             execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
 
@@ -132,7 +136,7 @@ class Ways:
 
     def _add_border(self, composite: str, outside: Director | Refinement) -> None:
         """Let a composite fire again as long as tokens wait at its inputs."""
-        border = Border(composite, self.director, outside)
+        border = self._borders[composite] = Border(composite, self.director, outside)
         for paths, passages in zip(
             self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
         ):
