@@ -109,6 +109,8 @@ def test_one_aspect_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
         "max": 1,
         "choices": [],
         "doc": "probability that a message is lost",
+        "differs": False,
+        "ptolemy": None,
     }
 
 
