@@ -143,6 +143,12 @@ class Ways:
             passages += (self._passages[path] for path in paths)
             for passage in passages:
                 passage.border = border
+        around = composite
+        while around and border.poster is None:
+            around = around.rpartition(".")[0]
+            border.poster = self._borders.get(around)
+        border.nesting = 0 if border.poster is None else border.poster.nesting + 1
+        self.director.posters[composite] = border
 
     def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
         if not composite or self.graph.refinement_of(composite) != composite:
@@ -223,6 +229,12 @@ class Ways:
     def executed(self) -> Container[str]:
         """The actors that aspects stand at, or whose parameters they change."""
         return self._executions
+
+    def post(self, before: str, path: str) -> None:
+        """Of the actors at the start, the second is initialized after the first: see what is done with then."""
+        for composite, border in reversed(self._borders.items()):
+            if is_within(before, composite) and not is_within(path, composite):
+                border.post()
 
     def open(self) -> None:
         """From now on tokens can be sent."""

@@ -101,6 +101,59 @@ def test_a_composite_fires_again_at_a_tag_for_tokens_that_wait_at_its_inputs() -
     ]
 
 
+NEXT = """
+composites:
+  C:
+    parameters: {between: }
+    director: {}
+    actors:
+      first: {type: Wakes, at: [5]}
+      second: {type: Wakes, at: "${[between]}"}
+  Around: {parameters: {between: }, director: {}, actors: {c: {type: C, between: "${between}"}}}
+actors:
+  early: {type: TYPE, between: 0.5}
+  alone: {type: Wakes, at: [1], then: 5}
+  late: {type: TYPE, between: 3}
+"""
+
+
+class Wakes(Actor):
+    """Wakes up at times, at the last of which it asks for another one; sends at whole multiples of 5 s."""
+
+    is_source: ClassVar[bool] = True
+    output: OutputPort[Any] = OutputPort(Any)
+    at: Parameter[Any] = Parameter(object)
+    then = Parameter(float, 0.0)
+
+    def initialize(self) -> None:
+        for time in self.at:
+            self.wake_at(time)
+
+    def fire(self) -> None:
+        if self.now == self.at[-1] and self.then:
+            self.wake_at(self.then)
+        if self.now == 5:
+            self.output.send(self.now)
+
+
+@pytest.mark.parametrize("kind", ["C", "Around"])
+def test_a_composite_is_posted_for_what_comes_first_in_it(kind: str) -> None:
+    """Whenever it has fired: for 5 s after its firing between, which is before the other actor's or behind it."""
+    inner = ".c" if kind == "Around" else ""
+    ours = [f"early{inner}.first", f"late{inner}.first"]
+    text = NEXT.replace("TYPE", kind)
+    for head, order in (
+        ("director: {ties: posted}\n", [*ours, "alone"]),
+        (LIKE, [ours[0], "alone", ours[1]]),
+        ("director: {like: ptolemy, ties: declared}\n", [ours[0], "alone", ours[1]]),
+        ("", [ours[0], "alone", ours[1]]),
+    ):
+        _, results = simulate(head + text, types=[*TYPES, Wakes])
+        assert [port.rpartition(".")[0] for _, _, port, _ in sends(results)] == order
+    _, results = simulate(LIKE + text.replace("between: 0.5", "between: 4"), types=[*TYPES, Wakes])
+    assert [port.rpartition(".")[0] for _, _, port, _ in sends(results)] == ["alone", ours[1], ours[0]]
+
+
 LOOP = """
 composites:
   C:
