@@ -6,9 +6,9 @@ from epicycle.actors cimport InputPort, Moment, Wake, Way, is_alone
 
 @cython.final
 cdef class Turn:
-    cdef public object actor
+    cdef public object actor, poster
     cdef public Form form
-    cdef public long rank
+    cdef public long nesting, rank
     cdef public list keeps, later, ports, wakes
     cdef public Wake wake
     cdef public bint fires_for_nothing, is_own, is_wanted, takes_all
@@ -35,6 +35,8 @@ cdef class Instant(Moment):
     cdef public Turn turn
     cdef public Wake wake
     cpdef add(self, Turn turn, Wake wake)
+    @cython.locals(found=list)
+    cpdef arrange(self)
 
 
 @cython.locals(instant=Instant)

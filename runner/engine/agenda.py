@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from epicycle.actors import Actor, InputPort, Moment, Wake, Way, is_alone
 
 _NOTHING: list[Any] = []  # what a port shows whose tokens are for a later turn
+
+
+class Poster(Protocol):
+    """What asks for turns of a composite that fires as one, for what is in it."""
+
+    poster: Poster | None  # of the one around it
+    nesting: int
+
+    def note(self, time: int, microstep: int) -> None:
+        """Something inside has asked for a turn."""
 
 
 class Turn:
@@ -17,13 +27,14 @@ class Turn:
     nothing is connected to are left out.  ``keeps`` are those of its inputs that keep tokens, if there are any.
     ``wakes`` are the wake-ups of the present tag.
 
+    ``poster`` posts it, for a composite that is posted as a whole; ``nesting`` is how many of those are around it.
     An actor that takes ``all_at_once`` takes what waits at all its inputs in any of its turns; if that is true, it also
     fires in a turn for tokens that it has taken before.
     """
 
     __slots__ = (
-        "actor", "fires_for_nothing", "form", "is_own", "is_wanted", "keeps", "later", "ports", "rank", "takes_all",
-        "wake", "wakes",
+        "actor", "fires_for_nothing", "form", "is_own", "is_wanted", "keeps", "later", "nesting", "ports", "poster",
+        "rank", "takes_all", "wake", "wakes",
     )  # fmt: skip
 
     def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int], all_at_once: bool | None = None) -> None:
@@ -38,6 +49,8 @@ class Turn:
         self.later: list[InputPort[Any]] = [p for p in connected if not self.takes_all and ranks[p.path] > rank]
         keeps = [port for port in self.ports if port.keep]
         self.keeps: list[InputPort[Any]] | None = keeps or None
+        self.poster: Poster | None = None
+        self.nesting = 0
         self.is_wanted = False  # whether the actor is to have this turn at the present tag
         self.wake: Wake | None = None  # the first of those of the present tag
         self.wakes: list[Wake] | None = None  # the others
@@ -127,6 +140,19 @@ class Instant(Moment):
         else:
             self.turns.append(turn)
             self.wakes.append(wake)
+
+    def arrange(self) -> None:
+        """Put what is inside of a composite that is posted as a whole behind what posts it."""
+        if self.turn is None or self.turns is None or self.wakes is None:
+            return
+        found = [(self.turn, self.wake), *zip(self.turns, self.wakes, strict=True)]
+        found.sort(key=_nesting)
+        (self.turn, self.wake), *rest = found
+        self.turns, self.wakes = [turn for turn, _ in rest], [wake for _, wake in rest]
+
+
+def _nesting(entry: tuple[Turn, Wake | None]) -> int:
+    return entry[0].nesting
 
 
 def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:

@@ -11,6 +11,7 @@ cdef long long _NOTICED
 cdef class Director:
     cdef public object _all_at_once, _environment, seed, crowd, ranks, _stop_after, _reason
     cdef public list _queue, _recent, _turns
+    cdef public dict posters
     cdef public Ranks _ready
     cdef public Times _times
     cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps, _time
@@ -31,6 +32,7 @@ cdef class Director:
     @cython.locals(wake=Wake)
     cpdef Wake _wake_at(self, Turn turn, Instant instant)
     cpdef Turn turn(self, actor, long rank)
+    @cython.locals(turn=Turn)
     cpdef Turn new_turn(self, actor, long rank)
     @cython.locals(now=Instant, instant=Instant)
     cpdef later(self, long long delay, way, token)

@@ -31,7 +31,7 @@ from epicycle.actors import NEVER, InputPort, Moment, Posts, Process, Ranks, Tag
 
 from ..text import NORMAL, Limits, describe
 from . import errors
-from .agenda import Delivery, Instant, Turn, new_instant
+from .agenda import Delivery, Instant, Poster, Turn, new_instant
 from .environment import Environment
 from .errors import ActorError, Crowd, CrowdError, LoopError, of_process
 from .pace import notice
@@ -53,7 +53,7 @@ class Director:
     __slots__ = (
         "_all_at_once", "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
         "_most_times", "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent",
-        "_stop_after", "_time", "_times", "_turns", "crowd", "firings", "present", "ranks", "seed", "steps",
+        "_stop_after", "_time", "_times", "_turns", "crowd", "firings", "posters", "present", "ranks", "seed", "steps",
     )  # fmt: skip
 
     def __init__(
@@ -79,6 +79,7 @@ class Director:
         # One entry per actor and tag, whatever the number of its tokens.
         self._ready = Ranks()
         self._all_at_once = {} if postings is None else postings.actors  # who take all that waits for them
+        self.posters: dict[str, Poster] = {}  # of composites that are posted as a whole
         if postings is not None:
             self._ready.posts = Posts(postings.places)
         self._next: Instant | None = None
@@ -150,17 +151,23 @@ class Director:
             return now
         instant = self._to_come(now, time)
         instant.add(turn, None)
+        if turn.poster is not None:
+            turn.poster.note(instant.time, instant.microstep)
         return instant
 
     def _call_now(self, turn: Turn, now: Instant) -> Wake:
         wake = new_wake(now.time, now.microstep)
         turn.add(wake)
         self.want(turn)
+        if turn.poster is not None:
+            turn.poster.note(now.time, now.microstep)
         return wake
 
     def _wake_at(self, turn: Turn, instant: Instant) -> Wake:
         wake = new_wake(instant.time, instant.microstep)
         instant.add(turn, wake)
+        if turn.poster is not None:
+            turn.poster.note(instant.time, instant.microstep)
         return wake
 
     def turn(self, actor: Actor, rank: int) -> Turn:
@@ -172,7 +179,14 @@ class Director:
 
     def new_turn(self, actor: Actor, rank: int) -> Turn:
         """A turn of an actor, or who stands in for it, at a rank."""
-        return Turn(actor, rank, self.ranks, self._all_at_once.get(actor.path))
+        turn = Turn(actor, rank, self.ranks, self._all_at_once.get(actor.path))
+        around = actor.path
+        while self.posters and around and turn.poster is None:
+            around = around.rpartition(".")[0]
+            turn.poster = self.posters.get(around)
+        if turn.poster is not None:
+            turn.nesting = turn.poster.nesting + 1
+        return turn
 
     def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
         """What puts tokens into a port at the present tag, and lets its actor fire, or who stands in for it."""
@@ -210,6 +224,10 @@ class Director:
         now = self.tag
         is_over = self.present is not None and self._rank >= rank
         return Tag(now.time, now.microstep + 1) if is_over else now
+
+    def is_between(self, first: int, last: int) -> bool:
+        """Whether none of the turns of these ranks is being taken."""
+        return self.present is None or not first <= self._rank <= last
 
     def is_to_come(self, first: int, last: int) -> bool:
         """Whether any turn of these ranks is still to come at the present tag, and none of them is being taken."""
@@ -271,6 +289,7 @@ class Director:
         turns, ready = self._turns, self._ready
         if ready.posts is not None:
             ready.posts.settle()
+            instant.arrange()
         if instant.turn is not None:
             self._wake_up(instant.turn, instant.wake)
         if instant.turns is not None and instant.wakes is not None:

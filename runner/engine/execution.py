@@ -19,7 +19,7 @@ from ..text import describe
 from .agenda import Turn
 from .director import Director
 from .errors import ActorError
-from .local_time import LocalDirector
+from .local_time import Border, LocalDirector
 from .refinement import Refinement
 
 
@@ -35,6 +35,7 @@ class Execution:
         self.way: Callable[[Job], None] = self.execute
         self.refresh: list[Callable[[], None]] = []
         self.forget: Callable[[], None] = _nothing
+        self.border: Border | None = None  # of the composite that it is in, if it is put off from outside of that
         self.refinement: Refinement | None = None  # that it is in, if errors in there lead to a transition
         self.seed = director.seed
         self.environment = local.environment
@@ -141,6 +142,8 @@ class Execution:
         if self._gates:
             self._held.append(job)
             return
+        if self.border is not None and job.released != self._director.last:
+            self.border.resume()
         self._director.put_back(job)
         for wake in job.wakes:
             wake.due = not wake.cancelled

@@ -6,6 +6,7 @@ place of the composite (``firing_order``).  What is theirs alone is the time tha
 
 from __future__ import annotations
 
+import heapq
 from collections import deque
 from typing import Any
 
@@ -15,7 +16,7 @@ from simpy.events import NORMAL, Event, EventPriority
 from epicycle.actors import Actor, Tag, Wake, Way
 
 from ..graph import Clock, is_within
-from .agenda import Delivery
+from .agenda import Delivery, Poster, Turn
 from .director import Director
 from .refinement import Refinement
 from .way import Call
@@ -136,6 +137,9 @@ class Passage(Actor):
         return any(lane.waiting for lane in self._lanes.values())
 
     def _let_through(self, border: Border) -> None:
+        if not border.lets_pass(self):
+            self.wake_in(0)
+            return
         while self.requests:
             self.requests.popleft().arrive()
         for lane in self._lanes.values():
@@ -162,7 +166,8 @@ class Passage(Actor):
 class Border(Actor):
     """The end of a composite whose director is like Ptolemy's: as long as tokens wait at its inputs, it fires again.
 
-    In each of its firings one token of each channel passes its ports.
+    In each of its firings one token of each channel passes its ports.  What an actor sends whose firing was put off
+    from outside leaves at the next microstep, unless the composite fires at this tag for what comes in.
     """
 
     def __init__(self, path: str, director: Director, outside: Director | Refinement) -> None:
@@ -174,23 +179,68 @@ class Border(Actor):
         self._outside = outside
         ranks = [rank for each, rank in director.ranks.items() if is_within(each, path)]
         self._first, self._last = min(ranks), max(ranks)
+        self._came_in: Tag | None = None  # when something did
+        # Only what comes first inside is posted, when it has fired: as whole tags, with those that have been posted.
+        self.poster: Poster | None = None
+        self.nesting = 0
+        self._turn: Turn | None = None
+        self._inside: list[tuple[int, int]] = []  # a heap
+        self._posted: set[tuple[int, int]] = set()
+        self._resumed: Tag | None = None  # when a firing was executed that had been put off
 
     @property
     def is_to_come(self) -> bool:
         """Whether the composite is yet to fire at the present tag."""
         return self._director.is_to_come(self._first, self._last)
 
+    @property
+    def turn(self) -> Turn:
+        """The turn in which it ends a firing of the composite."""
+        if self._turn is None:
+            self._turn = self._director.turn(self, self._director.ranks[self.path])
+        return self._turn
+
+    def note(self, time: int, microstep: int) -> None:
+        """Something inside has asked for a turn."""
+        heapq.heappush(self._inside, (time, microstep))
+        if self._director.last.microstep and self._director.is_between(self._first, self._last):
+            self.post()
+
+    def post(self) -> None:
+        """Ask for a turn for what comes first inside."""
+        now = self._director.last
+        while self._inside and self._inside[0] <= now:
+            heapq.heappop(self._inside)
+        self._posted = {tag for tag in self._posted if tag > now}
+        if self._inside and self._inside[0] not in self._posted:
+            self._posted.add(self._inside[0])
+            self._director.want_at(self.turn, self._inside[0][0])
+
+    def resume(self) -> None:
+        """An actor inside fires now whose firing was put off from outside."""
+        self._resumed = self.tag
+
+    def lets_pass(self, passage: Passage) -> bool:
+        """Whether what waits at a port may pass it now."""
+        now = self.tag
+        if passage in self.inputs_before:
+            self._came_in = now
+            self._outside.trigger(self)
+            return True
+        return self._resumed != now or self._came_in == now
+
     def go_on(self, passage: Passage) -> None:
         """Tokens are left at a port."""
-        if passage in self.inputs_before:
-            self._outside.trigger(self)
-        else:
+        if passage in self.outputs_behind:
             passage.wake_in(0)
 
     def fire(self) -> None:
-        for passage in (*self.inputs_before, *self.outputs_behind):
-            if passage.is_waited_for:
-                self._outside.trigger(passage)
+        if any(passage.is_waited_for for passage in self.inputs_before):
+            for passage in (*self.inputs_before, *self.outputs_behind):
+                if passage.is_waited_for:
+                    self._outside.trigger(passage)
+        else:
+            self.post()
 
 
 class _Lane:

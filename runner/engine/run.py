@@ -136,9 +136,13 @@ class Run:
         self.is_begun = True
         for path, actor in self.actors.items():
             actor.enter(self._ways.context_of(path))
-        for actor in self.actors.values():
+        before = ""
+        for path, actor in self.actors.items():
+            self._ways.post(before, path)
             self._call(actor, "initialize")
             self._initialized.append(actor)
+            before = path
+        self._ways.post(before, "")
         self._ways.begin()
         # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
         self._ways.open()

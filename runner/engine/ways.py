@@ -96,6 +96,7 @@ class Ways:
         self._directors: dict[str, Director | LocalDirector | Refinement] = {}
         self._conductors: dict[str, Conductor] = {}
         self._passages: dict[str, Passage] = {}
+        self._borders: dict[str, Border] = {}
         self._refinements: dict[str, Refinement] = {}
         for composite, clock in self.graph.clocks.items():
             self._add_director(composite, clock)
@@ -111,6 +112,9 @@ class Ways:
             if self._is_caught(path):
                 refinement = self._refinements[self.graph.refinement_of(path)]
                 execution.refinement = refinement
+            around = self.graph.director_of(path)
+            if any(self.graph.director_of(woven.name) != around for woven in self._woven_at.get(path, ())):
+                execution.border = self._borders.get(around)
             execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
 
@@ -132,13 +136,19 @@ class Ways:
 
     def _add_border(self, composite: str, outside: Director | Refinement) -> None:
         """Let a composite fire again as long as tokens wait at its inputs."""
-        border = Border(composite, self.director, outside)
+        border = self._borders[composite] = Border(composite, self.director, outside)
         for paths, passages in zip(
             self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
         ):
             passages += (self._passages[path] for path in paths)
             for passage in passages:
                 passage.border = border
+        around = composite
+        while around and border.poster is None:
+            around = around.rpartition(".")[0]
+            border.poster = self._borders.get(around)
+        border.nesting = 0 if border.poster is None else border.poster.nesting + 1
+        self.director.posters[composite] = border
 
     def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
         if not composite or self.graph.refinement_of(composite) != composite:
@@ -219,6 +229,12 @@ class Ways:
     def executed(self) -> Container[str]:
         """The actors that aspects stand at, or whose parameters they change."""
         return self._executions
+
+    def post(self, before: str, path: str) -> None:
+        """Of the actors at the start, the second is initialized after the first: see what is done with then."""
+        for composite, border in reversed(self._borders.items()):
+            if is_within(before, composite) and not is_within(path, composite):
+                border.post()
 
     def open(self) -> None:
         """From now on tokens can be sent."""

@@ -211,25 +211,28 @@ def facts(reference: TypeReference) -> list[str]:
 
 
 def _port_row(port: PortReference) -> list[str]:
-    own, changes = _notes(port), dict[str, Any](port.ptolemy or {})
-    there = _notes(replace(port, **{option: value for option, value in changes.items() if option != "type"}))
-    notes = [note for note, holds in own.items() if holds]
-    notes += [f"{note} like Ptolemy" for note, holds in there.items() if holds and not own.get(note)]
-    notes += [f"not so like Ptolemy: {note}" for note, holds in own.items() if holds and not there.get(note)]
-    return [port.name, port.type, ", ".join(notes), port.doc]
+    notes = ", ".join(_notes(port))
+    if port.ptolemy:
+        options: dict[str, Any] = {option: value for option, value in port.ptolemy.items() if option != "type"}
+        there = _notes(replace(port, **options)) or [
+            "required" if port.direction == "input" else "depends on all inputs"
+        ]
+        notes += ("; " if notes else "") + f"like Ptolemy {', '.join(there)}"
+    return [port.name, port.type, notes, port.doc]
 
 
-def _notes(port: PortReference) -> dict[str, bool]:
-    """What there is to say of a port, and whether it holds."""
+def _notes(port: PortReference) -> list[str]:
+    """What there is to say of a port."""
     is_input, inputs = port.direction == "input", port.depends_on
-    return {
+    notes = {
         "optional": is_input and not port.required,
         "does not trigger": is_input and not port.triggers,
-        "keeps what is not taken": is_input and port.keep,
+        "keeps what is not taken out": is_input and port.keep,
         # Such a port may stand in a loop.
         f"depends at once on {' and '.join(inputs or ()) or 'no input'}": not is_input and inputs is not None,
         "any number of connections": port.multi,
     }
+    return [note for note, holds in notes.items() if holds]
 
 
 def _parameter_row(parameter: ParameterReference) -> list[str]:
