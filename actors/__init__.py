@@ -45,6 +45,7 @@ from .passing import (
     Previous,
     Register,
     Sequencer,
+    Wire,
 )
 from .queues import Queue, Server, SharedQueue
 from .replay import Replay, ReplayError
@@ -97,7 +98,7 @@ __all__ = [
     "StateSpace", "Station", "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TimeAverage",
     "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle",
     "Uniform", "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "VonMises", "WaitingLine", "WaitingTime",
-    "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
+    "Wake", "Way", "WaypointFollower", "When", "Wire", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
     "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
     "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
     "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",

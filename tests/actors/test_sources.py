@@ -179,8 +179,8 @@ def test_distributions_without_width() -> None:
 
 
 NAMES = (
-    "Bernoulli, Binomial, Cauchy, ChiSquare, Choice, Constant, Exponential, Gamma, LogNormal, NegativeBinomial, Normal, "
-    "Poisson, RandomInteger, StudentT, Triangular, Uniform, VonMises"
+    "Bernoulli, Binomial, Cauchy, ChiSquare, Choice, Constant, Exponential, Gamma, LogNormal, NegativeBinomial, "
+    "Normal, Poisson, RandomInteger, StudentT, Triangular, Uniform, VonMises"
 )
 
 
