@@ -10,8 +10,8 @@ once per tag; the exception is one with an output that does not depend on an inp
 may have to send before that input is there: its tokens are taken in a firing of their own, at the rank of the input.
 
 Where ties are posted (``postings``), actors of equal depth and priority fire in the order in which they were to have a
-turn first: by a wake-up that was asked for, or by a token that was put in.  Then an actor takes all that waits for it, in
-whichever of its turns it fires, and its turns that follow each other at once are one firing.
+turn first: by a wake-up that was asked for, or by a token that was put in.  Then an actor takes all that waits for it,
+in whichever of its turns it fires, and its turns that follow each other at once are one firing.
 
 A token sent over a connection without delay arrives at the same tag; with delay d > 0 at (time + d, 1); with delay 0
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
@@ -352,8 +352,6 @@ class Director:
 
     def _wake_up(self, turn: Turn, wake: Wake | None) -> None:
         if wake is not None:
-            if wake.cancelled:
-                return
             turn.add(wake)
         if not turn.is_wanted:
             turn.is_wanted = True
