@@ -45,8 +45,9 @@ from .passing import (
     Previous,
     Register,
     Sequencer,
+    Wire,
 )
-from .queues import Queue, Server
+from .queues import Queue, Server, SharedQueue
 from .replay import Replay, ReplayError
 from .sinks import Display, Histogram, Recorder, Stop, Test
 from .sources import (
@@ -93,16 +94,16 @@ __all__ = [
     "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler",
     "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer",
     "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor", "Sequence", "Sequencer",
-    "Server", "SetFields", "SetVariable", "SingleEvent", "Solver", "Spread", "StateMachine", "StateSpace", "Station",
-    "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TimeAverage", "TimeCompare", "TimeDelay",
-    "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError",
-    "UnscentedEstimator", "Variable", "Vehicle", "VonMises", "WaitingLine", "WaitingTime", "Wake", "Way",
-    "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
-    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
-    "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
-    "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
-    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
+    "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread", "StateMachine",
+    "StateSpace", "Station", "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TimeAverage",
+    "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle",
+    "Uniform", "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "VonMises", "WaitingLine", "WaitingTime",
+    "Wake", "Way", "WaypointFollower", "When", "Wire", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
+    "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
+    "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",
+    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
+    "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
     "visible_character", "visible_lines",
 ]  # fmt: skip
 

@@ -1,5 +1,5 @@
-"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Previous, Register, BooleanSelect, Commutator,
-Sequencer, Default, IsPresent."""
+"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Previous, Register, Wire, BooleanSelect,
+Commutator, Sequencer, Default, IsPresent."""
 
 from __future__ import annotations
 
@@ -96,6 +96,27 @@ class Register(MostRecent):
     def fire(self) -> None:
         self.send_latest()
         self.note()
+
+
+class Wire(ByChannel):
+    """Sends the latest token of every channel whenever one comes on any of them.
+
+    A channel on which no token has come yet sends ``initial``, or nothing if that is not given.  Ptolemy: ``Wire``.
+    """
+
+    initial: Parameter[Any] = Parameter(object, None, doc="what is sent for a channel before its first token")
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._latest: list[Any] = [self.initial] * self.input.width
+
+    def fire(self) -> None:
+        for (tokens,) in rounds(self.input):
+            for channel, token in enumerate(tokens):
+                if token is not ABSENT:
+                    self._latest[channel] = token
+                if self._latest[channel] is not None:
+                    self.send(self._latest[channel], channel)
 
 
 class BooleanSelect(Actor):

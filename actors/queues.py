@@ -1,4 +1,4 @@
-"""Actors in which tokens wait: Queue and Server."""
+"""Actors in which tokens wait: Queue, SharedQueue and Server."""
 
 from __future__ import annotations
 
@@ -84,6 +84,50 @@ class Queue(Actor):
             else:
                 self._tokens.append(token)
         self.size.send(size)
+
+
+class SharedQueue(Actor):
+    """One line for several: a channel of ``trigger`` asks for a token, and gets it by the channel of ``output``.
+
+    Each has asked for one at the start.  A token goes to the first that waits; if nobody does it is kept, first in,
+    first out.  At one tag those who ask come before what comes in.  Ptolemy: ``SharedQueue``.
+    """
+
+    input = InputPort(doc="what comes in")
+    trigger = InputPort(multi=True, required=False, doc="asks for a token, by channel")
+    output = OutputPort(multi=True, doc="a channel for each who asks, in the order of the triggers")
+    size = OutputPort(int, doc="how many tokens are in it, behind each firing")
+    rejected = OutputPort(depends_on=("input",), doc="the tokens that found it full")
+
+    capacity: Parameter[int | None] = Parameter(
+        int, None, min=1, doc="how many tokens it holds; any number if left out"
+    )
+
+    def initialize(self) -> None:
+        self._tokens: deque[Any] = deque()
+        self._asking = [True] * self.output.width
+
+    def fire(self) -> None:
+        for triggers, arrived in rounds(self.trigger, self.input):
+            for channel, trigger in enumerate(triggers):
+                if trigger is ABSENT or channel >= self.output.width:
+                    continue
+                self._asking[channel] = not self._tokens
+                if self._tokens:
+                    self.output.send(self._tokens.popleft(), channel)
+            for token in present(arrived):
+                self._take(token)
+            self.size.send(len(self._tokens))
+
+    def _take(self, token: Any) -> None:
+        if True in self._asking:
+            channel = self._asking.index(True)
+            self._asking[channel] = False
+            self.output.send(token, channel)
+        elif self.capacity is not None and len(self._tokens) >= self.capacity:
+            self.rejected.send(token)
+        else:
+            self._tokens.append(token)
 
 
 class Server(Actor):

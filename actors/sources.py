@@ -256,7 +256,26 @@ def _times(trigger: InputPort[Any]) -> int:
     return len(trigger.tokens) if trigger.width <= 1 else len(list(rounds(trigger)))
 
 
-class Const(Actor):
+class _Answering(Actor):
+    """What sources have in common that answer triggers, as often as they may."""
+
+    trigger = InputPort(multi=True, doc="when to send")
+
+    limit: Parameter[int | None] = Parameter(int, None, min=1, doc="how many answers there are; no end if left out")
+
+    def initialize(self) -> None:
+        self._answers = 0
+
+    def answers(self) -> int:
+        """How often to answer at this tag."""
+        wanted = _times(self.trigger) if self.trigger.width or self.trigger.required else 1
+        if self.limit is not None:
+            wanted = min(wanted, self.limit - self._answers)
+        self._answers += wanted
+        return wanted
+
+
+class Const(_Answering):
     """Sends the same value for each trigger; once at the start if ``trigger`` is not connected.
 
     The distribution that gives the same value always is ``Constant``.  Ptolemy: ``Const``.
@@ -273,21 +292,21 @@ class Const(Actor):
         self.output.type = token_type([self.value])
 
     def initialize(self) -> None:
+        super().initialize()
         if not self.trigger.width:
             self.wake_in(0)
 
     def fire(self) -> None:
-        for _ in range(_times(self.trigger) if self.trigger.width else 1):
+        for _ in range(self.answers()):
             self.output.send(self.value)
 
 
-class Ramp(Actor):
+class Ramp(_Answering):
     """Counts triggers: sends ``init`` for the first, and for each further one the last number plus ``step``.
 
     The numbers are integers if ``init`` and ``step`` are; then a step that comes must be one, too.  Ptolemy: ``Ramp``.
     """
 
-    trigger = InputPort(multi=True, doc="when to send")
     output = OutputPort(float, doc="the number")
 
     init: Parameter[float] = Parameter(int | float, 0, doc="the first number")
@@ -298,11 +317,12 @@ class Ramp(Actor):
         self.output.type = int if isinstance(self.init, int) and isinstance(self.step, int) else float
 
     def initialize(self) -> None:
+        super().initialize()
         self._last: float | None = None
         self._step: float = 0  # behind the last number
 
     def fire(self) -> None:
-        for _ in range(_times(self.trigger)):
+        for _ in range(self.answers()):
             step = self._step if self.late_step else self.step
             self._last, self._step = self.init if self._last is None else self._last + step, self.step
             if self.output.type is int and not isinstance(self._last, int):
@@ -354,13 +374,12 @@ class Sequence(Actor):
         return _times(self.trigger) if self.enable.present and self.enable.value else 0
 
 
-class Pulse(Actor):
+class Pulse(_Answering):
     """Sends a value at certain triggers, counted from 0, and a zero like it at all others.
 
     A zero is 0, 0.0, false, an empty text, or a list of zeros.  Ptolemy: ``Pulse``.
     """
 
-    trigger = InputPort(multi=True, doc="when to send")
     output = OutputPort(doc="a value, or zero")
 
     values: Parameter[Any] = Parameter(object, [1, 0], shape=(None,), doc="what is sent")
@@ -376,11 +395,12 @@ class Pulse(Actor):
         self.output.type = token_type(self.values)
 
     def initialize(self) -> None:
+        super().initialize()
         self._count = 0  # of triggers
         self._place = 0  # of the next value
 
     def fire(self) -> None:
-        for _ in range(_times(self.trigger)):
+        for _ in range(self.answers()):
             if self._place == len(self.values) and self.repeat:
                 self._count = self._place = 0
                 if self.indexes[0] > 0:  # as there: the trigger that begins anew is answered only by a value

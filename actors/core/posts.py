@@ -22,17 +22,17 @@ class Posts:
         self._number = 0  # of what was posted last
         self._numbers: dict[int, int] = {}  # of what is in a group, that of its first post
         self._waiting: dict[int, int] = {}  # how much is left in a director
-        self._open: list[int] = []  # the directors that what was taken out last is in
+        self._open: Place = ()  # where what was taken out last is
 
     def push(self, rank: int) -> None:
         """Post a rank."""
         self._number += 1
-        *outer, (own, _) = self.places[rank]
-        key: list[int] = []
-        for group, director in outer:
+        place = self.places[rank]
+        key: tuple[int, ...] = ()
+        for group, director in place[:-1]:
             key += group, self._numbers.setdefault(director, self._number)
             self._waiting[director] = self._waiting.get(director, 0) + 1
-        heappush(self._heap, ((*key, own, self._number), rank))
+        heappush(self._heap, ((*key, place[-1][0], self._number), rank))
 
     def first(self) -> int:
         """The rank that is next; -1 if there is none."""
@@ -41,22 +41,23 @@ class Posts:
     def pop(self) -> int:
         """Take the next rank out."""
         rank = heappop(self._heap)[1]
-        around = [director for _, director in self.places[rank][:-1]]
-        self._leave(around)
-        for director in around:
-            self._waiting[director] -= 1
-        self._open = around
+        around = self.places[rank][:-1]
+        if around or self._open:
+            self._leave(around)
+            for _, director in around:
+                self._waiting[director] -= 1
         return rank
 
     def settle(self) -> None:
         """A tag begins: what was done at the one before is over."""
-        self._leave([])
-        self._open = []
+        self._leave(())
         if not self._heap:
             self._number = 0
 
-    def _leave(self, around: list[int]) -> None:
+    def _leave(self, around: Place) -> None:
         """Directors in which nothing is left are posted anew the next time, but for those that are gone on with."""
-        for director in self._open:
-            if director not in around and not self._waiting[director]:
+        for place in self._open:
+            director = place[1]
+            if place not in around and not self._waiting[director]:
                 del self._numbers[director], self._waiting[director]
+        self._open = around

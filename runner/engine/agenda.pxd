@@ -35,7 +35,7 @@ cdef class Instant(Moment):
     cdef public Turn turn
     cdef public Wake wake
     cpdef add(self, Turn turn, Wake wake)
-    @cython.locals(found=list)
+    @cython.locals(found=list, turn=Turn, wake=Wake)
     cpdef arrange(self)
 
 

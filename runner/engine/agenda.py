@@ -142,13 +142,14 @@ class Instant(Moment):
             self.wakes.append(wake)
 
     def arrange(self) -> None:
-        """Put what is inside of a composite that is posted as a whole behind what posts it."""
-        if self.turn is None or self.turns is None or self.wakes is None:
+        """Leave out what was called off, and put what is inside of a composite behind what posts the whole of it."""
+        if self.turn is None:
             return
-        found = [(self.turn, self.wake), *zip(self.turns, self.wakes, strict=True)]
-        found.sort(key=_nesting)
-        (self.turn, self.wake), *rest = found
-        self.turns, self.wakes = [turn for turn, _ in rest], [wake for _, wake in rest]
+        found = [(self.turn, self.wake), *zip(self.turns or (), self.wakes or (), strict=True)]
+        self.turn = self.wake = self.turns = self.wakes = None
+        for turn, wake in sorted(found, key=_nesting):
+            if wake is None or not wake.cancelled:
+                self.add(turn, wake)
 
 
 def _nesting(entry: tuple[Turn, Wake | None]) -> int:

@@ -9,6 +9,10 @@ gets at this tag, because all that can still send to it within the tag have a lo
 once per tag; the exception is one with an output that does not depend on an input at once (``depends_on``), which
 may have to send before that input is there: its tokens are taken in a firing of their own, at the rank of the input.
 
+Where ties are posted (``postings``), actors of equal depth and priority fire in the order in which they were to have a
+turn first: by a wake-up that was asked for, or by a token that was put in.  Then an actor takes all that waits for it,
+in whichever of its turns it fires, and its turns that follow each other at once are one firing.
+
 A token sent over a connection without delay arrives at the same tag; with delay d > 0 at (time + d, 1); with delay 0
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
 microstep 1.  The first tag of a run is (start, 1).
@@ -18,7 +22,7 @@ two, who is first goes on.  At one instant all that SimPy has to do comes first,
 received at the first microstep that the director has not handled yet.
 
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
-token; and tokens that an actor does not read do not stay in the port.
+token; and tokens that an actor does not read do not stay in the port, unless it keeps them (``InputPort.keep``).
 """
 
 from __future__ import annotations

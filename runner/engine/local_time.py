@@ -145,8 +145,8 @@ class Passage(Actor):
         for lane in self._lanes.values():
             if lane.waiting:
                 lane.waiting.popleft().arrive()
-        if self.is_waited_for:
-            border.go_on(self)
+        if self.is_waited_for and self in border.outputs_behind:
+            self.wake_in(0)
 
     def await_turn(self, onward: Way) -> Way:
         """Where a request goes that waits until the composite fires; all of them go on then."""
@@ -180,13 +180,13 @@ class Border(Actor):
         ranks = [rank for each, rank in director.ranks.items() if is_within(each, path)]
         self._first, self._last = min(ranks), max(ranks)
         self._came_in: Tag | None = None  # when something did
-        # Only what comes first inside is posted, when it has fired: as whole tags, with those that have been posted.
+        self._resumed: Tag | None = None  # when a firing was executed that had been put off
+        # When it has fired, it is posted for what comes first inside.
         self.poster: Poster | None = None
         self.nesting = 0
         self._turn: Turn | None = None
-        self._inside: list[tuple[int, int]] = []  # a heap
-        self._posted: set[tuple[int, int]] = set()
-        self._resumed: Tag | None = None  # when a firing was executed that had been put off
+        self._inside: list[tuple[int, int]] = []  # the tags at which something is to be done, a heap
+        self._posted: set[tuple[int, int]] = set()  # for which of them it has been posted
 
     @property
     def is_to_come(self) -> bool:
@@ -228,11 +228,6 @@ class Border(Actor):
             self._outside.trigger(self)
             return True
         return self._resumed != now or self._came_in == now
-
-    def go_on(self, passage: Passage) -> None:
-        """Tokens are left at a port."""
-        if passage in self.outputs_behind:
-            passage.wake_in(0)
 
     def fire(self) -> None:
         if any(passage.is_waited_for for passage in self.inputs_before):

@@ -231,10 +231,12 @@ class Ways:
         return self._executions
 
     def post(self, before: str, path: str) -> None:
-        """Of the actors at the start, the second is initialized after the first: see what is done with then."""
-        for composite, border in reversed(self._borders.items()):
-            if is_within(before, composite) and not is_within(path, composite):
-                border.post()
+        """At the start, one actor was initialized and another one is next: post composites that are done with."""
+        around = before if self._borders else ""
+        while around:
+            around = around.rpartition(".")[0]
+            if around in self._borders and not is_within(path, around):
+                self._borders[around].post()
 
     def open(self) -> None:
         """From now on tokens can be sent."""

@@ -150,6 +150,10 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         # The trigger that begins anew is answered only if a value is due at once.
         ("Pulse, repeat: true, values: [7], indexes: [1]", [("trigger", [[n, 0] for n in range(5)])], [0, 7, 7]),
         ("Ramp, init: 3, step: 2", [("trigger", [[0, 0], [1, 0]])], [3, 5]),
+        ("Ramp, limit: 2", [("trigger", [[0, 0], [0, 0], [1, 0]])], [0, 1]),
+        ("Const, limit: 2, value: a", [("trigger", [[0, 0], [1, 0], [2, 0]])], ["a", "a"]),
+        ("Const, limit: 1", [], [1]),
+        ("Pulse, limit: 3", [("trigger", [[n, 0] for n in range(5)])], [1, 0, 0]),
         # Triggers that come together, one on each channel, are one.
         ("Ramp", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0], [2, 0], [2, 0]])], [0, 1, 2, 3]),
         ("CurrentTime", [("trigger", [[0, 0], [1, 0]]), ("trigger", [[1, 0]])], [0.0, 1.0, 1.0]),
@@ -212,6 +216,13 @@ def test_tokens(actor: str, feeds: Feeds, expected: list[Any]) -> None:
         ("MostRecent", [("input", [[1, "a"], [2, "b"]]), ("trigger", [[0, 0], [2, 0]]), ("trigger",
          [[2, 0], [3, 0]])], 0,
          [(2, 1, "output", "b"), (3, 1, "output", "b")]),
+        ("SharedQueue, capacity: 1", [("input", [[n, n] for n in range(6)]), ("trigger", [[5, 0]]), ("trigger",
+         [[3, 0]])], 2,
+         [(0, 1, "output/0", 0), (0, 1, "size", 0), (1, 1, "output/1", 1), (1, 1, "size", 0), (2, 1, "size", 1),
+          (3, 1, "output/1", 2), (3, 1, "size", 1), (4, 1, "rejected", 4), (4, 1, "size", 1), (5, 1, "output/0", 3),
+          (5, 1, "size", 1)]),
+        ("SharedQueue", [("input", [[2, "a"]]), ("trigger", [[0, 0]])], 1, [(0, 1, "size", 0), (2, 1, "output/0",
+         "a"), (2, 1, "size", 0)]),
         ("Extreme, take: greatest", [("input", [[0, 1], [1, 5]]), ("input", [[1, 5], [2, 2.5]])], 0,
          [(0, 1, "value", 1), (0, 1, "channel", 0), (1, 1, "value", 5), (1, 1, "channel", 0), (2, 1, "value", 2.5),
           (2, 1, "channel", 1)]),
@@ -219,6 +230,10 @@ def test_tokens(actor: str, feeds: Feeds, expected: list[Any]) -> None:
          [(0, 1, "value", -1), (0, 1, "channel", 1)]),
         ("Spread", [("input", [[0, [1, 2, 3]], [1, ["a"]]])], 2,
          [(0, 1, "output/0", 1), (0, 1, "output/1", 2), (1, 1, "output/0", "a")]),
+        ("Wire, initial: 0", [("input", [[0, 1], [2, 2]]), ("input", [[1, "x"]])], 2,
+         [(0, 1, "output/0", 1), (0, 1, "output/1", 0), (1, 1, "output/0", 1), (1, 1, "output/1", "x"),
+          (2, 1, "output/0", 2), (2, 1, "output/1", "x")]),
+        ("Wire", [("input", [[0, 1], [0, 2]])], 0, [(0, 1, "output", 1), (0, 1, "output", 2)]),
         ("IsPresent", [("input", [[0, "a"], [1, "b"]]), ("input", [[1, "x"]])], 2,
          [(0, 1, "output/0", True), (0, 1, "output/1", False), (1, 1, "output/0", True), (1, 1, "output/1", True)]),
         ("BooleanSelect", [("true_input", [[0, "a"], [1, "b"]]), ("false_input", [[2, "x"]]),
@@ -314,7 +329,9 @@ EVERY = [
 @pytest.mark.parametrize(("kind", "number", "actor", "feeds"), EVERY)
 def test_snapshots_and_crashes(kind: str, number: int, actor: str, feeds: Feeds) -> None:
     """A run that goes on from a snapshot is the whole one; after a crash that costs the state the actor begins anew."""
-    outputs = 2 if kind in ("Spread", "Switch", "IsPresent") or (len(feeds) == 3 and kind == "Inhibit") else 0
+    outputs = (
+        2 if kind in ("Spread", "Switch", "IsPresent", "SharedQueue") or (len(feeds) == 3 and kind == "Inhibit") else 0
+    )
     model = f"model: m\ndirector: {{like: ptolemy}}\n{text(f'{{type: {actor}}}', feeds, outputs)}\n"
     whole = Simulation(load(model, [Probe]), keep_log=True).run(until=20).digest
     cut = Simulation(load(model, [Probe]), keep_log=True)

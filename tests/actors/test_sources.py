@@ -178,7 +178,10 @@ def test_distributions_without_width() -> None:
     assert set(draw("{type: Bernoulli, probability: 1}")) == {True}
 
 
-NAMES = "Bernoulli, Choice, Constant, Exponential, Gamma, LogNormal, Normal, RandomInteger, Triangular, Uniform"
+NAMES = (
+    "Bernoulli, Binomial, Cauchy, ChiSquare, Choice, Constant, Exponential, Gamma, LogNormal, NegativeBinomial, "
+    "Normal, Poisson, RandomInteger, StudentT, Triangular, Uniform, VonMises"
+)
 
 
 @pytest.mark.parametrize(

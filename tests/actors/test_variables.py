@@ -113,3 +113,36 @@ def test_an_aspect_for_numbers_takes_no_other_parameter() -> None:
     with pytest.raises(ModelError) as caught:
         load(model().replace("in_text: {type: Replace, to: \"str(v.value) + '!'\"", "in_text: {type: Bias, by: 1"))
     assert caught.value.problems[0].message == "aspect in_text: Bias alters numbers, but text.value is any value"
+
+
+@pytest.mark.parametrize("director", ["", "director: {}"])
+def test_a_port_parameter_of_a_composite(director: str) -> None:
+    """An input that sets a variable inside: what comes counts at its own tag, for all that fire behind it."""
+    text = f"""
+model: m
+director: {{like: ptolemy}}
+composites:
+  Scaled:
+    {director}
+    parameters: {{gain: 2}}
+    inputs: [gain_in, in]
+    outputs: [out, told]
+    actors:
+      gain: {{type: Variable, delayed: false, priority: -1000}}
+      scale: {{type: Scale, factor: "${{gain}}"}}
+      const: {{type: Const, value: "${{gain}}"}}
+    aspects: {{it: {{type: Replace, to: gain.value, at: const.value}}}}
+    connections:
+      - gain_in -> gain.input
+      - gain.value -> scale.factor
+      - in -> scale.input
+      - scale.output -> const.trigger, out
+      - const.output -> told
+actors:
+  clock: {{type: Clock, period: 1 s, values: [1]}}
+  gains: {{type: Clock, period: 10 s, offsets: [1 s, 1.5 s], values: [5, 7]}}
+  scaled: {{type: Scaled}}
+connections: [clock.output -> scaled.in, gains.output -> scaled.gain_in]
+"""
+    assert [each[3] for each in sends(text, "scaled.scale", until=3.0)] == [2, 5, 7, 7]
+    assert [each[3] for each in sends(text, "scaled.const", until=3.0)] == [2, 5, 7, 7]

@@ -260,6 +260,7 @@ def network(numbers: Numbers) -> dict[str, Any]:
     if numbers.random() < 0.15:
         path = numbers.choice([name for name in actors if name != "sink"])
         model.setdefault("aspects", {})["two"] = {**numbers.choice(AT_ACTORS), "at": path}
+    prefix = ""
     if numbers.random() < 0.3:
         part = {"actors": dict(actors), "connections": connections, "director": {"start": 1}}
         if numbers.random() < 0.5:
@@ -269,14 +270,27 @@ def network(numbers: Numbers) -> dict[str, Any]:
         if "director" in part and numbers.random() < 0.3:
             part["director"].update(numbers.choice(RULES))
         model = {"composites": {"Part": part}, "actors": {"part": {"type": "Part"}}}
-        ends = [f"part.{port}" for port in ends]
+        prefix = "part."
+        if numbers.random() < 0.3:  # two of them in another one, each of which may have what the other one sends
+            part |= {"inputs": {"into": None}, "outputs": {"out": None}}
+            part["connections"] = [*connections, {"from": ends[0], "to": "out"}, {"from": "into", "to": "sink.input"}]
+            around: dict[str, Any] = {"actors": {"part": {"type": "Part"}, "twin": {"type": "Part"}}}
+            around["connections"] = [
+                {"from": "part.out", "to": "twin.into"},
+                {"from": "twin.out", "to": "part.into", "delay": numbers.choice(TIMES)},
+            ]
+            if numbers.random() < 0.7:
+                around["director"] = numbers.choice([{}, {"drift": 0.5}, *RULES])
+            model = {"composites": {"Part": part, "Around": around}, "actors": {"around": {"type": "Around"}}}
+            prefix = "around.part."
+        ends = [f"{prefix}{port}" for port in ends]
     if numbers.random() < 0.4:
         model["director"] = numbers.choice(RULES)
     model["run"] = {"stop": numbers.choice([3, 6.05]), "seed": numbers.randint(0, 5), "record": ends[:2]}
     metrics: dict[str, Any] = {}
     for place in range(3):
         end = numbers.choice(ends)
-        there = actors[end.removeprefix("part.").partition(".")[0]]
+        there = actors[end.removeprefix(prefix).partition(".")[0]]
         is_number = end.endswith("size") or (there["type"] in SENDS_NUMBERS and there.get("gives") != "any value")
         is_number = is_number and there.get("expression") not in ("a > b", "a < b <= 1", "a > 0 and not b > 1")
         metrics[f"m{place}"] = {"of": end, **numbers.choice([*OF_ANY, *(3 * OF_NUMBERS if is_number else ())])}

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Pending
-from epicycle.runner.engine import Simulation
+from epicycle.runner.engine import Firing, Simulation, Tracer
 from tests.engine.engine_parts import load, sends, simulate
 
 
@@ -242,3 +242,21 @@ connections: [a.output -> pair.input, b.output -> pair.input]
         "b.output",
         "pair.output",
     ]
+
+
+def test_a_traced_run_says_what_a_firing_takes() -> None:
+    """The wake-up and the token that waits, in one; the log is that of a run that is not traced."""
+    text = """
+director: {like: ptolemy}
+actors:
+  a: {type: Asker, asks: [[0, 0.5, 1.5]]}
+  delay: {type: Delay}
+  p: {type: Scale}
+connections: [a.output -> p.input, a.output -> delay.input]
+"""
+    model, found = load(text, types=TYPES), list[Firing]()
+    tracer = Tracer({"delay": model.graph.actors["delay"]}, found.append)
+    digest = Simulation(model, tracer=tracer).run().digest
+    assert digest == Simulation(model).run().digest
+    told = [(firing.tag.seconds, len(firing.wakes), [each.token for each in firing.arrivals]) for firing in found]
+    assert told == [(0.5, 0, [0.5]), (1.5, 1, [1.5]), (1.5, 0, []), (2.5, 1, [])]
