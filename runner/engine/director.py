@@ -352,8 +352,6 @@ class Director:
 
     def _wake_up(self, turn: Turn, wake: Wake | None) -> None:
         if wake is not None:
-            if wake.cancelled:
-                return
             turn.add(wake)
         if not turn.is_wanted:
             turn.is_wanted = True

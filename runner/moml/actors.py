@@ -111,10 +111,17 @@ class Actor:
             if name == "_priority" or said.java.endswith(".Priority"):
                 self.values["priority"] = self.get(name)
             elif name == "firingCountLimit":
-                if self.get(name):
-                    self.notes.note(f"{self.path}.{name} = {said.value!r}: has no counterpart")
+                self._limit(name)
             elif not self._is_only_named(name, said):
                 self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: has no counterpart")
+
+    def _limit(self, name: str) -> None:
+        """After so many firings it is over; 0 is no limit."""
+        count = self.get(name)
+        if isinstance(count, int) and count > 0 and self.row.type in ("Const", "Ramp", "Pulse"):
+            self.values["limit"] = count
+        elif isinstance(count, int) and count > 0:
+            self.notes.note(f"{self.path}.{name} = {count}: has no counterpart")
 
     def _is_only_named(self, name: str, said: Property) -> bool:
         """Whether it is a parameter that somebody added, for expressions in other ones."""

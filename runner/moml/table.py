@@ -100,6 +100,13 @@ _TIME: Mapping[str, Counterpart] = {
         capacity="whole",
         persistentTrigger="flag",
     ),
+    "SharedQueue": counterpart(
+        "SharedQueue",
+        "input trigger* | output* size",
+        special=how.positive("capacity"),
+        capacity="whole",
+        persistentTrigger="nothing",
+    ),
     "Server": counterpart(
         "Server",
         "input serviceTime | output size",
@@ -127,7 +134,7 @@ _FLOW: Mapping[str, Counterpart] = {
     "EventFilter": counterpart("Filter"),
     "TrueGate": counterpart("Filter"),
     "SuppressSimultaneousEvents": counterpart("FirstOfInstant"),
-    "Wire": counterpart("Commutator", "input* | output*"),
+    "Wire": counterpart("Wire", "input* | output*", initialValue="value:initial=0"),
     "Switch": counterpart("Switch", "input control | output*"),
     "BooleanSwitch": counterpart("BooleanSwitch", "input* control | trueOutput* falseOutput*"),
     "ConfigurationSwitch": counterpart(

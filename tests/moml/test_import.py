@@ -170,7 +170,6 @@ def test_what_has_no_counterpart_is_told(tmp_path: Path) -> None:
     )
     assert notes(tmp_path, text) == [
         "Ramp.trigger.defaultValue = '3': has no counterpart",
-        "Ramp.firingCountLimit = '5': has no counterpart",
         "Ramp.odd = '\"x\"': has no counterpart",
         "strange, a StrangeAttribute: has no counterpart",
     ]
