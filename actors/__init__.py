@@ -7,36 +7,69 @@ from .compiled import CORE, CORE_MODULES, CORE_REASON
 
 # isort: split
 # What comes before decides what all imports behind find: compiled modules, or their sources.
-from .accumulation import Accumulator, Counter, Difference, Integrator
-from .arithmetic import AddSubtract, MathFunction, MultiplyDivide, Scale
+from .accumulation import Accumulator, Counter, Derivative, Difference, Integrator, TimeAverage
+from .arithmetic import AddSubtract, Extreme, MathFunction, MultiplyDivide, Scale
 from .core import *
 from .distributions import (
     Bernoulli,
+    Binomial,
+    Cauchy,
+    ChiSquare,
     Choice,
     Constant,
     Distribution,
     Exponential,
     Gamma,
     LogNormal,
+    NegativeBinomial,
     Normal,
+    Poisson,
     RandomInteger,
+    StudentT,
     Triangular,
     Uniform,
+    VonMises,
 )
 from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
 from .functions import Expression, Function, LookupTable
-from .logic import Comparator, LogicGate
-from .queues import Queue, Server
+from .generators import DRand, Generator, JavaRandom
+from .logic import Comparator, Equals, LogicGate
+from .passing import (
+    BooleanSelect,
+    Commutator,
+    Default,
+    Filter,
+    FirstOfInstant,
+    Inhibit,
+    IsPresent,
+    Previous,
+    Register,
+    Sequencer,
+    Wire,
+)
+from .queues import Queue, Server, SharedQueue
 from .replay import Replay, ReplayError
 from .sinks import Display, Histogram, Recorder, Stop, Test
-from .sources import Clock, Const, CurrentMicrostep, CurrentTime, PoissonClock, Ramp, Random, Sequence, SingleEvent
+from .sources import (
+    Clock,
+    Const,
+    CurrentMicrostep,
+    CurrentTime,
+    PoissonClock,
+    Pulse,
+    Ramp,
+    Random,
+    Sequence,
+    SingleEvent,
+)
 from .statistics import MovingAverage, MovingStatistics
-from .timing import ResettableTimer, TimeDelay, TimeGap, Timer
+from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
+from .variables import SetVariable, Variable
 
 if TYPE_CHECKING:
     from .continuous import ODE
     from .control import *
-    from .entities import Batch, Match, RecordAssembler, RecordDisassembler, SetFields, Unbatch
+    from .entities import Batch, Collect, Match, RecordAssembler, RecordDisassembler, SetFields, Spread, Unbatch
     from .links import ArqReceiver, ArqSender, Link, NetworkSwitch
     from .modes import *
     from .resources import Machine, Pool, Station, WaitingLine
@@ -45,29 +78,33 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",
-    "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier", "Batch",
-    "Bernoulli", "BodyState", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "ChannelError", "Choice",
-    "CircularMotion", "Clock", "Comparator", "Configurable", "Const", "Constant", "Context", "Counter",
-    "CurrentMicrostep", "CurrentTime", "DeadZone", "Difference", "DiscreteFilter", "Display", "DistanceMonitor",
-    "Distribution", "Emitter", "EpicycleError", "Estimate", "Exponential", "Expression", "FilterDesign", "FilterError",
-    "FilterPyEstimator", "FirstOrder", "Function", "Gamma", "GoalMonitor", "Histogram", "Hysteresis", "InertialSensor",
-    "Inform", "InputPort", "Integrator", "Latest", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable",
-    "Machine", "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment",
-    "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "NetworkSwitch", "Normal", "Objective",
-    "OutputPort", "Parameter", "ParameterError", "Pending", "Plan", "PoissonClock", "Pool", "PortError",
-    "PortParameter", "Pose", "Process", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger",
-    "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder",
-    "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select",
-    "Sensor", "SeparationMonitor", "Sequence", "Server", "SetFields", "SingleEvent", "Solver", "StateMachine",
-    "StateSpace", "Station", "Stop", "Stream", "Switch", "Synchronizer", "Tag", "Test", "TimeDelay", "TimeGap", "Timer",
-    "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator",
-    "Vehicle", "WaitingLine", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter",
-    "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
-    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest",
-    "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit",
-    "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
-    "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
-    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
+    "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier",
+    "Batch", "Bernoulli", "Binomial", "BodyState", "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth",
+    "Casadi", "Cauchy", "ChannelError", "ChiSquare", "Choice", "CircularMotion", "Clock", "Collect", "Commutator",
+    "Comparator", "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DRand",
+    "DeadZone", "Default", "Derivative", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution",
+    "Emitter", "EpicycleError", "Equals", "Estimate", "Exponential", "Expression", "Extreme", "Filter", "FilterDesign",
+    "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Function", "Gamma", "Generator", "GoalMonitor",
+    "Histogram", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort", "Integrator", "IsPresent",
+    "JavaRandom", "Latest", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine",
+    "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent",
+    "MovingAverage", "MovingStatistics", "MultiplyDivide", "NegativeBinomial", "NetworkSwitch", "Normal", "Objective",
+    "OutputPort", "Parameter", "ParameterError", "Pending", "Place", "Plan", "Poisson", "PoissonClock", "Pool",
+    "PortError", "PortParameter", "Pose", "Posts", "Previous", "Process", "Pulse", "Quantity", "Quantizer", "Queue",
+    "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler",
+    "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer",
+    "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor", "Sequence", "Sequencer",
+    "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread", "StateMachine",
+    "StateSpace", "Station", "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TimeAverage",
+    "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch", "Unicycle",
+    "Uniform", "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "VonMises", "WaitingLine", "WaitingTime",
+    "Wake", "Way", "WaypointFollower", "When", "Wire", "abridged", "accepts", "array_parameter", "bounds_text", "brief",
+    "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits",
+    "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",
+    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
+    "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
+    "visible_character", "visible_lines",
 ]  # fmt: skip
 
 
@@ -79,7 +116,9 @@ _LATER = {
         "PID", "Butterworth", "DeadZone", "DiscreteFilter", "FilterDesign", "FirstOrder", "Hysteresis", "Limiter",
         "Quantizer", "StateSpace", "TransferFunction",
     ),
-    ".entities": ("Batch", "Match", "RecordAssembler", "RecordDisassembler", "SetFields", "Unbatch"),
+    ".entities": (
+        "Batch", "Collect", "Match", "RecordAssembler", "RecordDisassembler", "SetFields", "Spread", "Unbatch",
+    ),
     ".links": ("ArqReceiver", "ArqSender", "Link", "NetworkSwitch"),
     ".modes": ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"),
     ".resources": ("Machine", "Pool", "Station", "WaitingLine"),

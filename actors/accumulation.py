@@ -1,18 +1,21 @@
-"""Actors that add up what comes: Counter, Accumulator, Integrator, Difference."""
+"""What adds up what comes, or tells how it changes: Counter, Accumulator, Integrator, TimeAverage, Derivative,
+Difference."""
 
 from __future__ import annotations
 
-from .core import Actor, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
+from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
+from .matching import taken
 
 
 class Counter(Actor):
     """Counts tokens of any kind: up for each at ``increment``, down for each at ``decrement``.
 
-    The number is sent once per tag at which it was counted.  Ptolemy: ``Counter``.
+    The number is sent once per tag at which it was counted; where the ports keep their tokens, as in Ptolemy, once for
+    those that come first on each channel, and so on.  Ptolemy: ``Counter``.
     """
 
-    increment = InputPort(multi=True, required=False, doc="each token counts one up")
-    decrement = InputPort(multi=True, required=False, doc="each token counts one down")
+    increment = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one up")
+    decrement = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one down")
     reset = InputPort(required=False, doc="sets the number back, before the tag is counted")
     output = OutputPort(int, doc="the number")
 
@@ -24,7 +27,10 @@ class Counter(Actor):
     def fire(self) -> None:
         if self.reset.present:
             self._number = self.initial
-        self._number += len(self.increment.tokens) - len(self.decrement.tokens)
+        if self.increment.keep:
+            self._number += taken(self.increment) - taken(self.decrement)
+        else:
+            self._number += len(self.increment.tokens) - len(self.decrement.tokens)
         self.output.send(self._number)
 
 
@@ -39,13 +45,17 @@ class Accumulator(Actor):
     output = OutputPort(float, doc="the sum; sent for each round of tokens, and at a reset")
 
     initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
+    reset_by = Parameter(
+        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset it: any, or those that are true"
+    )
 
     def initialize(self) -> None:
         self._sum = self.initial
 
     def fire(self) -> None:
         if self.reset.present:
-            self._sum = self.initial
+            if self.reset_by == "any" or any(token is True for token in self.reset.tokens):
+                self._sum = self.initial
             if not self.input.present:
                 self.output.send(self._sum)
         for (tokens,) in rounds(self.input):
@@ -60,11 +70,13 @@ class Integrator(Actor):
     exact for queue lengths and other step signals.  ``trapezoid``: it runs straight from token to token,
     ``sum((x[k] + x[k+1]) / 2 * (t[k+1] - t[k]))``.  Before the first token the signal is 0.  The integral up to now is
     sent for each token, and for each ``trigger``, where the signal is taken to hold its latest value.
-    The unit is that of the input times s.  Ptolemy: ``Integrator`` (which is continuous; see ``ODE`` for that).
+    The unit is that of the input times s.  Ptolemy: ``Integrator`` of its DE library (``trapezoid``); for the other,
+    which is continuous, see ``ODE``.
     """
 
     input = InputPort(float, doc="the signal")
     trigger = InputPort(required=False, doc="asks for the integral at other times")
+    reset = InputPort(required=False, doc="begins anew behind this tag, after telling the integral up to now")
     output = OutputPort(float, doc="the integral up to now")
 
     method = Parameter(str, "hold", choices=("hold", "trapezoid"), doc="what the signal does between two tokens")
@@ -83,6 +95,10 @@ class Integrator(Actor):
             self.output.send(self._integral)
         if self.trigger.present and not self.input.present:
             self.output.send(self._integral + self._elapsed() * self._held)
+        if self.reset.present:
+            if not (self.input.present or self.trigger.present):
+                self.output.send(self._integral)
+            self.initialize()
 
     @property
     def _held(self) -> float:
@@ -91,6 +107,58 @@ class Integrator(Actor):
     def _elapsed(self) -> float:
         """Seconds since the latest token; none before the first, up to which the signal is 0."""
         return 0.0 if self._value is None else to_seconds(self.tag.time - self._since)
+
+
+class Derivative(Actor):
+    """How fast a signal changes from token to token: ``(x[k] - x[k-1]) / (t[k] - t[k-1])``; nothing for the first.
+
+    Two tokens of one time must be equal, and tell nothing.  The unit is that of the input per s.
+    Ptolemy: ``Derivative``.
+    """
+
+    input = InputPort(float, doc="the signal")
+    reset = InputPort(required=False, doc="forgets the signal behind this tag")
+    output = OutputPort(float, doc="its slope")
+
+    def initialize(self) -> None:
+        self._value: float | None = None
+        self._since = 0
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            gap = self.tag.time - self._since
+            if self._value is not None and gap:
+                self.output.send((token - self._value) / to_seconds(gap))
+            elif self._value not in (None, token):
+                raise EpicycleError(f"{self._value!r} and {token!r} come at one time: a jump has no slope")
+            self._value, self._since = token, self.tag.time
+        if self.reset.present:
+            self.initialize()
+
+
+class TimeAverage(Actor):
+    """The mean over time of a signal that keeps the value of a token until the next one comes, from 0 s up to now.
+
+    Before the first token the signal is 0.  It is sent for each token from the second on, but not at 0 s.
+    Ptolemy: ``AverageOverTime``.
+    """
+
+    input = InputPort(float, doc="the signal")
+    output = OutputPort(float, doc="its mean")
+
+    def initialize(self) -> None:
+        self._integral = 0.0
+        self._value: float | None = None
+        self._since = 0
+
+    def fire(self) -> None:
+        now = self.tag.time
+        for token in self.input.tokens:
+            if self._value is not None:
+                self._integral += self._value * to_seconds(now - self._since)
+                if now:
+                    self.output.send(self._integral / to_seconds(now))
+            self._value, self._since = token, now
 
 
 class Difference(Actor):

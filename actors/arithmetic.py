@@ -1,4 +1,4 @@
-"""Arithmetic on tokens: AddSubtract, MultiplyDivide, Scale, MathFunction.
+"""Arithmetic on tokens: AddSubtract, MultiplyDivide, Extreme, Scale, MathFunction.
 
 Integers stay integers where arithmetic keeps them.  A result that is no real number (a division by zero, the root of
 a negative number) ends the run with an error.
@@ -7,36 +7,85 @@ a negative number) ends the run with an error.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Mapping
+from functools import reduce
 from typing import Any, Final
 
-from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter, elementary, present, rounds
+from .core import (
+    ABSENT,
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    PortParameter,
+    elementary,
+    present,
+    rounds,
+)
+from .expression import operand, text_of
 
 
 class AddSubtract(Actor):
     """The sum of what comes at ``plus`` minus the sum of what comes at ``minus``.
 
-    Channels without a token at this tag do not count.  Ptolemy: ``AddSubtract``.
+    Channels without a token at this tag do not count.  Under ``like: ptolemy`` the ports take other tokens, too: texts
+    are joined, lists added item by item, fields by their names.  Ptolemy: ``AddSubtract``.
     """
 
-    plus = InputPort(float, multi=True, required=False, doc="what is added")
-    minus = InputPort(float, multi=True, required=False, doc="what is subtracted")
-    output = OutputPort(float, doc="sum(plus) - sum(minus)")
+    plus = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="what is added")
+    minus = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="what is subtracted")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="sum(plus) - sum(minus)")
 
     def fire(self) -> None:
         for plus, minus in rounds(self.plus, self.minus):
-            self.output.send(elementary.total(present(plus)) - elementary.total(present(minus)))
+            above, below = present(plus), present(minus)
+            if all(isinstance(token, (int, float)) for token in above + below):
+                self.output.send(elementary.total(above) - elementary.total(below))
+            else:
+                self.output.send(reduce(_less, below, reduce(_added, above[1:], above[0] if above else 0)))
+
+
+def _added(left: Any, right: Any) -> Any:
+    if isinstance(left, str) or isinstance(right, str):
+        return text_of(left) + text_of(right)
+    return _item_by_item(left, right, operator.add)
+
+
+def _less(left: Any, right: Any) -> Any:
+    return _item_by_item(left, right, operator.sub)
+
+
+def _item_by_item(left: Any, right: Any, compute: Callable[[Any, Any], Any]) -> Any:
+    """A sum or the like of numbers, of lists of them, or of fields that both have; a number goes with all of a list."""
+    left, right = operand(left), operand(right)
+    if isinstance(left, Mapping) and isinstance(right, Mapping):
+        return {name: _item_by_item(left[name], right[name], compute) for name in left if name in right}
+    lists = [isinstance(each, (list, tuple)) for each in (left, right)]
+    if any(lists) and not any(isinstance(each, (str, Mapping)) for each in (left, right)):
+        if all(lists) and len(left) != len(right):
+            raise EpicycleError(f"{left!r} has {len(left)} items and {right!r} has {len(right)}")
+        count = len(left if lists[0] else right)
+        pairs = zip(left if lists[0] else [left] * count, right if lists[1] else [right] * count, strict=True)
+        return [_item_by_item(one, other, compute) for one, other in pairs]
+    if not isinstance(left, (int, float)) or not isinstance(right, (int, float)):
+        raise EpicycleError(f"{left!r} and {right!r} do not go together")
+    return compute(left, right)
 
 
 class MultiplyDivide(Actor):
     """The product of what comes at ``multiply``, divided by all that comes at ``divide``.
 
-    Channels without a token at this tag do not count.  Ptolemy: ``MultiplyDivide``.
+    Channels without a token at this tag do not count.  With ``whole``, as in Ptolemy, whole numbers are divided without
+    remainder, towards zero.  Ptolemy: ``MultiplyDivide``.
     """
 
     multiply = InputPort(float, multi=True, required=False, doc="the factors; their product is 1 if there are none")
     divide = InputPort(float, multi=True, required=False, doc="the divisors")
     output = OutputPort(float, doc="prod(multiply) / prod(divide)")
+
+    whole = Parameter(bool, False, ptolemy=True, doc="whether a quotient of whole numbers is one, too")
 
     def fire(self) -> None:
         for multiply, divide in rounds(self.multiply, self.divide):
@@ -44,25 +93,56 @@ class MultiplyDivide(Actor):
             for divisor in present(divide):
                 if divisor == 0:
                     raise EpicycleError(f"{product!r} is to be divided by {divisor!r}")
-                product /= divisor
+                if self.whole and isinstance(product, int) and isinstance(divisor, int):
+                    sign = 1 if (product < 0) == (divisor < 0) else -1
+                    product = sign * (abs(product) // abs(divisor))
+                else:
+                    product /= divisor
             self.output.send(product)
+
+
+class Extreme(Actor):
+    """The greatest or the least of what comes together, and the channel on which it came; of equals, the first.
+
+    Channels without a token at this tag do not count.  Ptolemy: ``Maximum`` (``maximumValue``, ``channelNumber``),
+    ``Minimum``.
+    """
+
+    input = InputPort(float, multi=True, doc="what is compared")
+    value = OutputPort(float, doc="the greatest or the least")
+    channel = OutputPort(int, doc="where it came, from 0")
+
+    take = Parameter(str, choices=("greatest", "least"), doc="which of them")
+
+    def fire(self) -> None:
+        for (tokens,) in rounds(self.input):
+            there = [channel for channel, token in enumerate(tokens) if token is not ABSENT]
+            best = max if self.take == "greatest" else min
+            channel = best(there, key=tokens.__getitem__)
+            self.value.send(tokens[channel])
+            self.channel.send(channel)
 
 
 class Scale(Actor):
     """Multiplies each token: ``factor * input + offset``.
 
+    Of a list each item is; under ``like: ptolemy`` the port takes lists.
     Ptolemy: ``Scale``, ``AddSubtract`` with a constant.
     """
 
-    input = InputPort(float, doc="what is multiplied")
-    output = OutputPort(float, doc="factor * input + offset")
+    input: InputPort[Any] = InputPort(float, ptolemy={"type": Any}, doc="what is multiplied")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="factor * input + offset")
 
     factor: PortParameter[float] = PortParameter(int | float, 1, doc="what it is multiplied by")
     offset: PortParameter[float] = PortParameter(int | float, 0, doc="what is added then")
 
     def fire(self) -> None:
         for token in self.input.tokens:
-            self.output.send(self.factor * token + self.offset)
+            if isinstance(token, (int, float)):
+                self.output.send(self.factor * token + self.offset)
+            else:
+                scaled = _item_by_item(token, self.factor, operator.mul)
+                self.output.send(scaled if self.offset == 0 else _added(scaled, self.offset))
 
 
 def _sign(x: float) -> int:

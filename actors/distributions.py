@@ -4,8 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Configurable, EpicycleError, Parameter, ParameterError, Stream, array_parameter, counted, token_type
+from .core import (
+    Configurable,
+    EpicycleError,
+    Parameter,
+    ParameterError,
+    Stream,
+    array_parameter,
+    counted,
+    elementary,
+    token_type,
+)
 from .core.choices import cumulated, weighted
+from .generators import Numbers
 
 
 class Distribution(Configurable):
@@ -89,6 +100,83 @@ class Gamma(Distribution):
         return random.gamma(self.shape, self.mean / self.shape)
 
 
+class ChiSquare(Distribution):
+    """The chi-square distribution: the sum of squares of standard normal numbers."""
+
+    freedom = Parameter(float, unit="1", min=1, doc="degrees of freedom, how many squares")
+
+    def draw(self, random: Stream) -> float:
+        return random.chisquare(self.freedom)
+
+
+class StudentT(Distribution):
+    """Student's t distribution."""
+
+    freedom = Parameter(float, unit="1", above=0, doc="degrees of freedom")
+
+    def draw(self, random: Stream) -> float:
+        return random.standard_t(self.freedom)
+
+
+class Cauchy(Distribution):
+    """The Cauchy distribution, which has no mean; in physics that of Breit and Wigner."""
+
+    median = Parameter(float, 0.0, doc="the median")
+    scale = Parameter(float, 1.0, above=0, doc="half the width at half the height")
+    cut: Parameter[float | None] = Parameter(float, None, above=0, doc="how far from the median it ends, if it does")
+
+    def draw(self, random: Stream) -> float:
+        if self.cut is None:
+            return self.median + self.scale * random.standard_cauchy()
+        angle = random.uniform(-1.0, 1.0) * elementary.atan(self.cut / self.scale)
+        return self.median + self.scale * elementary.tan(angle)
+
+
+class VonMises(Distribution):
+    """The von Mises distribution of angles, in rad."""
+
+    mean = Parameter(float, 0.0, unit="rad", doc="the likeliest angle")
+    concentration = Parameter(float, 1.0, unit="1", above=0, doc="kappa, for large ones 1 / variance")
+
+    def draw(self, random: Stream) -> float:
+        return random.vonmises(self.mean, self.concentration)
+
+
+class Poisson(Distribution):
+    """The Poisson distribution: how many of many rare things happen."""
+
+    token_type: Any = int
+
+    mean = Parameter(float, 1.0, unit="1", above=0, doc="the mean")
+
+    def draw(self, random: Stream) -> int:
+        return random.poisson(self.mean)
+
+
+class Binomial(Distribution):
+    """The binomial distribution: how many of several trials succeed."""
+
+    token_type: Any = int
+
+    trials = Parameter(int, 1, min=0, doc="how many trials")
+    probability = Parameter(float, 0.5, unit="1", min=0, max=1, doc="of success in each")
+
+    def draw(self, random: Stream) -> int:
+        return random.binomial(self.trials, self.probability)
+
+
+class NegativeBinomial(Distribution):
+    """The negative binomial distribution: how many trials fail before some have succeeded."""
+
+    token_type: Any = int
+
+    successes = Parameter(float, 1.0, unit="1", above=0, doc="how many successes")
+    probability = Parameter(float, 0.5, unit="1", above=0, max=1, doc="of success in each trial")
+
+    def draw(self, random: Stream) -> int:
+        return random.negative_binomial(self.successes, self.probability)
+
+
 class Triangular(Distribution):
     """The triangular distribution: a least, a likeliest and a greatest number."""
 
@@ -153,6 +241,9 @@ class Choice(Distribution):
             )
 
     def draw(self, random: Stream) -> Any:
+        numbers: Any = random
+        if isinstance(numbers, Numbers):
+            return self.values[numbers.weighted(self._sums)]
         return self.values[weighted(random, self._sums)]
 
 

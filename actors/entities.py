@@ -1,4 +1,5 @@
-"""Entities, which are tokens with fields: SetFields, RecordAssembler, RecordDisassembler, Batch, Unbatch, Match."""
+"""Entities, which are tokens with fields, and lists: SetFields, RecordAssembler, RecordDisassembler, Batch, Unbatch,
+Collect, Spread, Match."""
 
 from __future__ import annotations
 
@@ -206,6 +207,40 @@ class Unbatch(Actor):
                 raise EpicycleError(f"{brief(items)} is not a list")
             for item in token:
                 self.output.send(item)
+
+
+class Collect(Actor):
+    """Makes a list of a token of each channel, as soon as there is one on each; others wait in the order of arrival.
+
+    Ptolemy: ``ElementsToArray``.
+    """
+
+    input = InputPort(multi=True, doc="what is collected")
+    output: OutputPort[Any] = OutputPort(list, doc="a token of each channel, in their order")
+
+    def initialize(self) -> None:
+        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+
+    def fire(self) -> None:
+        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
+            queue.extend(tokens)
+        while all(self._waiting):
+            self.output.send([queue.popleft() for queue in self._waiting])
+
+
+class Spread(Actor):
+    """Sends what is in a list by the channels of its output, in their order; what is left over is lost.
+
+    Ptolemy: ``ArrayToElements``.
+    """
+
+    input = InputPort(doc="lists")
+    output = OutputPort(multi=True, doc="the items of a list, one by each channel")
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            for channel, item in zip(range(self.output.width), operand(token), strict=False):
+                self.output.send(item, channel)
 
 
 class Match(Actor):

@@ -14,9 +14,11 @@ from .core import (
     ParameterError,
     PortError,
     PortParameter,
+    Tag,
     array_parameter,
     brief,
     counted,
+    rounds,
 )
 from .core.choices import cumulated, weighted
 from .expression import FormulaParameter, of_token
@@ -26,24 +28,33 @@ class Merge(Actor):
     """Joins the tokens of all its channels into one stream, one token per microstep.
 
     Of tokens at the same tag, that of the lowest channel comes first and the others in the microsteps after; with
-    ``discard`` the others are lost.  Ptolemy: ``Merge``.
+    ``discard`` the others are lost.  With ``whole_channel``, as in Ptolemy, all tokens of a channel come at once.
+    Ptolemy: ``Merge``.
     """
 
     input = InputPort(multi=True, doc="the streams")
     output = OutputPort(doc="one token at a time")
 
     discard = Parameter(bool, False, doc="whether all but the first token of a tag are lost")
+    whole_channel = Parameter(
+        bool, False, ptolemy=True, doc="whether tokens that come together on one channel leave together"
+    )
 
     def initialize(self) -> None:
         self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+        self._left: Tag | None = None  # the tag at which a channel was sent whole, and others had to wait
 
     def fire(self) -> None:
         for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
             queue.extend(tokens)
         first = next((queue for queue in self._waiting if queue), None)
-        if first is None:
+        if first is None or self._left == self.tag:
             return
         self.output.send(first.popleft())
+        if self.whole_channel:
+            while first:
+                self.output.send(first.popleft())
+            self._left = self.tag if any(self._waiting) and not self.discard else None
         if self.discard:
             for queue in self._waiting:
                 queue.clear()
@@ -148,52 +159,78 @@ class Switch(Actor):
     control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
     output = OutputPort(multi=True, doc="a channel for each connection, in their order")
 
+    outside = Parameter(
+        str,
+        "error",
+        choices=("error", "nothing"),
+        ptolemy="nothing",
+        doc="what is sent while control names no channel",
+    )
+
     def initialize(self) -> None:
         self._channel = 0
 
     def fire(self) -> None:
-        if self.control.present:
-            self._channel = _channel(self.control.value, self.control, self.output.width, "output")
-        for token in self.input.tokens:
-            self.output.send(token, self._channel)
+        width = self.output.width
+        if self.control.present and self.outside == "nothing":
+            self._channel = self.control.value
+        elif self.control.present:
+            self._channel = _channel(self.control.value, self.control, width, "output")
+        if self.outside == "error" or 0 <= self._channel < width:
+            for token in self.input.tokens:
+                self.output.send(token, self._channel)
 
 
 class BooleanSwitch(Actor):
     """Sends each token to ``true_output`` or ``false_output``, as the latest ``control`` token says.
 
-    Ptolemy: ``BooleanSwitch``.
+    With several connections of ``input``, each channel leads to that of the outputs with its number.
+    Ptolemy: ``BooleanSwitch``, ``ConfigurationSwitch`` (whose ``selector`` is ``control``).
     """
 
-    input = InputPort(doc="what is handed on")
-    control = InputPort(bool, doc="where to; false until a token comes")
-    true_output = OutputPort(doc="the tokens that come while control is true")
-    false_output = OutputPort(doc="the tokens that come while control is false")
+    input = InputPort(multi=True, doc="what is handed on")
+    true_output = OutputPort(multi=True, doc="the tokens that come while control is true")
+    false_output = OutputPort(multi=True, doc="the tokens that come while control is false")
 
-    def initialize(self) -> None:
-        self._control = False
+    control = PortParameter(bool, False, doc="where to")
 
     def fire(self) -> None:
-        if self.control.present:
-            self._control = self.control.value
-        for token in self.input.tokens:
-            (self.true_output if self._control else self.false_output).send(token)
+        output = self.true_output if self.control else self.false_output
+        for channel, tokens in enumerate(self.input.by_channel()):
+            if self.input.width == 1 or channel < output.width:
+                for token in tokens:
+                    output.send(token, None if self.input.width == 1 else channel)
 
 
 class Select(Actor):
     """Hands on the tokens of the channel that the latest ``control`` token names; those of the others are lost.
 
-    Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1).  Its ``Select`` is another actor: there the
-    tokens of the other channels wait until they are chosen.
+    If unread tokens are ``kept``, those of the others wait until they are chosen, and one goes on in each firing, which
+    takes one token of ``control``; a number that names no channel chooses none.
+    Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1), with tokens kept ``Select``.
     """
 
     input = InputPort(multi=True, doc="a channel for each connection, in their order")
     control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
     output = OutputPort(doc="the tokens of the channel chosen")
 
+    unread = Parameter(
+        str, "lost", choices=("lost", "kept"), ptolemy="kept", doc="what becomes of tokens that are not chosen"
+    )
+
+    def check(self) -> None:
+        self.input.keep = self.control.keep = self.unread == "kept"
+
     def initialize(self) -> None:
         self._channel = 0
 
     def fire(self) -> None:
+        if self.unread == "kept":
+            if self.control.waiting():
+                self._channel = self.control.get()
+            if 0 <= self._channel < self.input.width and self.input.waiting(self._channel):
+                self.output.send(self.input.get(self._channel))
+            return
         if self.control.present:
             self._channel = _channel(self.control.value, self.control, self.input.width, "input")
         for token in self.input.by_channel()[self._channel]:
@@ -217,7 +254,7 @@ class Repeat(Actor):
                 self.output.send(token)
 
 
-class _ByChannel(Actor):
+class ByChannel(Actor):
     """What these actors share: an input and an output with channels that belong together."""
 
     input = InputPort(multi=True, doc="the streams")
@@ -231,14 +268,15 @@ class _ByChannel(Actor):
                 "equally many, for each channel of the input leads to one of the output"
             )
 
-    def _send(self, token: Any, channel: int) -> None:
+    def send(self, token: Any, channel: int) -> None:
+        """Send what came on a channel."""
         if self.input.width == 1 or self.output.width == 0:
             self.output.send(token)
         else:
             self.output.send(token, channel)
 
 
-class Sampler(_ByChannel):
+class Sampler(ByChannel):
     """Hands on what comes at the same tag as a trigger; all other tokens are lost.
 
     Ptolemy: ``Sampler``.
@@ -250,17 +288,17 @@ class Sampler(_ByChannel):
         if self.trigger.present:
             for channel, tokens in enumerate(self.input.by_channel()):
                 for token in tokens:
-                    self._send(token, channel)
+                    self.send(token, channel)
 
 
-class MostRecent(_ByChannel):
+class MostRecent(ByChannel):
     """Sends the latest token of each channel whenever it is triggered, as often as that happens: a zero-order hold.
 
     A channel on which no token has come yet sends ``initial``, or nothing if that is not given.
-      Ptolemy: ``MostRecent``, ``ZeroOrderHold``.
+    Ptolemy: ``MostRecent``, ``ZeroOrderHold``.
     """
 
-    trigger = InputPort(doc="when to send")
+    trigger = InputPort(multi=True, doc="when to send; triggers that come together, one on each channel, are one")
 
     initial: Parameter[Any] = Parameter(object, None, doc="what is sent for a channel before its first token")
 
@@ -269,16 +307,24 @@ class MostRecent(_ByChannel):
         self._latest: list[Any] = [self.initial] * self.input.width
 
     def fire(self) -> None:
+        self.note()
+        self.send_latest()
+
+    def note(self) -> None:
+        """Take note of the latest tokens."""
         for channel, tokens in enumerate(self.input.by_channel()):
             if tokens:
                 self._latest[channel] = tokens[-1]
-        for _ in self.trigger.tokens:
+
+    def send_latest(self) -> None:
+        """Send them for each trigger."""
+        for _ in rounds(self.trigger):
             for channel, token in enumerate(self._latest):
                 if token is not None:
-                    self._send(token, channel)
+                    self.send(token, channel)
 
 
-class Synchronizer(_ByChannel):
+class Synchronizer(ByChannel):
     """Waits until there is a token on every channel, and then sends one of each at the same tag.
 
     Tokens wait in the order of their arrival.  Ptolemy: ``Synchronizer``.
@@ -293,7 +339,7 @@ class Synchronizer(_ByChannel):
             queue.extend(tokens)
         while all(self._waiting):
             for channel, queue in enumerate(self._waiting):
-                self._send(queue.popleft(), channel)
+                self.send(queue.popleft(), channel)
 
 
 def _channel(number: int, control: InputPort[Any], width: int, name: str) -> int:

@@ -28,6 +28,7 @@ from .core import (
     token_type,
 )
 from .expression import FormulaParameter, operand
+from .matching import matched
 
 FUNCTION_GROUP = "epicycle.functions"
 _KINDS: dict[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
@@ -48,7 +49,9 @@ class Expression(Actor):
     (``state['position'][0]``).  What ``${...}`` puts into the text is put in as it is written, so a value that may be
     negative belongs in parentheses: ``(${a}) ** 2``.
 
-    Nothing is sent before every input has had a token.  Ptolemy: ``Expression``, which demands all tokens at once.
+    Nothing is sent before every input has had a token.  Where the inputs keep their tokens, as in Ptolemy, each is used
+    once: with those of the other inputs that are their turn.  Ptolemy: ``Expression``, and most actors that compute
+    something of one token: ``input[index]`` is its ``ArrayElement``.
     """
 
     output: OutputPort[Any] = OutputPort(float, doc="the value of the expression")
@@ -58,27 +61,36 @@ class Expression(Actor):
         str,
         None,
         choices=tuple(_KINDS),
+        ptolemy="any value",
         doc="what the value is; a truth value for a comparison and otherwise a number if left out",
     )
     hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+    iteration = Parameter(bool, False, doc="whether the name 'iteration' is the number of the evaluation, from 1")
 
     def check(self) -> None:
         self._kind = self.gives or ("truth value" if self.expression.is_condition else "number")
         self.output.type = _KINDS[self._kind]
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
-        names = [name for name in self.expression.names if name != "time"]
-        return {name: InputPort(doc="a name of the expression") for name in names}
+        known = ("time", "iteration") if self.iteration else ("time",)
+        names = [name for name in self.expression.names if name not in known]
+        return {name: InputPort(ptolemy={"keep": True}, doc="a name of the expression") for name in names}
 
     def initialize(self) -> None:
-        self._latest = Latest(list(self.inputs.values()), hold=self.hold)
+        self._ports = list(self.inputs.values())
+        self._latest = Latest(self._ports, hold=self.hold)
+        self._count = 0
 
     def fire(self) -> None:
-        for values in self._latest.rounds():
+        keeps = any(port.keep for port in self._ports)
+        for values in matched(self._ports) if keeps else self._latest.rounds():
             self.output.send(self._value(values))
 
     def _value(self, values: dict[str, Any]) -> Any:
         formula, values["time"] = self.expression, self.now
+        if self.iteration:
+            self._count += 1
+            values["iteration"] = self._count
         value = formula.of_floats(*map(values.get, formula.names))
         if value is None:
             value = formula({name: operand(token) for name, token in values.items()})
@@ -217,7 +229,11 @@ class LookupTable(Actor):
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="the table")
     at: Parameter[Any] = array_parameter((None,), None, doc="the arguments of the values, ascending")
     outside = Parameter(
-        str, "error", choices=("error", "nearest", "nothing"), doc="what is sent for an input beyond the table's ends"
+        str,
+        "error",
+        choices=("error", "nearest", "nothing"),
+        ptolemy="nothing",
+        doc="what is sent for an input beyond the table's ends",
     )
 
     def check(self) -> None:

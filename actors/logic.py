@@ -1,4 +1,4 @@
-"""Decisions: LogicGate, Comparator."""
+"""Decisions: LogicGate, Comparator, Equals."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from .core import ABSENT, Actor, InputPort, Latest, OutputPort, Parameter, present, rounds
+from .matching import matched
 
 GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
     "and": all,
@@ -60,12 +61,13 @@ COMPARISONS: Final[dict[str, Callable[[Any, Any, float], bool]]] = {
 class Comparator(Actor):
     """Compares ``left`` with ``right``, or with ``value`` if nothing is connected to ``right``.
 
-    A tolerance widens what passes: ``left >= right`` holds down to ``right - tolerance``.  Ptolemy: ``Comparator``,
-    ``Equals``.
+    A tolerance widens what passes: ``left >= right`` holds down to ``right - tolerance``.  Where the ports keep their
+    tokens, as in Ptolemy, each is compared once: with the token of the other side that is its turn.
+    Ptolemy: ``Comparator``.
     """
 
-    left: InputPort[Any] = InputPort(float | bool | str, doc="the left side")
-    right: InputPort[Any] = InputPort(float | bool | str, required=False, doc="the right side")
+    left: InputPort[Any] = InputPort(float | bool | str, ptolemy={"keep": True}, doc="the left side")
+    right: InputPort[Any] = InputPort(float | bool | str, required=False, ptolemy={"keep": True}, doc="the right side")
     output = OutputPort(bool, doc="whether the comparison holds")
 
     comparison = Parameter(str, choices=tuple(COMPARISONS), doc="which comparison")
@@ -78,5 +80,24 @@ class Comparator(Actor):
 
     def fire(self) -> None:
         compare = COMPARISONS[self.comparison]
-        for values in self._latest.rounds():
+        for values in matched([self.left, self.right]) if self.left.keep else self._latest.rounds():
             self.output.send(compare(values["left"], values.get("right", self.value), self.tolerance))
+
+
+class Equals(Actor):
+    """Tells whether the tokens that come together are all equal; channels without a token do not count.
+
+    Ptolemy: ``Equals``.
+    """
+
+    input = InputPort(multi=True, doc="what is compared")
+    output = OutputPort(bool, doc="whether all are equal")
+
+    tolerance = Parameter(
+        float, 0.0, min=0, doc="by how much numbers may differ from the first and still count as equal"
+    )
+
+    def fire(self) -> None:
+        for (tokens,) in rounds(self.input):
+            first, *others = present(tokens)
+            self.output.send(all(_equal(first, other, self.tolerance) for other in others))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .core import (
+    ABSENT,
     Actor,
     EpicycleError,
     InputPort,
@@ -19,6 +21,7 @@ from .core import (
     Tag,
     array_parameter,
     counted,
+    rounds,
     visible_lines,
 )
 
@@ -125,8 +128,10 @@ class Histogram(Actor):
 class Test(Actor):
     """Compares what comes with what is expected, in order, and ends the run with an error where they differ.
 
-    Numbers may differ by ``tolerance``, also within lists; everything else must be equal.  Values that are missing at
-    the end of the run are an error, too.  Ptolemy: ``Test``, ``NonStrictTest``.
+    Numbers may differ by ``tolerance``, also within lists and fields; everything else must be equal.  Values that are
+    missing at the end of the run are an error, too, and so is a token too many, unless more may ``follow``.  With
+    ``together``, each value is a list of what comes together, a token on each channel.
+    Ptolemy: ``Test``, ``NonStrictTest``.
     """
 
     __test__: ClassVar[bool] = False  # for pytest, which would take it for a class of tests
@@ -139,27 +144,44 @@ class Test(Actor):
     )
     tolerance = Parameter(float, 1e-9, min=0, doc="by how much a number, or a time in s, may differ")
     complete = Parameter(bool, True, doc="whether all values must have come when the run ends")
+    together = Parameter(bool, False, doc="whether a value is a list, of a token on each channel")
+    follow = Parameter(bool, False, ptolemy=True, doc="whether other tokens may come after those that are expected")
 
     def check(self) -> None:
         if self.times is not None and len(self.times) != len(self.values):
             raise ParameterError(f"{counted(len(self.times), 'time')} for {counted(len(self.values), 'value')}")
+        if self.together:
+            for index, value in enumerate(self.values):
+                if not isinstance(value, (list, tuple)):
+                    raise ParameterError(f"values: value {index} is {value!r}, no list of a token on each channel")
 
     def initialize(self) -> None:
         self._seen = 0
 
     def fire(self) -> None:
-        for token in self.input.tokens:
-            index = self._seen
-            self._seen += 1
-            if index >= len(self.values):
-                raise EpicycleError(f"token {index} is {token!r}, but only {len(self.values)} are expected")
-            expected = self.values[index]
-            if not _alike(token, expected, self.tolerance):
-                raise EpicycleError(f"token {index} is {token!r}, expected {expected!r}{self._within()}")
-            if self.times is not None and abs(self.now - self.times[index]) > self.tolerance:
-                raise EpicycleError(
-                    f"token {index} came at {self.now:.9g} s, expected at {self.times[index]:.9g} s{self._within()}"
-                )
+        if not self.together:
+            for token in self.input.tokens:
+                self._compare(token)
+            return
+        for (tokens,) in rounds(self.input):
+            if ABSENT in tokens and self._seen < len(self.values):
+                raise EpicycleError(f"for value {self._seen} no token came on channel {tokens.index(ABSENT)}")
+            self._compare(tokens)
+
+    def _compare(self, token: Any) -> None:
+        index = self._seen
+        if index >= len(self.values) and self.follow:
+            return
+        self._seen += 1
+        if index >= len(self.values):
+            raise EpicycleError(f"token {index} is {token!r}, but only {len(self.values)} are expected")
+        expected = self.values[index]
+        if not _alike(token, expected, self.tolerance):
+            raise EpicycleError(f"token {index} is {token!r}, expected {expected!r}{self._within()}")
+        if self.times is not None and abs(self.now - self.times[index]) > self.tolerance:
+            raise EpicycleError(
+                f"token {index} came at {self.now:.9g} s, expected at {self.times[index]:.9g} s{self._within()}"
+            )
 
     def _within(self) -> str:
         return f" within {self.tolerance:g}" if self.tolerance else ""
@@ -173,12 +195,14 @@ class Test(Actor):
 
 
 def _alike(token: Any, expected: Any, tolerance: float) -> bool:
-    """Whether a token is what is expected; lists and arrays are compared item by item."""
+    """Whether a token is what is expected; lists, arrays and fields are compared item by item."""
     if isinstance(token, (np.ndarray, np.generic)):
         token = token.tolist()
     if isinstance(expected, (list, tuple)):
         is_list = isinstance(token, (list, tuple)) and len(token) == len(expected)
         return is_list and all(_alike(one, other, tolerance) for one, other in zip(token, expected, strict=True))
+    if isinstance(expected, Mapping) and isinstance(token, Mapping):
+        return token.keys() == expected.keys() and all(_alike(token[k], expected[k], tolerance) for k in expected)
     if isinstance(expected, bool) or isinstance(token, bool):
         return token is expected
     if isinstance(expected, (int, float)) and isinstance(token, (int, float)):

@@ -1,12 +1,18 @@
 """Where tokens begin: Clock, PoissonClock and SingleEvent of their own accord, and what answers a trigger: Const, Ramp,
-Sequence, Random, CurrentTime, CurrentMicrostep."""
+Sequence, Pulse, Random, CurrentTime, CurrentMicrostep.
+
+Triggers that come together, one at each connection, are one trigger, but for CurrentTime.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 from .core import (
+    NEVER,
     Actor,
+    EpicycleError,
     InputPort,
     OutputPort,
     Parameter,
@@ -14,10 +20,13 @@ from .core import (
     PortParameter,
     Wake,
     array_parameter,
+    rounds,
     to_nanoseconds,
+    to_seconds,
     token_type,
 )
 from .distributions import Distribution
+from .generators import Generator
 
 
 class _Ticking(Actor):
@@ -53,18 +62,30 @@ class Clock(_Ticking):
     """Ticks at fixed times without drift: in cycle k at ``offset + k * period`` plus each of ``offsets``.
 
     Times are counted in whole nanoseconds from the start of the run, or from the latest ``start`` token if that port
-    is connected.  Two equal offsets tick in successive microsteps.  A new period counts from the next cycle on.
-    Ptolemy: ``DiscreteClock``, ``Clock``.
+    is connected.  Ticks of one time, be it of equal offsets or of one that is the whole period, come in successive
+    microsteps.  After an infinite period there is no other.  A new period counts from the next cycle on, or
+    ``at once``: for the wait from the last tick of a cycle to the next, unless it would be over already.
+
+    With ``trigger`` connected, the first tick is sent, and then those for which a trigger has come since the tick
+    before, or comes with them; the others are left out.  Ptolemy: ``DiscreteClock``; with ``new_period: at once`` and
+    ``late_trigger`` its ``Clock``.
     """
 
     is_source: ClassVar[bool] = True
 
     start = InputPort(required=False, doc="begins a first cycle; if connected, nothing else does")
     stop = InputPort(required=False, doc="ends the ticking until the next start")
+    trigger = InputPort(multi=True, required=False, doc="lets the next tick be sent; all are, if not connected")
 
     period = PortParameter(float, unit="s", above=0, doc="length of a cycle, rounded to whole nanoseconds")
     offset = Parameter(float, 0.0, unit="s", min=0, doc="time from the start to the first cycle")
     offsets = array_parameter((None,), [0.0], unit="s", min=0, doc="when each cycle ticks, in order")
+    cycles: Parameter[int | None] = Parameter(int, None, min=1, doc="how many cycles there are; no end if left out")
+    new_period = Parameter(str, "next cycle", choices=("next cycle", "at once"), doc="from when on a new period counts")
+    reset_period = Parameter(bool, False, ptolemy=True, doc="whether a start gives back the period of the model")
+    late_trigger = Parameter(
+        bool, False, doc="whether a trigger still lets a tick be sent that was left out at an earlier microstep"
+    )
 
     def check(self) -> None:
         super().check()
@@ -73,68 +94,136 @@ class Clock(_Ticking):
         self._check_period(self.period)
 
     def _check_period(self, period: float) -> None:
-        if self.offsets[-1] >= period:
+        if self.offsets[-1] > period:
             raise ParameterError(f"offsets: {self.offsets[-1]:g} s is not within the period of {period:g} s")
+
+    @property
+    def is_endless(self) -> bool:
+        return super().is_endless and self.cycles is None and Clock.period.port_of(self).given < math.inf
 
     def initialize(self) -> None:
         self._offsets = [to_nanoseconds(offset) for offset in self.offsets]
         self._wake: Wake | None = None
+        self._left_out: tuple[int, int] | None = None  # the latest tick that was not sent, and its time
         if not self.start.width:
             self._begin()
             self._wake = self._wake_at(self._next)
 
     def _begin(self) -> None:
         """Lay the first cycle from now on."""
-        self._cycle = self.tag.time + to_nanoseconds(self.offset)
+        self._cycle = self._before = self.tag.time + to_nanoseconds(self.offset)
         self._tick = 0
+        self._may_tick = True
 
     @property
     def _next(self) -> int:
         """The time of the next tick."""
         return self._cycle + self._offsets[self._tick % len(self._offsets)]
 
+    def _wake_for_next(self) -> Wake | None:
+        if self.cycles is not None and self._tick >= self.cycles * len(self._offsets):
+            return None
+        return self._wake_at(self._next) if self._cycle < NEVER else None
+
     def fire(self) -> None:
         due = self._wake is not None and self._wake.due
         if self.start.present or self.stop.present:
-            if self._wake is not None:
-                self._wake.cancel()
-            self._wake = None
+            self._call_off()
             due = False
         if self.start.present and not self.stop.present:
+            if self.reset_period and not self.inputs["period"].present:
+                Clock.period.port_of(self).reset()
             self._begin()
             due = self._next == self.tag.time
             if not due:
                 self._wake = self._wake_at(self._next)
+        elif self.inputs["period"].present and self.new_period == "at once" and self._wake is not None:
+            due = self._lay_anew(due)
+        if self.trigger.present:
+            self._may_tick = True
         if due:
+            self._pass()
+        elif self.late_trigger and self.trigger.present and self._left_out is not None:
+            tick, time = self._left_out
+            if time == self.tag.time:
+                self._send(tick)
+                self._left_out, self._may_tick = None, False
+
+    def _call_off(self) -> None:
+        if self._wake is not None:
+            self._wake.cancel()
+        self._wake = None
+
+    def _lay_anew(self, due: bool) -> bool:
+        """Let the next cycle begin a new period after the one before, if it waits for its begin; whether it is due."""
+        begin = self._after(self._before)
+        if self._tick == 0 or self._tick % len(self._offsets) or begin < self.tag.time:
+            return due
+        self._call_off()
+        self._cycle = begin
+        if self._next == self.tag.time:
+            return True
+        self._wake = self._wake_for_next()
+        return False
+
+    def _after(self, begin: int) -> int:
+        """When the cycle begins that follows one that began then."""
+        # Counted in integers, so that no rounding adds up over a long run.
+        return NEVER if math.isinf(self.period) else begin + to_nanoseconds(self.period)
+
+    def _pass(self) -> None:
+        """Tick, and wait for the next."""
+        if self._may_tick or not self.trigger.width:
             self._send(self._tick)
-            self._tick += 1
-            if self._tick % len(self._offsets) == 0:
-                self._check_period(self.period)
-                # Counted in integers, so that no rounding adds up over a long run.
-                self._cycle += to_nanoseconds(self.period)
-            self._wake = self._wake_at(self._next)
+        else:
+            self._left_out = self._tick, self.tag.time
+        self._may_tick = False
+        self._tick += 1
+        if self._tick % len(self._offsets) == 0:
+            self._check_period(self.period)
+            self._before, self._cycle = self._cycle, self._after(self._cycle)
+        self._wake = self._wake_for_next()
 
 
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    Ptolemy: ``PoissonClock``.
+    A trigger lets one come at once, from which the time to the next is drawn anew.  Ptolemy: ``PoissonClock``.
     """
+
+    is_source: ClassVar[bool] = True
+
+    trigger = InputPort(multi=True, required=False, doc="lets a tick come at once")
 
     mean_interval = Parameter(float, 1.0, unit="s", above=0, doc="mean time between two ticks")
     fire_at_start = Parameter(bool, True, doc="whether the first tick comes at the start")
+    generator: Parameter[Generator | None] = Parameter(
+        Generator, None, doc="another program's generator, if it is to give the numbers"
+    )
+
+    def check(self) -> None:
+        super().check()
+        self._numbers = None if self.generator is None else self.generator.numbers()
 
     def initialize(self) -> None:
         self._tick = 0
-        self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
+        self._rest = 0.0
+        self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
     def _interval(self) -> int:
-        return to_nanoseconds(self.random.exponential(self.mean_interval))
+        if self._numbers is None:
+            return to_nanoseconds(self.random.exponential(self.mean_interval))
+        # What whole nanoseconds leave over is added to the next, or it would add up against the other program.
+        interval = self._numbers.exponential(self.mean_interval) + self._rest
+        self._rest = interval - to_seconds(to_nanoseconds(interval))
+        return to_nanoseconds(interval)
 
     def fire(self) -> None:
+        if self._wake is not None and not self._wake.due:
+            self._wake.cancel()
         self._send(self._tick)
         self._tick += 1
-        self._wake_at(self.tag.time + self._interval())
+        self._wake = self._wake_at(self.tag.time + self._interval())
 
 
 class SingleEvent(Actor):
@@ -162,7 +251,31 @@ class SingleEvent(Actor):
         self.output.send(self.value)
 
 
-class Const(Actor):
+def _times(trigger: InputPort[Any]) -> int:
+    """How often to answer at this tag."""
+    return len(trigger.tokens) if trigger.width <= 1 else len(list(rounds(trigger)))
+
+
+class _Answering(Actor):
+    """What sources have in common that answer triggers, as often as they may."""
+
+    trigger = InputPort(multi=True, doc="when to send")
+
+    limit: Parameter[int | None] = Parameter(int, None, min=1, doc="how many answers there are; no end if left out")
+
+    def initialize(self) -> None:
+        self._answers = 0
+
+    def answers(self) -> int:
+        """How often to answer at this tag."""
+        wanted = _times(self.trigger) if self.trigger.width or self.trigger.required else 1
+        if self.limit is not None:
+            wanted = min(wanted, self.limit - self._answers)
+        self._answers += wanted
+        return wanted
+
+
+class Const(_Answering):
     """Sends the same value for each trigger; once at the start if ``trigger`` is not connected.
 
     The distribution that gives the same value always is ``Constant``.  Ptolemy: ``Const``.
@@ -170,7 +283,7 @@ class Const(Actor):
 
     is_source: ClassVar[bool] = True
 
-    trigger = InputPort(required=False, doc="when to send; once at the start if not connected")
+    trigger = InputPort(multi=True, required=False, doc="when to send; once at the start if not connected")
     output = OutputPort(doc="the value")
 
     value: Parameter[Any] = Parameter(object, 1, doc="what is sent")
@@ -179,32 +292,44 @@ class Const(Actor):
         self.output.type = token_type([self.value])
 
     def initialize(self) -> None:
+        super().initialize()
         if not self.trigger.width:
             self.wake_in(0)
 
     def fire(self) -> None:
-        for _ in self.trigger.tokens if self.trigger.width else (None,):
+        for _ in range(self.answers()):
             self.output.send(self.value)
 
 
-class Ramp(Actor):
+class Ramp(_Answering):
     """Counts triggers: sends ``init`` for the first, and for each further one the last number plus ``step``.
 
-    The numbers are integers if ``init`` and ``step`` are.  Ptolemy: ``Ramp``.
+    The numbers are integers if ``init`` and ``step`` are; then a step that comes must be one, too.  Ptolemy: ``Ramp``.
     """
 
-    trigger = InputPort(doc="when to send")
     output = OutputPort(float, doc="the number")
 
     init: Parameter[float] = Parameter(int | float, 0, doc="the first number")
     step: PortParameter[float] = PortParameter(int | float, 1, doc="what is added from one to the next")
+    late_step = Parameter(bool, False, ptolemy=True, doc="whether a step counts behind the next number, not before it")
+
+    def check(self) -> None:
+        self.output.type = int if isinstance(self.init, int) and isinstance(self.step, int) else float
 
     def initialize(self) -> None:
+        super().initialize()
         self._last: float | None = None
+        self._step: float = 0  # behind the last number
 
     def fire(self) -> None:
-        for _ in self.trigger.tokens:
-            self._last = self.init if self._last is None else self._last + self.step
+        for _ in range(self.answers()):
+            step = self._step if self.late_step else self.step
+            self._last, self._step = self.init if self._last is None else self._last + step, self.step
+            if self.output.type is int and not isinstance(self._last, int):
+                raise EpicycleError(
+                    f"init and step are whole numbers, and so is what is sent, but a step of {self.step!r} has come; "
+                    f"write 'init: {self.init:.1f}' for numbers that are not whole"
+                )
             self.output.send(self._last)
 
 
@@ -215,14 +340,17 @@ class Sequence(Actor):
     token of ``enable`` is a trigger.  Ptolemy: ``Sequence``.
     """
 
-    trigger = InputPort(required=False, doc="when to send")
+    trigger = InputPort(multi=True, required=False, doc="when to send")
     enable = InputPort(bool, required=False, doc="whether to send")
     output = OutputPort(doc="the values in turn")
 
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is sent")
     repeat = Parameter(bool, False, doc="whether to begin again after the last value")
+    hold = Parameter(bool, False, doc="whether the last value is sent again and again when all are used up")
 
     def check(self) -> None:
+        if self.repeat and self.hold:
+            raise ParameterError("repeat and hold cannot both be true: after the last value comes the first, or itself")
         self.output.type = token_type(self.values)
 
     def initialize(self) -> None:
@@ -235,13 +363,60 @@ class Sequence(Actor):
             if self._next < len(self.values):
                 self.output.send(self.values[self._next])
                 self._next += 1
+                if self.hold:
+                    self._next = min(self._next, len(self.values) - 1)
 
     def _triggers(self) -> int:
         if not self.enable.width:
-            return len(self.trigger.tokens)
+            return _times(self.trigger)
         if not self.trigger.width:
             return sum(map(bool, self.enable.tokens))
-        return len(self.trigger.tokens) if self.enable.present and self.enable.value else 0
+        return _times(self.trigger) if self.enable.present and self.enable.value else 0
+
+
+class Pulse(_Answering):
+    """Sends a value at certain triggers, counted from 0, and a zero like it at all others.
+
+    A zero is 0, 0.0, false, an empty text, or a list of zeros.  Ptolemy: ``Pulse``.
+    """
+
+    output = OutputPort(doc="a value, or zero")
+
+    values: Parameter[Any] = Parameter(object, [1, 0], shape=(None,), doc="what is sent")
+    indexes: Parameter[Any] = Parameter(object, [0, 1], shape=(None,), doc="at which triggers, ascending")
+    repeat = Parameter(bool, False, doc="whether to count from 0 again after the last value")
+
+    def check(self) -> None:
+        count = [each for each in self.indexes if isinstance(each, int) and not isinstance(each, bool) and each >= 0]
+        if len(count) != len(self.indexes) or count != sorted(set(count)):
+            raise ParameterError(f"indexes: {list(self.indexes)} is not an ascending list of whole numbers from 0 on")
+        if not self.values or len(self.values) != len(self.indexes):
+            raise ParameterError(f"there are {len(self.values)} values for {len(self.indexes)} indexes")
+        self.output.type = token_type(self.values)
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._count = 0  # of triggers
+        self._place = 0  # of the next value
+
+    def fire(self) -> None:
+        for _ in range(self.answers()):
+            if self._place == len(self.values) and self.repeat:
+                self._count = self._place = 0
+                if self.indexes[0] > 0:  # as there: the trigger that begins anew is answered only by a value
+                    self._count = 1
+                    continue
+            if self._place < len(self.values) and self._count == self.indexes[self._place]:
+                self.output.send(self.values[self._place])
+                self._place += 1
+            else:
+                self.output.send(_zero(self.values[0]))
+            self._count += 1
+
+
+def _zero(value: Any) -> Any:
+    """What is nothing, of the kind of a value."""
+    return [_zero(each) for each in value] if isinstance(value, (list, tuple)) else type(value)()
 
 
 class Random(Actor):
@@ -250,26 +425,31 @@ class Random(Actor):
     Ptolemy: ``Gaussian``, ``Uniform``, ``ColtExponential``, ``Bernoulli``, ``DiscreteRandomSource`` and others.
     """
 
-    trigger = InputPort(doc="when to send")
+    trigger = InputPort(multi=True, doc="when to send")
     output = OutputPort(doc="the token drawn")
 
     distribution: Parameter[Distribution] = Parameter(Distribution, doc="what is drawn from")
+    generator: Parameter[Generator | None] = Parameter(
+        Generator, None, doc="another program's generator, if it is to give the numbers"
+    )
 
     def check(self) -> None:
         self.output.type = self.distribution.token_type
+        self._numbers = None if self.generator is None else self.generator.numbers()
 
     def fire(self) -> None:
-        for _ in self.trigger.tokens:
-            self.output.send(self.distribution.draw(self.random))
+        numbers: Any = self.random if self._numbers is None else self._numbers
+        for _ in range(_times(self.trigger)):
+            self.output.send(self.distribution.draw(numbers))
 
 
 class CurrentTime(Actor):
-    """Sends the present time for each trigger.
+    """Sends the present time for each trigger, those that come together included.
 
     Ptolemy: ``CurrentTime``.
     """
 
-    trigger = InputPort(doc="when to send")
+    trigger = InputPort(multi=True, doc="when to send")
     output = OutputPort(float, doc="the time in s")
 
     def fire(self) -> None:
@@ -283,9 +463,9 @@ class CurrentMicrostep(Actor):
     Ptolemy: ``CurrentMicrostep``.
     """
 
-    trigger = InputPort(doc="when to send")
+    trigger = InputPort(multi=True, doc="when to send")
     output = OutputPort(int, doc="the microstep, from 1")
 
     def fire(self) -> None:
-        for _ in self.trigger.tokens:
+        for _ in range(_times(self.trigger)):
             self.output.send(self.tag.microstep)

@@ -66,7 +66,8 @@ class Harness:
     def fire(self, seconds: float, microstep: int = 1, **tokens: Any) -> None:
         """Fire once at a tag, with a token for each of these inputs; wake-ups of this tag are due.
 
-        A list of tokens goes to the channels of a port that takes several connections, one each, None left out.
+        A list of tokens goes to the channels of a port that takes several connections, one each, None left out; what is
+        no list goes to the first.
         """
         self._fire(Tag(to_nanoseconds(seconds), microstep), tokens.items())
 
@@ -102,7 +103,7 @@ class Harness:
             self.environment.run(until=tag.time)
         for name, token in tokens:
             port = self.actor.inputs[name]
-            each_channel = token if port.multi else [token]
+            each_channel = token if port.multi and isinstance(token, list) else [token]
             port.width = max(port.width, len(each_channel))
             for channel, each in enumerate(each_channel):
                 if each is not None:

@@ -1,32 +1,79 @@
-"""Actors that deal with time: TimeDelay, Timer, ResettableTimer, TimeGap."""
+"""Actors that deal with time: TimeDelay, Timer, ResettableTimer, WaitingTime, TimeCompare, TimeGap."""
 
 from __future__ import annotations
 
+import heapq
+from bisect import insort
+from collections import deque
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, Pending, PortParameter, Tag, Wake, to_seconds, token_type
+from .core import (
+    Actor,
+    InputPort,
+    OutputPort,
+    Parameter,
+    Pending,
+    PortParameter,
+    Tag,
+    Wake,
+    to_nanoseconds,
+    to_seconds,
+    token_type,
+)
 
 
 class TimeDelay(Actor):
     """Sends each token on after a delay; with delay 0 at the next microstep.
 
     A token is delayed by what ``delay`` is at its own tag, so one may overtake another.  The output does not depend
-    on the inputs at once: the actor may stand in a loop.  Ptolemy: ``TimeDelay``, ``TimedDelay``, ``VariableDelay``.
+    on the inputs at once: the actor may stand in a loop.  With ``steps`` a token keeps its microstep, and those that
+    are due at one time leave one by one, at successive microsteps.  Ptolemy: ``TimeDelay``, ``TimedDelay``,
+    ``VariableDelay``.
     """
 
     input = InputPort(doc="what is delayed")
     output = OutputPort(depends_on=(), doc="each token after its delay")
 
     delay = PortParameter(float, 1.0, unit="s", min=0, doc="how long each token is held")
+    steps = Parameter(bool, False, ptolemy=True, doc="whether tokens keep their microsteps and leave one by one")
 
     def initialize(self) -> None:
-        self._held: Pending[Any] = Pending(self)
+        self._held: Pending[Any] | _Steps = _Steps(self) if self.steps else Pending(self)
 
     def fire(self) -> None:
         for token in self._held.due():
             self.output.send(token)
         for token in self.input.tokens:
             self._held.put(token, self.delay)
+
+
+class _Steps:
+    """What a delay holds that keeps microsteps: as in Ptolemy, where an actor has a firing for each token that comes.
+
+    In each of them one leaves at most that is due, and what is left is looked at again at the next microstep.
+    """
+
+    def __init__(self, actor: TimeDelay) -> None:
+        self._actor = actor
+        self._line: list[tuple[int, int, int, Any]] = []  # tokens with their times, microsteps and numbers
+        self._number = 0
+
+    def put(self, token: Any, delay: float) -> None:
+        """Keep a token for ``delay`` seconds; 0 is the next microstep."""
+        now, wake = self._actor.tag, self._actor.wake_in(delay)
+        microstep = now.microstep if wake.time > now.time else wake.microstep
+        heapq.heappush(self._line, (wake.time, microstep, self._number, token))
+        self._number += 1
+
+    def due(self) -> list[Any]:
+        """Take out what leaves now."""
+        now, found = self._actor.tag, list[Any]()
+        most = max(1, len(self._actor.input.tokens))
+        while self._line and self._line[0][:2] <= now and len(found) < most:
+            found.append(heapq.heappop(self._line)[3])
+        if self._line and self._line[0][0] <= now.time:
+            self._actor.wake_in(0)
+        return found
 
 
 class _Timing(Actor):
@@ -44,39 +91,130 @@ class _Timing(Actor):
 class Timer(_Timing):
     """Sends a value after as many seconds as a token says; any number of tokens may be waiting at once.
 
+    With ``one_at_a_time``, as in Ptolemy, a firing sends one value; what is due as well follows in the next microsteps.
     Ptolemy: ``Timer``.
     """
 
+    one_at_a_time = Parameter(
+        bool, False, ptolemy=True, doc="whether values of one time leave in successive microsteps"
+    )
+
     def initialize(self) -> None:
         self._running: Pending[None] = Pending(self)
+        self._ends: list[int] = []  # of those that run one at a time, ascending
 
     def fire(self) -> None:
+        if self.one_at_a_time:
+            for delay in self.input.tokens or (None,):
+                self._take(delay)
+            return
         for _ in self._running.due():
             self.output.send(self.value)
         for delay in self.input.tokens:
-            if delay < 0:
-                raise ValueError(f"{self.input.path} is {delay:g} s: a timer cannot run for less than no time")
-            self._running.put(None, delay)
+            self._running.put(None, self._checked(delay))
+
+    def _take(self, delay: float | None) -> None:
+        """Send one value that is due, and take a token, if there is one."""
+        now = self.tag.time
+        if self._ends and self._ends[0] == now:
+            del self._ends[0]
+            self.output.send(self.value)
+        if self._ends and self._ends[0] == now:
+            self.wake_in(0)
+        if delay is not None:
+            self.wake_in(self._checked(delay))
+            insort(self._ends, now + to_nanoseconds(delay))
+
+    def _checked(self, delay: float) -> float:
+        if delay < 0:
+            raise ValueError(f"{self.input.path} is {delay:g} s: a timer cannot run for less than no time")
+        return delay
 
 
 class ResettableTimer(_Timing):
     """Sends a value after as many seconds as the latest token says.
 
     A further token before that starts the time again, a negative one stops it.  A token at the very tag at which the
-    time is over comes too late to stop that.  Ptolemy: ``ResettableTimer``.
+    time is over comes too late to stop that.  If it is not ``preemptive``, times run one after the other: each begins
+    when the one before it is over, and a negative token takes back the one that waits last, or else the one that runs.
+    Ptolemy: ``ResettableTimer``, ``NonInterruptibleTimer`` (not preemptive).
     """
+
+    preemptive = Parameter(bool, True, doc="whether a token starts the time again; if not, it waits until that is over")
 
     def initialize(self) -> None:
         self._wake: Wake | None = None
+        self._waiting: deque[float] = deque()
 
     def fire(self) -> None:
         if self._wake is not None and self._wake.due:
             self._wake = None
             self.output.send(self.value)
         for delay in self.input.tokens:
-            if self._wake is not None:
-                self._wake.cancel()
-            self._wake = self.wake_in(delay) if delay >= 0 else None
+            if self.preemptive:
+                self._stop()
+                self._wake = self.wake_in(delay) if delay >= 0 else None
+            elif delay >= 0:
+                self._waiting.append(delay)
+            elif self._waiting:
+                self._waiting.pop()
+            else:
+                self._stop()
+        if self._waiting and self._wake is None:
+            self._wake = self.wake_in(self._waiting.popleft())
+
+    def _stop(self) -> None:
+        if self._wake is not None:
+            self._wake.cancel()
+        self._wake = None
+
+
+class WaitingTime(Actor):
+    """Sends how long each token of ``waiter`` has waited for a token of ``waited_for``; tokens of one tag wait for 0 s.
+
+    Ptolemy: ``WaitingTime``, where the port is called ``waitee``.
+    """
+
+    waiter = InputPort(doc="what waits")
+    waited_for = InputPort(doc="what ends the waiting of all that wait")
+    output = OutputPort(float, doc="how long each has waited, in s, in the order in which they came")
+
+    def initialize(self) -> None:
+        self._since: list[int] = []
+
+    def fire(self) -> None:
+        now = self.tag.time
+        self._since += [now] * len(self.waiter.tokens)
+        if self.waited_for.present:
+            for time in self._since:
+                self.output.send(to_seconds(now - time))
+            self._since.clear()
+
+
+class TimeCompare(Actor):
+    """Sends by how much a token of ``second`` comes after one of ``first``: the one after its first, and so on.
+
+    Ptolemy: ``TimeCompare``, where the ports are called ``input1`` and ``input2``.
+    """
+
+    first = InputPort(doc="from when on time is taken")
+    second = InputPort(doc="up to when it is taken")
+    output = OutputPort(float, doc="the time of the second less that of the first, in s")
+
+    nonnegative = Parameter(bool, False, doc="whether tokens of 'second' that came before their first are passed over")
+
+    def initialize(self) -> None:
+        self._firsts: deque[int] = deque()
+        self._seconds: deque[int] = deque()
+
+    def fire(self) -> None:
+        for port, times in ((self.first, self._firsts), (self.second, self._seconds)):
+            times.extend([self.tag.time] * len(port.tokens))
+        while self._firsts and self._seconds:
+            difference = self._seconds.popleft() - self._firsts[0]
+            if difference >= 0 or not self.nonnegative:
+                self._firsts.popleft()
+                self.output.send(to_seconds(difference))
 
 
 class TimeGap(Actor):

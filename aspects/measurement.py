@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epicycle.actors import Distribution, EpicycleError, Normal, Parameter, Stream, Uniform, texts_parameter
-from epicycle.actors.expression import PortFormulaParameter
+from epicycle.actors.expression import PortFormulaParameter, operand
 
 from .core import JoinPoint, LawParameter, MeasurementAspect, RandomLoss, altered, is_bad, law, stamped_as
 
@@ -191,6 +191,33 @@ class Transform(Alteration):
         result = numbers.copy()
         result[known] = new
         return result
+
+
+class Replace(MeasurementAspect):
+    """Replaces what passes, of whatever kind, by an expression of it, of the time and of what ports have sent last.
+
+    At a parameter it lets it go by a variable of the model: ``to: limit.value + 1``.  Nothing is replaced as long as
+    one of the ports has sent nothing, and NaN stays as it is.  Event: ``replaced``, with the new value.
+    """
+
+    events: ClassVar[tuple[str, ...]] = ("replaced",)
+    alters_parameters: ClassVar[bool] = True
+    alters_numbers: ClassVar[bool] = False
+
+    to = PortFormulaParameter(
+        given=("value", "time"),
+        doc="expression over what passes (value), the time in s (time) and ports, such as value and switch.output",
+    )
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        assert self.to is not None
+        given = operand(token)
+        is_nan = isinstance(given, float) and math.isnan(given)
+        new = None if is_nan else point.value_of(self.to, value=given, time=point.now)
+        if new is not None and (type(new) is not type(given) or new != given):
+            point.act("replaced", token, new)
+            token = new
+        point.forward(token)
 
 
 class Outlier(Alteration):

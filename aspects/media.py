@@ -95,10 +95,11 @@ class Bus(Medium):
     """Carries one message at a time, whatever its port: a server with one queue, by priority and not preemptive.
 
     The carriage of a message takes ``factor`` * length.  It arrives when that is over, and when that is at once it
-    leaves no trace.  At the output of its sender a broadcast is carried once, at the inputs of its receivers once for
-    each.  Events: ``delayed``, when it arrives, with the seconds since it came; ``dropped``, for want of a
-    place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share in which the bus carries;
-    ``mean_wait``, the mean time from coming to the begin of carriage; ``mean_queue``, the mean number that wait.
+    leaves no trace, or, with ``steps``, takes a microstep.  At the output of its sender a broadcast is carried once, at
+    the inputs of its receivers once for each.  Events: ``delayed``, when it arrives, with the seconds since it came;
+    ``dropped``, for want of a place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share
+    in which the bus carries; ``mean_wait``, the mean time from coming to the begin of carriage; ``mean_queue``, the
+    mean number that wait.
 
     With Poisson arrivals at rate a and a constant carriage s it is M/D/1: utilisation r = a s and
     mean_wait = r s / (2 (1 - r)) (Pollaczek-Khinchine); with priorities, mean_wait of class k is
@@ -110,9 +111,10 @@ class Bus(Medium):
     reports: ClassVar[dict[str, str]] = {"utilisation": "1", "mean_wait": "s", "mean_queue": "1"}
 
     factor = Parameter(float, min=0.0, unit="s", doc="time that it takes to carry a message of length 1")
+    steps = Parameter(bool, False, ptolemy=True, doc="whether a message that takes no time takes a microstep")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        bus: Server = point.shared.setdefault("bus", Server())
+        bus: Server = point.shared.setdefault("bus", Server(steps=self.steps))
         duration = to_nanoseconds(self.factor * self.length_of(token))
         if dropped := bus.arrive(
             Message(self.priority_of(token), token, point, duration), self.capacity, self.overflow

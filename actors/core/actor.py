@@ -12,8 +12,9 @@ actor upstream (along connections without delay, and outputs that depend on thei
 this tag: all tokens of the tag are there, and an absent token will not come.  So it is called once per tag; only an
 actor with an output that does not depend on an input at once is called for the tokens of such inputs by themselves.
 In ``fire`` an actor may read its inputs (``port.present``, ``port.value``, ``port.tokens``), send any number of
-tokens, change its state and ask for wake-ups.  Tokens that it does not read are gone when it returns.  A token that
-it sends is received within the same tag unless the connection has a delay.
+tokens, change its state and ask for wake-ups.  Tokens that it does not read are gone when it returns, unless the port
+keeps them (``InputPort(keep=True)``, ``port.get()``).  A token that it sends is received within the same tag unless
+the connection has a delay.
 
 ``wake_in(seconds)`` and ``wake_at(seconds)`` ask for a firing later: a wake-up for the present time comes at the
 same time, one microstep on; one in the future at microstep 1.  Asking for the past means now.  A ``Wake`` can be
@@ -162,6 +163,12 @@ class Actor(Configurable):
         known[id(self.context)] = _NoContext(made)
         return made
 
+    def follow_ptolemy(self) -> None:
+        """Engine: what was not given, and the ports, are as they are in Ptolemy, where the declarations say how."""
+        Configurable.follow_ptolemy(self)
+        for port in (*self.inputs.values(), *self.outputs.values()):
+            port.follow_ptolemy()
+
     def move(self, path: str) -> None:
         """Engine: the actor gets its full path in the model that it is added to."""
         self.path = path
@@ -187,6 +194,8 @@ class Actor(Configurable):
         for port in self.inputs.values():
             if isinstance(port, ParameterPort):
                 port.reset()
+            if port.keep:
+                port.prepare()
         self.initialize()
 
     def halt(self) -> None:

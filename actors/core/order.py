@@ -10,17 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .moment import Wake, When
+    from .posts import Posts
 
 NEVER = 2**63 - 1  # ns
 
 
 class Ranks:
-    """Whole numbers, of which the least comes first."""
+    """Whole numbers, of which the least comes first; with ``posts``, the one that comes first there."""
 
-    __slots__ = ("content",)
+    __slots__ = ("content", "posts")
 
     def __init__(self) -> None:
         self.content: list[int] = []
+        self.posts: Posts | None = None
 
     @property
     def size(self) -> int:
@@ -29,10 +31,17 @@ class Ranks:
 
     def push(self, rank: int) -> None:
         """Put one in."""
-        heappush(self.content, rank)
+        if self.posts is not None:
+            self.posts.push(rank)
+            self.content.append(rank)  # so many there are; which, the posts know
+        else:
+            heappush(self.content, rank)
 
     def pop(self) -> int:
         """Take the least one out."""
+        if self.posts is not None:
+            self.content.pop()
+            return self.posts.pop()
         return heappop(self.content)
 
 

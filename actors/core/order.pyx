@@ -10,7 +10,7 @@ cdef long long LAST = 2**63 - 1
 
 
 cdef class Ranks:
-    __slots__ = ("content",)
+    __slots__ = ("content", "posts")
 
     def __dealloc__(self):
         PyMem_Free(self.items)
@@ -34,6 +34,10 @@ cdef class Ranks:
                 raise MemoryError
             self.items, self.room = items, 2 * self.room + 8
         self.size += 1
+        if self.posts is not None:
+            items[place] = rank
+            self.posts.push(rank)
+            return 0
         while place > 0:
             above = (place - 1) >> 1
             if items[above] <= rank:
@@ -43,11 +47,13 @@ cdef class Ranks:
         items[place] = rank
         return 0
 
-    cdef long long pop(self):
+    cdef long long pop(self) except? -1:
         cdef long long* items = self.items
         cdef long long least = items[0], last
         cdef Py_ssize_t place = 0, below
         self.size -= 1
+        if self.posts is not None:
+            return self.posts.pop()
         last = items[self.size]
         while True:
             below = 2 * place + 1

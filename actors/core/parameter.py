@@ -40,7 +40,15 @@ class _Required:
         return "required"
 
 
+class _Same:
+    """What a parameter is in Ptolemy that is the same there."""
+
+    def __repr__(self) -> str:
+        return "the same"
+
+
 REQUIRED: Any = _Required()
+SAME: Any = _Same()
 _EXACT = 2**53  # up to which all whole numbers are floats
 _WORDS: dict[Any, str] = {
     float: "number",
@@ -66,6 +74,7 @@ class Parameter(Generic[T]):
     A text is one of ``choices``; ``renamed`` tells the present names of former ones.
     Numbers are ``min`` or more, or else greater than ``above``, and ``max`` or less.
     A parameter that takes values of several kinds names one parameter for each kind as its ``forms``.
+    ``ptolemy`` is the default under a director with ``like: ptolemy``, if that is another one.
     """
 
     def __init__(
@@ -81,10 +90,12 @@ class Parameter(Generic[T]):
         renamed: Mapping[str, str] | None = None,
         shape: tuple[int | None, ...] | None = None,
         optional: bool = False,
+        ptolemy: T | None = SAME,
         doc: str = "",
     ) -> None:
         self.type: Any = type
         self.default = default
+        self.ptolemy = ptolemy
         self.unit = unit
         self.min = min
         self.above = above
@@ -92,7 +103,7 @@ class Parameter(Generic[T]):
         self.choices = tuple(choices)
         self.renamed = dict(renamed or {})
         self.shape = shape
-        self.optional = optional or default is None
+        self.optional = optional or default is None or ptolemy is None
         self.doc = doc
         self.name = ""
         self.forms: tuple[Parameter[Any], ...] = ()
@@ -131,9 +142,20 @@ class Parameter(Generic[T]):
     @cached_property
     def default_value(self) -> T | None:
         """The default as it is stored in an instance."""
-        if self.default is None or isinstance(self.default, Configurable):
-            return self.default
-        return self.convert(self.default)
+        return self._stored(self.default)
+
+    @property
+    def differs(self) -> bool:
+        """Whether the default is another one in Ptolemy."""
+        return self.ptolemy is not SAME
+
+    @cached_property
+    def ptolemy_value(self) -> T | None:
+        """The default in Ptolemy as it is stored in an instance."""
+        return self._stored(self.ptolemy)
+
+    def _stored(self, default: T | None) -> T | None:
+        return default if default is None or isinstance(default, Configurable) else self.convert(default)
 
     def describe_type(self) -> str:
         """The type in words, for messages and the reference."""
@@ -302,8 +324,19 @@ class Configurable:
         What follows from them may be set here: the type of a port for example.
         """
 
+    def follow_ptolemy(self) -> None:
+        """Engine: parameters that were not given have the defaults that they have in Ptolemy."""
+        given: frozenset[str] = vars(self).get("_configured", frozenset())
+        changed = [each for name, each in declared_parameters(type(self)).items() if each.differs and name not in given]
+        for parameter in changed:
+            parameter.store(self, parameter.ptolemy_value)
+        if changed:
+            self.check()
+
     def _configure(self, values: Mapping[str, object]) -> None:
         declared = declared_parameters(type(self))
+        if any(parameter.differs for parameter in declared.values()):
+            self._configured = frozenset(values)
         for name in values:
             if name not in declared:
                 message = unknown_parameter(type(self), name)

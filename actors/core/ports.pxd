@@ -18,7 +18,7 @@ cdef class _Told(Emitter):
 
 
 cdef class Port:
-    cdef public object actor, type, doc
+    cdef public object actor, type, doc, ptolemy
     cdef public bint multi
     cdef public str name, path
     cdef public Py_ssize_t width
@@ -27,7 +27,8 @@ cdef class Port:
 
 cdef class InputPort(Port):
     cdef public list arrived, channels, shown
-    cdef public bint required, triggers
+    cdef public bint keep, required, triggers
+    cdef public Py_ssize_t kept
     cpdef tell(self, bound)
     cpdef receive(self, token, channel)
     cpdef prepare(self)

@@ -44,6 +44,7 @@ class Aspect(Configurable, ABC):
     events: ClassVar[tuple[str, ...]] = ()
     reports: ClassVar[dict[str, str]] = {}
     alters_parameters: ClassVar[bool] = False  # a kind of port aspects does
+    alters_numbers: ClassVar[bool] = True  # and nothing else
 
     def __init_subclass__(cls, **keywords: object) -> None:
         super().__init_subclass__(**keywords)

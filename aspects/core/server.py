@@ -70,9 +70,10 @@ class WaitingLine(Generic[T]):
 
 
 class Server:
-    """Serves one task at a time, and counts what it does."""
+    """Serves one task at a time, and counts what it does; ``steps``: one that takes no time takes a microstep."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, steps: bool = False) -> None:
+        self.steps = steps
         self.line: WaitingLine[Task] = WaitingLine()
         self.begins = 0
         self.waited = 0  # by all that have begun, until then
@@ -97,7 +98,8 @@ class Server:
         """
         now, served = task.came, self._served
         task.number, self._come = self._come, self._come + 1
-        if served is not None and self._begun + served.duration <= now:
+        is_in_time = served is not None and (served.duration > 0 or not self.steps)
+        if served is not None and is_in_time and self._begun + served.duration <= now:
             self._finish((served, self._begun))  # it is over, though we have not been called yet
             served = self._served
         can_interrupt = preemptive or (preemptive is not None and self._begun == now)
@@ -126,7 +128,7 @@ class Server:
         self._served, self._begun = task, now
         self.begins += 1
         self.waited += now - task.came
-        if task.duration > 0:
+        if task.duration > 0 or self.steps:
             task.point.later(to_seconds(task.duration), self._finish, (task, now))
         else:
             self._release(task, now)

@@ -127,7 +127,7 @@ def check_connections(draft: Draft, problems: Problems) -> None:
                     f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
                     about=("missing", in_general(port.path)),
                 )
-            if len(wires) > 1 and not port.multi:
+            if not port.multi and len(graph.channels_to(port)) > 1:
                 times = Counter(wire.source.path for wire in wires)
                 writers = ", ".join(
                     f"{path} ({number} times)" if number > 1 else path for path, number in times.items()
@@ -139,6 +139,7 @@ def check_connections(draft: Draft, problems: Problems) -> None:
                     wires[1].hops[-1].position,
                     *((f"the first connection is at {first}",) if first else ()),
                     "connect one of them, or send through an actor that merges them",
+                    "if all of it is one channel, write {from: [...], to: ..., shared: true}",
                     about=("several", in_general(port.path)),
                 )
 
@@ -208,7 +209,9 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
         # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
         blamed = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
         hints = [
-            f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
+            f"{path} has a director like Ptolemy's: all its outputs depend on all its inputs"
+            if graph.rules[path].are_ptolemys
+            else f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
             for path in dict.fromkeys(actors)
             if path in graph.clocks
         ]

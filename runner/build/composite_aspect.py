@@ -212,7 +212,8 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
         position = graph.positions.get(f"aspect {woven.name}")
         order = graph.next_order + len(found)
         key = (source, destination, woven.name)
-        found.setdefault(key, Detour(source, destination, None, position, order, woven.name))
+        waits = woven.model is not None and graph.refires(woven.model.path)
+        found.setdefault(key, Detour(source, destination, None, position, order, woven.name, waits))
 
     for place in (place for place in at if place in graph.actors):  # what it asks for comes in after its turn
         actor = graph.actors[place]

@@ -164,6 +164,7 @@ class Link:
     destination: str
     delay: int | None  # ns
     position: Position
+    shared: bool = False
 
 
 @dataclass(frozen=True)
@@ -174,8 +175,10 @@ class Links:
     is_whole: bool
 
     def make(self, draft: Draft) -> None:
+        first = draft.graph.next_order  # which tells the connection apart from all others
         for link in self.found:
-            draft.graph.connect(link.source, link.destination, link.delay, link.position)
+            shared = first if link.shared else None
+            draft.graph.connect(link.source, link.destination, link.delay, link.position, shared)
         draft.is_wired = draft.is_wired and self.is_whole
 
 
@@ -218,7 +221,7 @@ class Wiring:
             spare_self = connection.to_all and not source.own and not target.own
             for one, other in pairs:
                 if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
-                    links.append(Link(one, other, delay, source.text.position))
+                    links.append(Link(one, other, delay, source.text.position, connection.shared))
         return Links(links, is_whole)
 
     def _label(self, text: Text) -> str:

@@ -9,7 +9,18 @@ from epicycle.actors import Stop, Tag, counted, declared_parameters
 
 from ..catalogue import take_problem
 from ..collection import without_collection
-from ..graph import Metric, ModelGraph, Watched, WovenAspect, check_processors, firing_order, is_within
+from ..graph import (
+    Metric,
+    ModelGraph,
+    Postings,
+    Rules,
+    Watched,
+    WovenAspect,
+    check_processors,
+    firing_order,
+    is_within,
+    postings,
+)
 from ..language import Values
 from ..shown import short
 from ..tables import Table, Tabled
@@ -18,7 +29,7 @@ from ..text import Mapping as MappingNode
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .draft import Draft
-from .named import Port, raising
+from .named import Port, director_of, raising
 from .scope import Composite, Scope
 from .settle import nanoseconds
 from .watch import Watching, checked_seed
@@ -39,6 +50,7 @@ class Model(Scope, Tabled):
     {'ticks': 15}
 
     ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
+    ``ties="posted"`` and ``like="ptolemy"`` are what its director goes by, and the actors that are added then.
     A model that was loaded can be changed in the same way.  Its ``parameters`` are a record of how it was made:
     actors took their values from them then, so they are set with ``load_model(..., set=...)``, not here.
 
@@ -53,11 +65,16 @@ class Model(Scope, Tabled):
         stop: float | str | None = None,
         seed: int = 0,
         parameters: Mapping[str, object] | None = None,
+        ties: str | None = None,
+        like: str | None = None,
     ) -> None:
         super().__init__(self, "")
         self.name = name
         self.doc = doc
         self.draft = Draft()
+        with raising() as problems:
+            rules = director_of(name, {"ties": ties, "like": like}, call_site(), problems)
+        self.draft.graph.rules[""] = Rules().inside(rules.get("ties"), rules.get("like"))
         self.parameters: dict[str, object] = dict(parameters or {})
         self.declared: dict[str, tuple[str, str]] = {}  # unit and doc of the parameters
         self.aspects: list[WovenAspect] = []
@@ -71,7 +88,7 @@ class Model(Scope, Tabled):
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
         self._scopes: dict[str, Composite] = {}
-        self._order: dict[str, int] | None = None  # worked out since then
+        self._order: tuple[dict[str, int], Postings | None] | None = None  # worked out since then
         self.stop = stop
 
     @property
@@ -182,9 +199,16 @@ class Model(Scope, Tabled):
 
     def order(self) -> dict[str, int]:
         """Engine: the firing order of a model that has been checked; the same for all its runs."""
+        return self._ordered()[0]
+
+    def postings(self) -> Postings | None:
+        """Engine: where ties are as they were posted, if they are anywhere."""
+        return self._ordered()[1]
+
+    def _ordered(self) -> tuple[dict[str, int], Postings | None]:
         if self._order is None:
             with without_collection():
-                self._order = firing_order(self.graph)
+                self._order = firing_order(self.graph), postings(self.graph)
         return self._order
 
     # -- changes: what is called here has been found to be right --------------------------------------------------
@@ -249,8 +273,11 @@ class Model(Scope, Tabled):
     def _tables(self) -> list[Table]:
         actors = []
         for path, actor in self.graph.actors.items():
-            values = {name: getattr(actor, name) for name in declared_parameters(type(actor))}
-            given = (f"{name}={short(value)}" for name, value in values.items() if value is not None)
+            declared = declared_parameters(type(actor)).items()
+            values = [(name, getattr(actor, name), parameter) for name, parameter in declared]
+            # What is there to be as in Ptolemy is worth a word where it is.
+            plain = {name for name, value, each in values if each.differs and short(value) == short(each.default_value)}
+            given = (f"{name}={short(value)}" for name, value, _ in values if value is not None and name not in plain)
             actors.append((path, type(actor).__name__, ", ".join(given)))
         connections = [
             (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")

@@ -13,7 +13,7 @@ from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 from ..graph import ModelGraph
 from ..language import ConnectionText, PointcutText, connection
 from ..text import ModelError, NodeReader, Position, Problem, Problems, Scalar, Text, node_of, within
-from .settle import drift, local_nanoseconds
+from .settle import OF_DIRECTORS
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,16 @@ def raising() -> Iterator[Problems]:
     problems.raise_if_any()
 
 
-def clock_of(
-    path: str, start: object, speed: object, position: Position, problems: Problems
-) -> tuple[int | None, float]:
-    """When the local time of a composite starts (ns; None: as it is around it) and how fast it goes."""
-    found: list[Any] = [None, 1.0]
-    for number, (key, value, convert) in enumerate((("start", start, local_nanoseconds), ("drift", speed, drift))):
+def director_of(path: str, said: Mapping[str, object], position: Position, problems: Problems) -> dict[str, Any]:
+    """What is said of a director, ``None`` for nothing; what is wrong is told and left out."""
+    found: dict[str, Any] = {}
+    for key, value in said.items():
         try:
-            found[number] = found[number] if value is None else convert(value)
+            if value is not None:
+                found[key] = OF_DIRECTORS[key](value)
         except (ParameterError, ValueError) as error:
             problems.add(f"{path}: director.{key}: {error}", position)
-    return found[0], found[1]
+    return found
 
 
 def check_aspect(aspect: object, kinds: tuple[type, ...], position: Position, problems: Problems) -> None:

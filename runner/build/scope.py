@@ -28,7 +28,7 @@ from .named import (
     Named,
     Places,
     check_aspect,
-    clock_of,
+    director_of,
     firing_time_of,
     mistake,
     raising,
@@ -149,24 +149,32 @@ class Scope:
         director: bool = False,
         start: float | str | None = None,
         drift: float = 1.0,
+        ties: str | None = None,
+        like: str | None = None,
     ) -> Composite:
         """Add an empty composite, a scope for actors of its own, with ports through which it is connected.
 
         With ``director`` it has a director of its own and fires as one actor; local time then begins at ``start`` s
-        (default: as around it) and goes ``drift`` times as fast.  Raises ``ModelError``.
+        (default: as around it) and goes ``drift`` times as fast.  ``ties`` and ``like`` are what this director goes by
+        (default: as that around it).  Raises ``ModelError``.
         """
         position = call_site()
         made, ports = Composite(self._model, self._full(name)), [("input", each) for each in inputs]
         ports += [("output", each) for each in outputs]
         with raising() as problems:
             full = self._free(name, position, problems)
-            begin, speed = clock_of(full, start, drift, position, problems)
+            said = {"start": start, "drift": drift, "ties": ties, "like": like}
+            given = director_of(full, said, position, problems)
+            if not director and (ties or like):
+                key = "ties" if ties else "like"
+                message = f"{full}: {key!r} is for a director of its own, and {full} has none"
+                problems.add(message, position, "write director=True, or say it of the model")
         for number, (_, port) in enumerate(ports):
             made.check_port(port, [each for _, each in ports[:number]], position)
         graph = self._model.edit().graph
         graph.add_composite(full, OF_NO_CLASS)
         if director:
-            graph.add_director(full, begin, speed)
+            graph.add_director(full, **given)
         graph.positions.setdefault(full, position)
         for direction, port in ports:
             graph.add_composite_port(f"{full}.{port}", direction, position)
@@ -324,6 +332,8 @@ class Scope:
             firing_time = firing_time_of(time, aspect, position, problems)
         model = self._model
         if isinstance(aspect, Aspect):
+            if model.graph.rules_at(full).are_ptolemys:
+                aspect.follow_ptolemy()
             with raising() as problems:
                 pointcuts = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
                 weaving = Weaving(model.draft, Paths(model.draft), full, self.path, problems, type(aspect))

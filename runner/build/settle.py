@@ -18,6 +18,7 @@ from epicycle.actors import (
     unknown_parameter,
 )
 
+from ..graph import LIKE, TIES, Rules
 from ..language import CompositeText, PartText, Setting, Settings, Values
 from ..text import (
     RAISE_IT,
@@ -139,8 +140,9 @@ class Settler:
         names: dict[str, object],
         position: Position,
         path: str,
+        rules: Rules,
     ) -> dict[str, object] | None:
-        """Converted values for a Configurable class; None if some are wrong."""
+        """Converted values for a Configurable class, with defaults by the rules; None if some are wrong."""
         declared = declared_parameters(cls)
         before, complete = len(self.problems), True
         result: dict[str, object] = {}
@@ -152,7 +154,9 @@ class Settler:
                 node, known, scope = setting.node, self.values.outside, ""
                 outside[name] = setting.position
             if node is None:
-                if parameter.required:
+                if parameter.differs and rules.are_ptolemys:
+                    result[name] = parameter.ptolemy_value
+                elif parameter.required:
                     self._tell_missing(f"{label}: {cls.__name__}", name, parameter.doc, position, path)
                 continue
             value = self.values.of(node, known, f"{label}.{name}", scope)
@@ -246,6 +250,15 @@ def local_nanoseconds(start: object) -> int:
 def drift(value: object) -> float:
     found: Any = Parameter(float, unit="1", min=1e-6, max=1e6).convert(value)
     return 1.0 if found is None else float(found)
+
+
+# What may be said of a director, and how it is taken.
+OF_DIRECTORS: dict[str, Callable[[Any], Any]] = {
+    "start": lambda start: None if start is None else local_nanoseconds(start),
+    "drift": drift,
+    "ties": TIES.convert,
+    "like": LIKE.convert,
+}
 
 
 def converted(

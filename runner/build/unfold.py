@@ -17,12 +17,12 @@ from epicycle.actors import Actor, Parameter
 from ..catalogue import Catalogue, CatalogueError, PortTypeError, read_type, token_types
 from ..graph import Modal
 from ..language import CompositeText, PartText, PortText
-from ..text import RAISE_IT, Position, did_you_mean
+from ..text import RAISE_IT, Entry, Position, did_you_mean
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors
 from .draft import Draft
 from .modes import connect_modes
-from .settle import Settler, converted, drift, local_nanoseconds
+from .settle import OF_DIRECTORS, Settler, converted
 
 MAX_DEPTH = 50
 MAX_SHOWN = 12  # types in one message
@@ -230,7 +230,8 @@ class Unfolding:
             self.draft.graph.priorities[path] = found or 0
 
     def _actor(self, path: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
-        values = self.settler.configuration(path, actor_type, part.values, names, part.position, path)
+        rules = self.draft.graph.rules_at(path)
+        values = self.settler.configuration(path, actor_type, part.values, names, part.position, path, rules)
         if values is not None:
             try:
                 actor = actor_type(path, **values)
@@ -265,15 +266,23 @@ class Unfolding:
         if is_refinement:
             graph.add_refinement(path)
         elif composite.director is None and composite.refinements:
-            graph.add_director(path, None, 1.0)
+            graph.add_director(path)
         elif composite.director is not None:
-            local: dict[str, Any] = {"start": None, "drift": 1.0}
-            for key, entry in composite.director.items():
-                convert = local_nanoseconds if key == "start" else drift
-                found = converted(self.values, entry.value, inside, f"{path}: director.{key}", path, convert)
-                local |= {} if found is self.values.missing else {key: found}
-            graph.add_director(path, local["start"], local["drift"])
+            graph.add_director(path, **self._director(path, path, composite.director, inside))
         self.body(path, composite, inside, (*within, composite.name))
+
+    def rules(self, model: CompositeText, names: Names) -> None:
+        """What the director of the model goes by."""
+        given = self._director(model.name, "", model.director or {}, names)
+        self.draft.graph.rules[""] = self.draft.graph.rules[""].inside(given.get("ties"), given.get("like"))
+
+    def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
+        """What is said of a director; what is wrong is left out."""
+        found = {
+            key: converted(self.values, entry.value, names, f"{what}: director.{key}", path, OF_DIRECTORS[key])
+            for key, entry in given.items()
+        }
+        return {key: value for key, value in found.items() if value is not self.values.missing}
 
     def _port_type(self, composite: CompositeText, port: PortText) -> Any:
         """The type that a composite declares for a port; None if it says none, or none that there is."""

@@ -132,16 +132,16 @@ class Weaving(View):
         return () if meant is None else (f"{owner} has a parameter {meant!r}",)
 
     def _enter_parameter(self, actor: str, name: str, pointcut: PointcutText) -> None:
-        """Take a parameter of an actor, if it holds numbers that nothing else changes."""
+        """Take a parameter of an actor, if it holds what the aspect alters and nothing else does."""
         path, parameter = f"{actor}.{name}", declared_parameters(type(self.graph.actors[actor]))[name]
         about = ("altered", in_general(path))
         if pointcut.exclude:
             self._parameters[path] = True
-        elif parameter.type not in (int, float, int | float):
+        elif self.cls.alters_numbers and parameter.type not in (int, float, int | float):
             self._problem(
                 f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut, about=about
             )
-        elif parameter.value_in(self.graph.actors[actor]) is None:
+        elif self.cls.alters_numbers and parameter.value_in(self.graph.actors[actor]) is None:
             self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
         elif path in self.graph.ports and self.graph.incoming(path):
             sender = self.graph.incoming(path)[0].source

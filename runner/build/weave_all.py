@@ -69,7 +69,8 @@ class _Weaver:
             return
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
         given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name)
+        rules = self.graph.rules_at(name)
+        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name, rules)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} does not say where it stands", part.position, hint, scope=scope)

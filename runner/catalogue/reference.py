@@ -28,7 +28,10 @@ from epicycle.aspects import Aspect
 
 @dataclass(frozen=True)
 class PortReference:
-    """A port of an actor type; ``depends_on`` is for outputs, None where it is all inputs."""
+    """A port of an actor type; ``depends_on`` is for outputs, None where it is all inputs.
+
+    ``ptolemy`` is what is else under a director that is like Ptolemy's, by the names of these attributes.
+    """
 
     name: str
     direction: str
@@ -38,13 +41,16 @@ class PortReference:
     depends_on: tuple[str, ...] | None
     doc: str
     triggers: bool = True  # of an input: whether a token there makes the actor do its work
+    keep: bool = False  # of an input: whether tokens stay until they are taken out
+    ptolemy: Mapping[str, object] | None = None
 
 
 @dataclass(frozen=True)
 class ParameterReference:
     """A parameter of a type; ``type`` is in words, ``default`` as it would stand in a model file.
 
-    ``part`` is the base of the types that its value may have, if it is a mapping with a type.
+    ``part`` is the base of the types that its value may have, if it is a mapping with a type.  ``ptolemy`` is the
+    default under a director that is like Ptolemy's, if ``differs``.
     """
 
     name: str
@@ -59,6 +65,8 @@ class ParameterReference:
     max: float | None
     choices: tuple[str, ...]
     doc: str
+    differs: bool = False
+    ptolemy: object = None
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,8 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
                 getattr(port, "depends_on", None),
                 port.doc,
                 getattr(port, "triggers", True),
+                getattr(port, "keep", False),
+                port.ptolemy,
             )
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),
@@ -131,6 +141,8 @@ def _parameter(parameter: Parameter[object]) -> ParameterReference:
         parameter.max,
         parameter.choices,
         parameter.doc,
+        parameter.differs,
+        as_written(parameter.ptolemy) if parameter.differs else None,
     )
 
 

@@ -1,6 +1,6 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import describe, run, studies, trace
+from . import describe, imports, run, studies, trace
 
 COMMANDS = (
     run.run,
@@ -16,6 +16,7 @@ COMMANDS = (
     describe.actors,
     describe.aspects,
     describe.schema,
+    imports.import_,
 )
 
 __all__ = ["COMMANDS"]

@@ -3,29 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from epicycle.actors import Actor, InputPort, Moment, Wake, Way, is_alone
 
 _NOTHING: list[Any] = []  # what a port shows whose tokens are for a later turn
 
 
+class Poster(Protocol):
+    """What asks for turns of a composite that fires as one, for what is in it."""
+
+    poster: Poster | None  # of the one around it
+    nesting: int
+
+    def note(self, time: int, microstep: int) -> None:
+        """Something inside has asked for a turn."""
+
+
 class Turn:
     """The place of an actor in the firing order: where it fires for its wake-ups, or for the tokens of some inputs.
 
     ``ports`` are these inputs, ``later`` those whose tokens are taken in a later turn of the same actor; ports that
-    nothing is connected to are left out.  ``wakes`` are the wake-ups of the present tag.
+    nothing is connected to are left out.  ``keeps`` are those of its inputs that keep tokens, if there are any.
+    ``wakes`` are the wake-ups of the present tag.
+
+    ``poster`` posts it, for a composite that is posted as a whole; ``nesting`` is how many of those are around it.
+    An actor that takes ``all_at_once`` takes what waits at all its inputs in any of its turns; if that is true, it also
+    fires in a turn for tokens that it has taken before.
     """
 
-    __slots__ = ("actor", "form", "is_wanted", "later", "ports", "rank", "wake", "wakes")
+    __slots__ = (
+        "actor", "fires_for_nothing", "form", "is_own", "is_wanted", "keeps", "later", "nesting", "ports", "poster",
+        "rank", "takes_all", "wake", "wakes",
+    )  # fmt: skip
 
-    def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int]) -> None:
+    def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int], all_at_once: bool | None = None) -> None:
         self.actor = actor
         self.form: Form | None = None
         self.rank = rank
         connected = [port for port in actor.inputs.values() if port.width]
-        self.ports: list[InputPort[Any]] = [port for port in connected if ranks[port.path] == rank]
-        self.later: list[InputPort[Any]] = [port for port in connected if ranks[port.path] > rank]
+        self.takes_all = all_at_once is not None
+        self.fires_for_nothing = bool(all_at_once)
+        self.is_own = ranks.get(actor.path) == rank
+        self.ports: list[InputPort[Any]] = [p for p in connected if self.takes_all or ranks[p.path] == rank]
+        self.later: list[InputPort[Any]] = [p for p in connected if not self.takes_all and ranks[p.path] > rank]
+        keeps = [port for port in self.ports if port.keep]
+        self.keeps: list[InputPort[Any]] | None = keeps or None
+        self.poster: Poster | None = None
+        self.nesting = 0
         self.is_wanted = False  # whether the actor is to have this turn at the present tag
         self.wake: Wake | None = None  # the first of those of the present tag
         self.wakes: list[Wake] | None = None  # the others
@@ -49,11 +74,21 @@ class Turn:
                 if not wake.cancelled:
                     wake.due = due = True
         self.wake = self.wakes = None
-        if not due:
-            for port in self.ports:
-                if port.arrived:
-                    return True
-        return due
+        return due or self.new() > 0
+
+    def new(self) -> int:
+        """How many tokens have come for it."""
+        found = 0
+        for port in self.ports:
+            found += len(port.arrived) - port.kept
+        return found
+
+    def kept(self) -> int:
+        """How many tokens wait at ports that keep them."""
+        found = 0
+        for port in self.keeps or _NOTHING:
+            found += len(port.arrived)
+        return found
 
     def hold(self) -> None:
         """The actor fires: it does not see yet what is for a later turn."""
@@ -64,7 +99,10 @@ class Turn:
         """The actor has fired: what it has not read is gone."""
         for port in self.ports:
             if port.arrived:
-                port.clear()
+                if port.keep:
+                    port.kept = len(port.arrived)
+                else:
+                    port.clear()
         for port in self.later:
             port.shown = port.arrived
 
@@ -102,6 +140,20 @@ class Instant(Moment):
         else:
             self.turns.append(turn)
             self.wakes.append(wake)
+
+    def arrange(self) -> None:
+        """Leave out what was called off, and put what is inside of a composite behind what posts the whole of it."""
+        if self.turn is None:
+            return
+        found = [(self.turn, self.wake), *zip(self.turns or (), self.wakes or (), strict=True)]
+        self.turn = self.wake = self.turns = self.wakes = None
+        for turn, wake in sorted(found, key=_nesting):
+            if wake is None or not wake.cancelled:
+                self.add(turn, wake)
+
+
+def _nesting(entry: tuple[Turn, Wake | None]) -> int:
+    return entry[0].nesting
 
 
 def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:

@@ -142,7 +142,7 @@ cdef class IntegratorForm(Native):
     cdef bint take(self) except -1:
         self.input, self.trigger, self.output = self.input_port("input"), self.input_port("trigger"), self.sender("output")
         self.holds = self.actor.method == "hold"
-        return self.output is not None
+        return self.output is not None and not self.actor.reset.width
 
     cpdef fire(self):
         cdef list tokens = tokens_of(self.input)

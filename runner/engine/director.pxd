@@ -9,8 +9,9 @@ cdef long long _NOTICED
 
 
 cdef class Director:
-    cdef public object _environment, seed, crowd, ranks, _stop_after, _reason
+    cdef public object _all_at_once, _environment, seed, crowd, ranks, _stop_after, _reason
     cdef public list _queue, _recent, _turns
+    cdef public dict posters
     cdef public Ranks _ready
     cdef public Times _times
     cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps, _time
@@ -31,6 +32,8 @@ cdef class Director:
     @cython.locals(wake=Wake)
     cpdef Wake _wake_at(self, Turn turn, Instant instant)
     cpdef Turn turn(self, actor, long rank)
+    @cython.locals(turn=Turn)
+    cpdef Turn new_turn(self, actor, long rank)
     @cython.locals(now=Instant, instant=Instant)
     cpdef later(self, long long delay, way, token)
     cpdef Delivery hold(self, way, token)
@@ -43,10 +46,15 @@ cdef class Director:
     cpdef Instant _await(self, long long time, long microstep)
     @cython.locals(turn=Turn, delivery=Delivery, turns=list, ready=Ranks, place=cython.Py_ssize_t)
     cpdef _handle(self, Instant instant)
+    @cython.locals(is_to_fire=cython.bint, other=Turn)
+    cpdef bint _gather(self, Turn turn) except -1
+    cpdef bint _has_reason(self, Turn turn) except -1
     cpdef _wake_up(self, Turn turn, Wake wake)
     cpdef _begin(self, Instant instant)
     cpdef bint use_wakes(self, Turn turn) except -1
     cpdef fire(self, Turn turn)
+    @cython.locals(waiting=Py_ssize_t, left=Py_ssize_t)
+    cpdef _fire_on(self, Turn turn)
     @cython.locals(
         times=Times, instant=Instant, queue=list, is_of_simpy=cython.bint, here=cython.longlong, now=cython.longlong,
         upcoming=cython.longlong, last_time=cython.longlong, last_step=cython.longlong,

@@ -9,6 +9,10 @@ gets at this tag, because all that can still send to it within the tag have a lo
 once per tag; the exception is one with an output that does not depend on an input at once (``depends_on``), which
 may have to send before that input is there: its tokens are taken in a firing of their own, at the rank of the input.
 
+Where ties are posted (``postings``), actors of equal depth and priority fire in the order in which they were to have a
+turn first: by a wake-up that was asked for, or by a token that was put in.  Then an actor takes all that waits for it,
+in whichever of its turns it fires, and its turns that follow each other at once are one firing.
+
 A token sent over a connection without delay arrives at the same tag; with delay d > 0 at (time + d, 1); with delay 0
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
 microstep 1.  The first tag of a run is (start, 1).
@@ -18,7 +22,7 @@ two, who is first goes on.  At one instant all that SimPy has to do comes first,
 received at the first microstep that the director has not handled yet.
 
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
-token; and tokens that an actor does not read do not stay in the port.
+token; and tokens that an actor does not read do not stay in the port, unless it keeps them (``InputPort.keep``).
 """
 
 from __future__ import annotations
@@ -27,11 +31,11 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from epicycle.actors import NEVER, InputPort, Moment, Process, Ranks, Tag, Times, Wake, Way, new_wake
+from epicycle.actors import NEVER, InputPort, Moment, Posts, Process, Ranks, Tag, Times, Wake, Way, new_wake
 
 from ..text import NORMAL, Limits, describe
 from . import errors
-from .agenda import Delivery, Instant, Turn, new_instant
+from .agenda import Delivery, Instant, Poster, Turn, new_instant
 from .environment import Environment
 from .errors import ActorError, Crowd, CrowdError, LoopError, of_process
 from .pace import notice
@@ -40,6 +44,7 @@ if TYPE_CHECKING:
     from epicycle.actors import Actor
     from epicycle.aspects import Job
 
+    from ..graph import Postings
     from .pace import Pace
 
 REPORTED = 256  # tokens that come together at one port: so many at a time are counted
@@ -50,12 +55,14 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times",
-        "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent", "_stop_after", "_time",
-        "_times", "_turns", "crowd", "firings", "present", "ranks", "seed", "steps",
+        "_all_at_once", "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
+        "_most_times", "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent",
+        "_stop_after", "_time", "_times", "_turns", "crowd", "firings", "posters", "present", "ranks", "seed", "steps",
     )  # fmt: skip
 
-    def __init__(self, order: dict[str, int], seed: int, limits: Limits = NORMAL) -> None:
+    def __init__(
+        self, order: dict[str, int], seed: int, limits: Limits = NORMAL, postings: Postings | None = None
+    ) -> None:
         self._environment = Environment(initial_time=0)
         self._queue = self._environment.queue
         self._has_simpy = False  # whether somebody has seen the environment
@@ -75,6 +82,10 @@ class Director:
         # What is to be done: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
         # One entry per actor and tag, whatever the number of its tokens.
         self._ready = Ranks()
+        self._all_at_once = {} if postings is None else postings.actors  # who take all that waits for them
+        self.posters: dict[str, Poster] = {}  # of composites that are posted as a whole
+        if postings is not None:
+            self._ready.posts = Posts(postings.places)
         self._next: Instant | None = None
         self._times = Times()
         self._rank = -1  # the rank of what is handled now
@@ -144,24 +155,41 @@ class Director:
             return now
         instant = self._to_come(now, time)
         instant.add(turn, None)
+        if turn.poster is not None:
+            turn.poster.note(instant.time, instant.microstep)
         return instant
 
     def _call_now(self, turn: Turn, now: Instant) -> Wake:
         wake = new_wake(now.time, now.microstep)
         turn.add(wake)
         self.want(turn)
+        if turn.poster is not None:
+            turn.poster.note(now.time, now.microstep)
         return wake
 
     def _wake_at(self, turn: Turn, instant: Instant) -> Wake:
         wake = new_wake(instant.time, instant.microstep)
         instant.add(turn, wake)
+        if turn.poster is not None:
+            turn.poster.note(instant.time, instant.microstep)
         return wake
 
     def turn(self, actor: Actor, rank: int) -> Turn:
         """The turn of a rank, which ``actor`` has: an actor of the model, or who stands in for it."""
         turn = self._turns[rank]
         if turn is None:
-            turn = self._turns[rank] = Turn(actor, rank, self.ranks)
+            turn = self._turns[rank] = self.new_turn(actor, rank)
+        return turn
+
+    def new_turn(self, actor: Actor, rank: int) -> Turn:
+        """A turn of an actor, or who stands in for it, at a rank."""
+        turn = Turn(actor, rank, self.ranks, self._all_at_once.get(actor.path))
+        around = actor.path
+        while self.posters and around and turn.poster is None:
+            around = around.rpartition(".")[0]
+            turn.poster = self.posters.get(around)
+        if turn.poster is not None:
+            turn.nesting = turn.poster.nesting + 1
         return turn
 
     def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
@@ -200,6 +228,16 @@ class Director:
         now = self.tag
         is_over = self.present is not None and self._rank >= rank
         return Tag(now.time, now.microstep + 1) if is_over else now
+
+    def is_between(self, first: int, last: int) -> bool:
+        """Whether none of the turns of these ranks is being taken."""
+        return self.present is None or not first <= self._rank <= last
+
+    def is_to_come(self, first: int, last: int) -> bool:
+        """Whether any turn of these ranks is still to come at the present tag, and none of them is being taken."""
+        if self.present is None or first <= self._rank <= last:
+            return False
+        return any(turn is not None and turn.is_wanted for turn in self._turns[first : last + 1])
 
     def set_aside(self, job: Job) -> None:
         """A firing is put off: what it is for does not belong to the next one of its actor."""
@@ -253,6 +291,9 @@ class Director:
 
     def _handle(self, instant: Instant) -> None:
         turns, ready = self._turns, self._ready
+        if ready.posts is not None:
+            ready.posts.settle()
+            instant.arrange()
         if instant.turn is not None:
             self._wake_up(instant.turn, instant.wake)
         if instant.turns is not None and instant.wakes is not None:
@@ -271,7 +312,10 @@ class Director:
                 assert turn is not None
                 turn.is_wanted = False
                 self._rank = turn.rank
-                if turn.wake is not None and not self.use_wakes(turn):
+                if turn.takes_all:
+                    if not self._gather(turn):
+                        continue
+                elif turn.wake is not None and not self.use_wakes(turn):
                     continue
                 if self.present is not instant:
                     self._begin(instant)
@@ -283,6 +327,28 @@ class Director:
             self.fail(turn, error)
         if self._next is None:
             self.present = None
+
+    def _gather(self, turn: Turn) -> bool:
+        """Let an actor that takes all that waits have the turns of its own that come next, too.
+
+        False if it has nothing to fire for.
+        """
+        is_to_fire = self._has_reason(turn)
+        posts = self._ready.posts
+        while posts is not None and posts.first() >= 0:
+            other = self._turns[posts.first()]
+            assert other is not None
+            if other.actor is not turn.actor:
+                break
+            self._ready.pop()
+            other.is_wanted = False
+            is_to_fire = self._has_reason(other) or is_to_fire
+        return is_to_fire
+
+    def _has_reason(self, turn: Turn) -> bool:
+        if turn.wake is not None:
+            return self.use_wakes(turn)
+        return turn.is_own or turn.fires_for_nothing or turn.new() > 0
 
     def _wake_up(self, turn: Turn, wake: Wake | None) -> None:
         if wake is not None:
@@ -316,8 +382,24 @@ class Director:
             turn.hold()
         if turn.form is not None:
             turn.form.fire()
-        else:
+        elif turn.keeps is None:
             turn.actor.fire()
+        else:
+            self._fire_on(turn)
+
+    def _fire_on(self, turn: Turn) -> None:
+        """Let an actor fire as long as it takes tokens out of ports that keep them, and leaves others there."""
+        waiting = turn.kept()
+        turn.actor.fire()
+        left = turn.kept()
+        while 0 < left < waiting:
+            turn.clear()
+            if turn.later:
+                turn.hold()
+            self.firings += 1
+            waiting = left
+            turn.actor.fire()
+            left = turn.kept()
 
     def fail(self, turn: Turn, error: BaseException) -> NoReturn:
         """Tell the error of an actor in its turn; one of an aspect on the way of a token, say, has been told."""

@@ -19,7 +19,7 @@ from ..text import describe
 from .agenda import Turn
 from .director import Director
 from .errors import ActorError
-from .local_time import LocalDirector
+from .local_time import Border, LocalDirector
 from .refinement import Refinement
 
 
@@ -35,9 +35,9 @@ class Execution:
         self.way: Callable[[Job], None] = self.execute
         self.refresh: list[Callable[[], None]] = []
         self.forget: Callable[[], None] = _nothing
+        self.border: Border | None = None  # of the composite that it is in, if it is put off from outside of that
         self.refinement: Refinement | None = None  # that it is in, if errors in there lead to a transition
         self.seed = director.seed
-        self.ranks = director.ranks
         self.environment = local.environment
         self.stop = local.stop
         self._director = director
@@ -45,8 +45,11 @@ class Execution:
         # An actor has a turn for each rank at which it takes tokens, and one for its wake-ups.
         self._turns: dict[int, _StandIn] = {}
         for port in actor.inputs.values():
-            self._turn_at(director.ranks[port.path]).inputs[port.name] = port
-        self._own = self._turn_at(director.ranks[actor.path])
+            self._stand_in(director.ranks[port.path]).inputs[port.name] = port
+        self._own = self._stand_in(director.ranks[actor.path])
+        if self.turn_at(self._own.rank).takes_all:
+            for turn in self._turns.values():
+                turn.inputs.update(actor.inputs)
         self._open: int | None = None  # the rank of its turn, while the actor itself does nothing
         self._asked: list[Wake] = []  # wake-ups that are to come
         self._ready: dict[Wake, Job] = {}  # what is to be executed, and by when
@@ -56,10 +59,14 @@ class Execution:
         self._held: list[Job] = []
         self._waiting: list[Job] = []
 
-    def _turn_at(self, rank: int) -> _StandIn:
+    def _stand_in(self, rank: int) -> _StandIn:
         if rank not in self._turns:
             self._turns[rank] = _StandIn(self, rank)
         return self._turns[rank]
+
+    def turn_at(self, rank: int) -> Turn:
+        """A turn as the actor itself would have it."""
+        return self._director.new_turn(self.actor, rank)
 
     # -- as the actor's context -----------------------------------------------------------------------------------
 
@@ -106,7 +113,7 @@ class Execution:
             self._asked = [wake for wake in self._asked if not (wake.due or wake.cancelled)]
         for wake in due:
             wake.due = False
-        taken = {port: port.take() for port in turn.inputs.values() if port.present}
+        taken = {port: port.take() for port in turn.inputs.values() if port.has_new}
         job = Job(self.actor, turn.rank, self._director.last, taken, tuple(due), life=self._life)
         self._director.set_aside(job)
         return job
@@ -135,6 +142,8 @@ class Execution:
         if self._gates:
             self._held.append(job)
             return
+        if self.border is not None and job.released != self._director.last:
+            self.border.resume()
         self._director.put_back(job)
         for wake in job.wakes:
             wake.due = not wake.cancelled
@@ -211,7 +220,7 @@ class _StandIn(Actor):
     def of_actor(self) -> Turn:
         """The turn as the actor itself would have it."""
         if self._of_actor is None:
-            self._of_actor = Turn(self._execution.actor, self.rank, self._execution.ranks)
+            self._of_actor = self._execution.turn_at(self.rank)
         return self._of_actor
 
     def fire(self) -> None:

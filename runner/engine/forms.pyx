@@ -32,6 +32,8 @@ cdef class DelayForm(Native):
     cdef public long long delay
 
     cdef bint take(self) except -1:
+        if self.actor.steps:
+            return False
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.line = self.actor._held._line
         self.delay = nanoseconds_of(self.actor.delay)
@@ -74,7 +76,10 @@ cdef class ClockForm(Ticking):
     cdef public long long period
 
     cdef bint take(self) except -1:
-        if self.actor.start.width or self.actor.stop.width or not Ticking.take(self):
+        actor = self.actor
+        if actor.start.width or actor.stop.width or actor.trigger.width or not Ticking.take(self):
+            return False
+        if actor.cycles is not None or actor.period == float("inf"):
             return False
         self.period = nanoseconds_of(self.actor.period)
         self.offsets = self.actor._offsets
@@ -104,7 +109,7 @@ cdef class PoissonForm(Ticking):
 
     cdef bint take(self) except -1:
         self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
-        return Ticking.take(self)
+        return self.actor.generator is None and not self.actor.trigger.width and Ticking.take(self)
 
     cpdef fire(self):
         cdef long long following
@@ -132,6 +137,8 @@ cdef class ServerForm(Native):
 
     cdef bint take(self) except -1:
         actor = self.actor
+        if actor.one_at_a_time:
+            return False
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.size, self.rejected = self.sender("size"), self.sender("rejected")
         self.line, self.waiting = actor._served._line, actor._waiting
@@ -200,7 +207,7 @@ cdef class RandomForm(Native):
     cdef bint take(self) except -1:
         self.trigger, self.output, self.stream = self.input_port("trigger"), self.sender("output"), self.actor.random
         self.drawing = drawing_of(self.actor.distribution, self.stream)
-        return self.output is not None
+        return self.output is not None and self.trigger.width == 1 and self.actor.generator is None
 
     cpdef fire(self):
         for _ in range(count_of(self.trigger)):
@@ -220,7 +227,7 @@ cdef class MergeForm(Native):
     cdef bint take(self) except -1:
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.waiting, self.discards = self.actor._waiting, self.actor.discard
-        return self.output is not None
+        return self.output is not None and not self.actor.whole_channel
 
     cpdef fire(self):
         cdef list tokens = tokens_of(self.input)
@@ -253,6 +260,8 @@ cdef class QueueForm(Native):
 
     cdef bint take(self) except -1:
         actor = self.actor
+        if actor.one_at_a_time:
+            return False
         self.input, self.trigger, self.output = self.input_port("input"), self.input_port("trigger"), self.sender("output")
         self.size, self.rejected = self.sender("size"), self.sender("rejected")
         self.waiting, self.persists = actor._tokens, actor.persistent_trigger
@@ -305,17 +314,17 @@ cdef class RecorderForm(Native):
 
 # What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
 SOURCES = (
-    ("accumulation.py", "Counter", "06c4e0e155cd5a54"),
-    ("accumulation.py", "Integrator", "31017c9ef3dda5b7"),
-    ("arithmetic.py", "AddSubtract", "c0e44508fa3ae047"),
+    ("accumulation.py", "Counter", "511f83c57109ba7d"),
+    ("accumulation.py", "Integrator", "a12ab980076fc006"),
+    ("arithmetic.py", "AddSubtract", "d542b33b8ebab49e"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),
     ("distributions.py", "Gamma", "561c0e5a4a78963b"),
     ("distributions.py", "Normal", "41b7f712051a423b"),
     ("distributions.py", "Uniform", "623cbec8bb43eb2b"),
-    ("flow.py", "Merge", "213360ad97d7f8e2"),
-    ("functions.py", "Expression", "2dfff6b191d7d6c7"),
-    ("queues.py", "Queue", "8c16cd6b83a476a1"),
-    ("sources.py", "Random", "606d80f45d45a9e4"),
+    ("flow.py", "Merge", "2870aac0ebfab367"),
+    ("functions.py", "Expression", "b1687473183ecb2d"),
+    ("queues.py", "Queue", "de9384977ec688db"),
+    ("sources.py", "Random", "638494c834d75368"),
     ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
     ("core/laws.py", "gamma", "da1afffdbd29a311"),
@@ -324,13 +333,13 @@ SOURCES = (
     ("core/port_parameter.py", "ParameterPort", "db98994b759143f6"),
     ("core/elementary/sums.py", "total", "dc84358727c0bc10"),
     ("distributions.py", "Exponential", "f14ea8a70640a74a"),
-    ("queues.py", "Server", "2445f4d1853973a9"),
+    ("queues.py", "Server", "b1b76d0c79386ea5"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
-    ("sources.py", "Clock", "4ed40b10da22b8e9"),
-    ("sources.py", "PoissonClock", "3d48035a29d3f078"),
+    ("sources.py", "Clock", "e8869bd338027fbd"),
+    ("sources.py", "PoissonClock", "47664d47db418e38"),
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
-    ("arithmetic.py", "Scale", "3aafcbc1e5e5c3de"),
-    ("timing.py", "TimeDelay", "b8778dbbc9a75614"),
+    ("arithmetic.py", "Scale", "d30f43b614b1f20e"),
+    ("timing.py", "TimeDelay", "2525e8b2de82467c"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),
     ("core/tag.py", "to_nanoseconds", "150cad21f6cd87f7"),
@@ -363,6 +372,8 @@ def attach(director, actors, besides):
             continue
         inputs = list(actor.inputs.values())
         varying = {each.name for each in inputs if type(each) is not InputPort and each.width}
+        if any(each.keep for each in inputs):
+            continue
         if actor.context is not director or not varying.issubset(getattr(kind, "varying", ())):
             continue
         form = kind()

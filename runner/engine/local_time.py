@@ -6,6 +6,7 @@ place of the composite (``firing_order``).  What is theirs alone is the time tha
 
 from __future__ import annotations
 
+import heapq
 from collections import deque
 from typing import Any
 
@@ -14,8 +15,8 @@ from simpy.events import NORMAL, Event, EventPriority
 
 from epicycle.actors import Actor, Tag, Wake, Way
 
-from ..graph import Clock
-from .agenda import Delivery
+from ..graph import Clock, is_within
+from .agenda import Delivery, Poster, Turn
 from .director import Director
 from .refinement import Refinement
 from .way import Call
@@ -84,7 +85,8 @@ class LocalEnvironment(simpy.Environment):
 class Passage(Actor):
     """A port of a composite with a director of its own: at each tag it lets one token of each channel through.
 
-    What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.
+    What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.  With
+    a ``border`` it lets one token through in each firing of the composite.
     """
 
     def __init__(self, path: str, director: Director | Refinement) -> None:
@@ -92,11 +94,14 @@ class Passage(Actor):
         self.enter(director)
         self.gate: Refinement | None = None  # behind it, which may be closed: what comes then is lost
         self.beside: Actor | None = None  # who fires when something has come through
+        self.border: Border | None = None
+        self.requests: deque[Delivery] = deque()  # to an aspect that is a model, which wait for its turn
         self._director = director
         self._lanes: dict[object, _Lane] = {}
 
     def clear(self) -> None:
         """Forget what waits."""
+        self.requests.clear()
         for lane in self._lanes.values():
             lane.waiting.clear()
 
@@ -111,6 +116,9 @@ class Passage(Actor):
         return Call(arrive)
 
     def fire(self) -> None:
+        if self.border is not None:
+            self._let_through(self.border)
+            return
         now = self.tag
         if self.gate is not None and not self.gate.is_open:
             self.clear()
@@ -120,8 +128,114 @@ class Passage(Actor):
             if lane.waiting and lane.passed != now:
                 lane.passed = now
                 lane.waiting.popleft().arrive()
-        if any(lane.waiting for lane in self._lanes.values()):
+        if self.is_waited_for:
             self.wake_in(0)
+
+    @property
+    def is_waited_for(self) -> bool:
+        """Whether tokens wait."""
+        return any(lane.waiting for lane in self._lanes.values())
+
+    def _let_through(self, border: Border) -> None:
+        if not border.lets_pass(self):
+            self.wake_in(0)
+            return
+        while self.requests:
+            self.requests.popleft().arrive()
+        for lane in self._lanes.values():
+            if lane.waiting:
+                lane.waiting.popleft().arrive()
+        if self.is_waited_for and self in border.outputs_behind:
+            self.wake_in(0)
+
+    def await_turn(self, onward: Way) -> Way:
+        """Where a request goes that waits until the composite fires; all of them go on then."""
+        border, waiting = self.border, self.requests
+        assert border is not None
+
+        def arrive(token: Any) -> None:
+            waiting.append(self._director.hold(onward, token))
+            if border.is_to_come:
+                self._director.trigger(self)
+            else:
+                self.wake_in(0)
+
+        return Call(arrive)
+
+
+class Border(Actor):
+    """The end of a composite whose director is like Ptolemy's: as long as tokens wait at its inputs, it fires again.
+
+    In each of its firings one token of each channel passes its ports.  What an actor sends whose firing was put off
+    from outside leaves at the next microstep, unless the composite fires at this tag for what comes in.
+    """
+
+    def __init__(self, path: str, director: Director, outside: Director | Refinement) -> None:
+        super().__init__(path)
+        self.enter(outside)
+        self.inputs_before: list[Passage] = []
+        self.outputs_behind: list[Passage] = []
+        self._director = director
+        self._outside = outside
+        ranks = [rank for each, rank in director.ranks.items() if is_within(each, path)]
+        self._first, self._last = min(ranks), max(ranks)
+        self._came_in: Tag | None = None  # when something did
+        self._resumed: Tag | None = None  # when a firing was executed that had been put off
+        # When it has fired, it is posted for what comes first inside.
+        self.poster: Poster | None = None
+        self.nesting = 0
+        self._turn: Turn | None = None
+        self._inside: list[tuple[int, int]] = []  # the tags at which something is to be done, a heap
+        self._posted: set[tuple[int, int]] = set()  # for which of them it has been posted
+
+    @property
+    def is_to_come(self) -> bool:
+        """Whether the composite is yet to fire at the present tag."""
+        return self._director.is_to_come(self._first, self._last)
+
+    @property
+    def turn(self) -> Turn:
+        """The turn in which it ends a firing of the composite."""
+        if self._turn is None:
+            self._turn = self._director.turn(self, self._director.ranks[self.path])
+        return self._turn
+
+    def note(self, time: int, microstep: int) -> None:
+        """Something inside has asked for a turn."""
+        heapq.heappush(self._inside, (time, microstep))
+        if self._director.last.microstep and self._director.is_between(self._first, self._last):
+            self.post()
+
+    def post(self) -> None:
+        """Ask for a turn for what comes first inside."""
+        now = self._director.last
+        while self._inside and self._inside[0] <= now:
+            heapq.heappop(self._inside)
+        self._posted = {tag for tag in self._posted if tag > now}
+        if self._inside and self._inside[0] not in self._posted:
+            self._posted.add(self._inside[0])
+            self._director.want_at(self.turn, self._inside[0][0])
+
+    def resume(self) -> None:
+        """An actor inside fires now whose firing was put off from outside."""
+        self._resumed = self.tag
+
+    def lets_pass(self, passage: Passage) -> bool:
+        """Whether what waits at a port may pass it now."""
+        now = self.tag
+        if passage in self.inputs_before:
+            self._came_in = now
+            self._outside.trigger(self)
+            return True
+        return self._resumed != now or self._came_in == now
+
+    def fire(self) -> None:
+        if any(passage.is_waited_for for passage in self.inputs_before):
+            for passage in (*self.inputs_before, *self.outputs_behind):
+                if passage.is_waited_for:
+                    self._outside.trigger(passage)
+        else:
+            self.post()
 
 
 class _Lane:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from epicycle.actors import EpicycleError, to_nanoseconds, to_seconds
+from epicycle.actors import EpicycleError, Way, to_nanoseconds, to_seconds
 from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
 from ..graph import WovenAspect
-from .way import Deliver
+from .way import Call, Deliver
 
 
 class Requests:
@@ -23,6 +23,7 @@ class Requests:
         self._ways: dict[str, list[JoinPoint]] = {}
         self._jobs: dict[tuple[str, int], Job] = {}  # the firings that wait for an answer, by actor and number
         self._number: dict[str, int] = {}  # how many firings of an actor there were
+        self._waits: set[str] = set()  # places whose requests wait for the composite's turn
 
     def add_way(self, point: JoinPoint, place: str) -> Callable[[Any], None]:
         """A further way through a place, to all that is behind a port or to one channel: where its tokens enter."""
@@ -34,14 +35,28 @@ class Requests:
             number = self._number[place] = self._number.get(place, -1) + 1
             self._jobs[place, number] = job
             seconds = time_needed(self.model.times[place], job, point.random) or 0.0
-            point.act("requested", seconds)
+            if place not in self._waits:
+                point.act("requested", seconds)
             self.entries[place](FiringRequest(None, "", place, point.now, self.name, number, seconds))
 
         def ask(token: Any) -> None:
-            point.act("requested", token)
+            if place not in self._waits:
+                point.act("requested", token)
             self.entries[place](Request(token, point.source, place, point.now, self.name, way))
 
         return ask_for_firing if place in self.model.times else ask
+
+    def told(self, place: str, onward: Way) -> Way:
+        """``onward`` for requests from a place that wait for the composite's turn: they are made when they come in."""
+        self._waits.add(place)
+
+        def come_in(request: Any) -> None:
+            is_firing = isinstance(request, FiringRequest)
+            point = self._ways[place][0 if is_firing else request.way]
+            point.act("requested", request.execution_time if is_firing else request.token)
+            onward.go(request)
+
+        return Call(come_in)
 
     def answer(self, request: Any) -> None:
         """Take what the composite sends from its response port; raises ``EpicycleError`` if that is no request."""

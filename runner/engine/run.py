@@ -58,7 +58,9 @@ class Run:
         order, limits = model.order(), model.graph.limits
         self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
         self.director = (
-            Director(order, seed, limits) if tracer is None else TracingDirector(order, seed, tracer, limits)
+            Director(order, seed, limits, model.postings())
+            if tracer is None
+            else TracingDirector(order, seed, tracer, limits, model.postings())
         )
         self.log.crowd = self.director.crowd.add
         self.signals = {name: Signal(name) for name in model.recorded}
@@ -134,9 +136,13 @@ class Run:
         self.is_begun = True
         for path, actor in self.actors.items():
             actor.enter(self._ways.context_of(path))
-        for actor in self.actors.values():
+        before = ""
+        for path, actor in self.actors.items():
+            self._ways.post(before, path)
             self._call(actor, "initialize")
             self._initialized.append(actor)
+            before = path
+        self._ways.post(before, "")
         self._ways.begin()
         # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
         self._ways.open()

@@ -12,6 +12,7 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake, Way, When
 from epicycle.aspects import Job
 
+from ..graph import Postings
 from ..results import EventLog, Names, Record, Writer
 from ..text import Limits
 from .agenda import Delivery, Turn
@@ -106,8 +107,10 @@ class _TracingWriter(Writer):
 class TracingDirector(Director):
     """A director that remembers why."""
 
-    def __init__(self, order: dict[str, int], seed: int, tracer: Tracer, limits: Limits) -> None:
-        super().__init__(order, seed, limits)
+    def __init__(
+        self, order: dict[str, int], seed: int, tracer: Tracer, limits: Limits, postings: Postings | None = None
+    ) -> None:
+        super().__init__(order, seed, limits, postings)
         self._tracer = tracer
         self._arrivals: dict[str, list[Arrival]] = {}
         self._asked: dict[Wake, Tag | None] = {}

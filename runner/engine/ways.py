@@ -28,14 +28,14 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..graph import Clock, Hop, ModelGraph, WovenAspect, is_within
+from ..graph import Clock, Hop, ModelGraph, WovenAspect, channel_of, is_within
 from ..results import EventLog, Signal
 from ..text import describe
 from .aspect_context import EngineContext
 from .director import Director
 from .errors import ActorError, LoopError
 from .execution import Execution
-from .local_time import LocalDirector, Passage
+from .local_time import Border, LocalDirector, Passage
 from .parameters import VaryingParameter
 from .refinement import Conductor, Refinement
 from .requests import Requests
@@ -96,6 +96,7 @@ class Ways:
         self._directors: dict[str, Director | LocalDirector | Refinement] = {}
         self._conductors: dict[str, Conductor] = {}
         self._passages: dict[str, Passage] = {}
+        self._borders: dict[str, Border] = {}
         self._refinements: dict[str, Refinement] = {}
         for composite, clock in self.graph.clocks.items():
             self._add_director(composite, clock)
@@ -111,6 +112,9 @@ class Ways:
             if self._is_caught(path):
                 refinement = self._refinements[self.graph.refinement_of(path)]
                 execution.refinement = refinement
+            around = self.graph.director_of(path)
+            if any(self.graph.director_of(woven.name) != around for woven in self._woven_at.get(path, ())):
+                execution.border = self._borders.get(around)
             execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
 
@@ -119,6 +123,8 @@ class Ways:
         outside = self._base(self.graph.director_of(composite)) if composite else self.director
         for paths in self.graph.borders(composite):
             self._passages.update({path: Passage(path, outside) for path in paths})
+        if self.graph.refires(composite):
+            self._add_border(composite, outside)
         self._directors[composite] = self._made_director(composite, clock)
         if composite in self.graph.modal:
             machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
@@ -127,6 +133,22 @@ class Ways:
             if machine.is_preemptive:
                 for path in self.graph.borders(composite)[0]:
                     self._passages[path].beside = conductor
+
+    def _add_border(self, composite: str, outside: Director | Refinement) -> None:
+        """Let a composite fire again as long as tokens wait at its inputs."""
+        border = self._borders[composite] = Border(composite, self.director, outside)
+        for paths, passages in zip(
+            self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
+        ):
+            passages += (self._passages[path] for path in paths)
+            for passage in passages:
+                passage.border = border
+        around = composite
+        while around and border.poster is None:
+            around = around.rpartition(".")[0]
+            border.poster = self._borders.get(around)
+        border.nesting = 0 if border.poster is None else border.poster.nesting + 1
+        self.director.posters[composite] = border
 
     def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
         if not composite or self.graph.refinement_of(composite) != composite:
@@ -208,6 +230,14 @@ class Ways:
         """The actors that aspects stand at, or whose parameters they change."""
         return self._executions
 
+    def post(self, before: str, path: str) -> None:
+        """At the start, one actor was initialized and another one is next: post composites that are done with."""
+        around = before if self._borders else ""
+        while around:
+            around = around.rpartition(".")[0]
+            if around in self._borders and not is_within(path, around):
+                self._borders[around].post()
+
     def open(self) -> None:
         """From now on tokens can be sent."""
         for output, emitter in self._emitters:
@@ -219,19 +249,21 @@ class Ways:
             output.disconnect()
 
     def _find(self) -> list[tuple[OutputPort[Any], Emitter]]:
-        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.
+        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.  Where a
+        # connection is shared, all wires over it are one.
         leaving: dict[str, list[tuple[Hop, ...]]] = {}
         for actor in self.actors.values():
             for port in actor.inputs.values():
-                wires = self.graph.wires_to(port)
-                port.width = len(wires)
-                for channel, wire in enumerate(wires):
-                    self._channels[wire.hops] = channel
-                    leaving.setdefault(wire.source.path, []).append(wire.hops)
+                channels = self.graph.channels_to(port)
+                port.width = len(channels)
+                for channel, wires in enumerate(channels):
+                    for wire in wires:
+                        self._channels[wire.hops] = channel
+                        leaving.setdefault(wire.source.path, []).append(wire.hops)
         for hops in leaving.values():
             hops.sort(key=lambda way: [hop.order for hop in way])  # as they are declared
         emitters = [
-            (output, self._emitter(output, leaving.get(output.path, [])))
+            (output, self._emitter(output, _by_channel(leaving.get(output.path, []))))
             for actor in self.actors.values()
             for output in actor.outputs.values()
         ]
@@ -246,7 +278,11 @@ class Ways:
                 if path not in ways:
                     ways[path] = all_of(self._branches(path, ()))
                 passage = self._passages.get(path)
-                onward = ways[path] if passage is None else passage.lane(place, ways[path])
+                onward = ways[path]
+                if passage is not None and passage.border is not None:
+                    onward = passage.await_turn(requests.told(place, onward))
+                elif passage is not None:
+                    onward = passage.lane(place, onward)
                 requests.entries[place] = self._woven(path, path, onward).go
 
     def _heard(self, path: str) -> list[Way]:
@@ -254,34 +290,38 @@ class Ways:
         listeners = self._listeners.get(path, [])
         return [listener if isinstance(listener, Way) else Call(listener) for listener in listeners]
 
-    def _emitter(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]]) -> Emitter:
+    def _emitter(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]]) -> Emitter:
         """What ``port.send`` does."""
-        port.width = len(wires)
-        everywhere = self._sender(port, wires, None, self._branches(port.path, ()))
+        port.width = len(channels)
+        everywhere = self._sender(port, channels, None, self._branches(port.path, ()))
         # An aspect at an output stands before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
             return everywhere
         return Screened(everywhere, partial(self._woven, port.path, port.path))
 
     def _sender(
-        self, port: OutputPort[Any], wires: list[tuple[Hop, ...]], channel: int | None, ways: list[Way]
+        self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]], channel: int | None, ways: list[Way]
     ) -> Sender:
         writer = self.log.writer("send", port.actor.path, port.name, channel, "")
-        return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self, wires)
+        return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self, channels)
 
-    def along(self, port: OutputPort[Any], wires: list[tuple[Hop, ...]], channel: int) -> Sender:
-        """What sends over one of the wires of a port."""
-        return self._sender(port, wires, channel, [self._way(wires[channel])])
+    def along(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]], channel: int) -> Sender:
+        """What sends over one of the channels of a port."""
+        wires = channels[channel]
+        ways = [self._way(wires[0])] if len(wires) == 1 else self._branches(port.path, (), wires)
+        return self._sender(port, channels, channel, ways)
 
-    def _branches(self, path: str, hops: tuple[Hop, ...]) -> list[Way]:
-        """The ways onward from a port, one for each connection that leaves it."""
+    def _branches(self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None) -> list[Way]:
+        """The ways onward from a port, one for each connection that leaves it, or that some wires take."""
         ways = []
         for hop in self.graph.outgoing(path):
             far, taken = hop.destination, (*hops, hop)
+            if wires is not None and not any(wire[: len(taken)] == taken for wire in wires):
+                continue
             if self.graph.owner(far) in self.actors:
                 onward = self._put(taken)
             else:
-                onward = all_of(self._heard(far) + self._branches(far, taken))
+                onward = all_of(self._heard(far) + self._branches(far, taken, wires))
             ways.append(self._over(hop, onward, taken))
         return ways
 
@@ -295,14 +335,14 @@ class Ways:
     def _over(self, hop: Hop, onward: Way, channel: tuple[Hop, ...]) -> Way:
         """One connection: its delay, and the aspects and the passage at its far end."""
         far = hop.destination
-        passage = self._passages.get(far)
+        passage, lane = self._passages.get(far), channel_of(channel, hop)
         is_output = self.graph.direction(far) == "output"
         source = far if is_output else hop.source
         # Aspects at a port of a composite stand outside of it.
         if passage is not None and not is_output:
-            onward = self._woven(far, source, passage.lane(channel, onward))
+            onward = self._woven(far, source, passage.lane(lane, onward))
         elif passage is not None:
-            onward = passage.lane(channel, self._woven(far, source, onward))
+            onward = passage.lane(lane, self._woven(far, source, onward))
         else:
             onward = self._woven(far, source, onward)
         for woven in reversed(self._woven_on.get((hop.source, far), [])):
@@ -436,3 +476,11 @@ class Ways:
                 raise
             except Exception as error:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
+
+
+def _by_channel(wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
+    """The wires of an output port by the channel, in their order."""
+    found: dict[object, list[tuple[Hop, ...]]] = {}
+    for hops in wires:
+        found.setdefault(channel_of(hops, hops[0]), []).append(hops)
+    return list(found.values())

@@ -2,12 +2,17 @@
 
 from .clock import Clock
 from .digraph import find_loop, in_order
+from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, channel_of, is_within
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
-from .ranks import Region, dependencies, firing_order
+from .ranks import Postings, Region, dependencies, firing_order, postings
+from .rules import LIKE, PTOLEMY, TIES, Rules
 from .watched import Metric, Watched
 from .woven import AspectModel, WovenAspect, check_processors, extent
 
 __all__ = [
+    "LIKE",
+    "PTOLEMY",
+    "TIES",
     "AspectModel",
     "Clock",
     "Detour",
@@ -16,10 +21,13 @@ __all__ = [
     "Modal",
     "ModelGraph",
     "PortNode",
+    "Postings",
     "Region",
+    "Rules",
     "Watched",
     "Wire",
     "WovenAspect",
+    "channel_of",
     "check_processors",
     "dependencies",
     "extent",
@@ -27,4 +35,5 @@ __all__ = [
     "firing_order",
     "in_order",
     "is_within",
+    "postings",
 ]

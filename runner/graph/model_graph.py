@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import Actor, InputPort, OutputPort
@@ -16,6 +16,7 @@ from epicycle.aspects import Request
 
 from ..text import NORMAL, Limits, Position
 from .clock import Clock
+from .rules import Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,7 @@ class Hop:
     delay: int | None  # ns; None: within the tag
     position: Position | None
     order: int
+    shared: int | None = field(default=None, kw_only=True)  # the same for all hops of a connection that is one channel
 
     def __str__(self) -> str:
         return f"{self.source} -> {self.destination}"
@@ -46,10 +48,11 @@ class Detour(Hop):
     """A part of the way that tokens take through an aspect that is a model, within the tag: it orders firings.
 
     Tokens go from where they are sent to the composite's request port, and from its response port to where they were
-    going.
+    going.  Where it ``waits`` for the composite's turn, it orders nothing.
     """
 
     aspect: str
+    waits: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,8 @@ class ModelGraph:
         self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
         # The composites with a director of their own, which are actors to the graph around them; "" is the model.
         self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
+        # What each of these directors goes by.
+        self.rules: dict[str, Rules] = {"": Rules() if inside is None else inside.rules[director]}
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
         self.modal: dict[str, Modal] = {}  # composites with modes, by their path
         self.priorities: dict[str, int] = {}
@@ -125,7 +130,7 @@ class ModelGraph:
         self._check_open()
         self.ports |= part.ports
         self.members[director] += part.members.pop("")
-        del part.clocks[""]
+        del part.clocks[""], part.rules[""]
         parts = part._parts
         part._parts = {path: each for path, each in parts.items() if path not in self._parts}
         for known, new in zip(self._by_path(), part._by_path(), strict=True):
@@ -138,6 +143,8 @@ class ModelGraph:
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         self._check_open()
+        if self.rules_at(actor.path).are_ptolemys:
+            actor.follow_ptolemy()
         actor.is_part = True
         self.actors[actor.path] = actor
         self._enrol(actor.path)
@@ -162,17 +169,35 @@ class ModelGraph:
         """The actors and composites in a composite, by their names: of an array all instances."""
         return self._parts.get(composite, {})
 
-    def add_director(self, path: str, start: int | None, drift: float) -> None:
-        """Give a composite a director of its own; ``start`` (ns) and ``drift`` are those of its clock."""
+    def add_director(
+        self,
+        path: str,
+        start: int | None = None,
+        drift: float = 1.0,
+        ties: str | None = None,
+        like: str | None = None,
+    ) -> None:
+        """Give a composite a director of its own, with this clock (``start`` in ns) and these rules if given."""
         self._check_open()
         outer = self.director_of(path)
         self.members[outer].append(path)
         self.members[path] = []
         self.clocks[path] = self.clocks[outer].inside(start, drift)
+        self.rules[path] = self.rules[outer].inside(ties, like)
+
+    def rules_at(self, path: str) -> Rules:
+        """What the director goes by that an actor or composite stands under."""
+        return self.rules[self.director_of(path)]
+
+    def refires(self, director: str) -> bool:
+        """Whether a composite fires again at a tag as long as tokens wait at its inputs, as in Ptolemy."""
+        if not director or director not in self.rules or director in self.modal:
+            return False
+        return self.rules[director].are_ptolemys and self.refinement_of(director) != director
 
     def add_refinement(self, path: str) -> None:
         """Give a composite a director of its own, whose time goes on in one mode alone; clocks in it count by that."""
-        self.add_director(path, None, 1.0)
+        self.add_director(path)
         self.clocks[path] = Clock()
 
     def add_composite_port(
@@ -192,9 +217,11 @@ class ModelGraph:
         port.name, port.path = path.rpartition(".")[2], path
         self.ports[path].port = port
 
-    def connect(self, source: str, destination: str, delay: int | None, position: Position | None) -> None:
+    def connect(
+        self, source: str, destination: str, delay: int | None, position: Position | None, shared: int | None = None
+    ) -> None:
         self._check_open()
-        self._enter(Hop(source, destination, delay, position, self._order))
+        self._enter(Hop(source, destination, delay, position, self._order, shared=shared))
 
     def _enter(self, hop: Hop) -> None:
         self._order = hop.order + 1
@@ -226,7 +253,7 @@ class ModelGraph:
         """What is known of parts, the actors first."""
         return (
             self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
-            self._borders, self._parts, self.modal,
+            self._borders, self._parts, self.modal, self.rules,
         )  # fmt: skip
 
     def remove(self, path: str) -> None:
@@ -318,6 +345,13 @@ class ModelGraph:
             if isinstance(start := self.ports[hops[0].source].port, OutputPort)
         ]
 
+    def channels_to(self, port: InputPort[Any]) -> list[list[Wire]]:
+        """The wires that end at an input port, by the channel."""
+        found: dict[object, list[Wire]] = {}
+        for wire in self.wires_to(port):
+            found.setdefault(channel_of(wire.hops, wire.hops[-1]), []).append(wire)
+        return list(found.values())
+
     def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
         """The ways from a port to actors' ports; ``check_passages`` has seen to it that they end."""
         for hop in self.outgoing(path) if forward else self.incoming(path):
@@ -347,6 +381,11 @@ class ModelGraph:
                 waiting += [each for each in reversed(before) if each not in seen]
                 seen.update(before)
         return found
+
+
+def channel_of(hops: tuple[Hop, ...], hop: Hop) -> object:
+    """What tells the channels of a port apart: the wire, or the connection at the port if that is one channel."""
+    return hops if hop.shared is None else hop.shared
 
 
 def is_within(path: str, outer: str) -> bool:

@@ -8,8 +8,12 @@ composite put in its place.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import chain
 from typing import TypeAlias
+
+from epicycle.actors import Place
 
 from .digraph import in_order
 from .model_graph import Hop, ModelGraph
@@ -27,24 +31,60 @@ def firing_order(graph: ModelGraph) -> dict[str, int]:
     (``depths``), at equal depth by priority, then in the order of declaration.  Raises
     ``graphlib.CycleError`` if there is a loop without delay.
     """
+    return {path: rank for rank, (paths, _) in enumerate(_unfolded(graph)) for path in paths}
+
+
+@dataclass(frozen=True)
+class Postings:
+    """Where ties are as they were posted: the place of each rank, and the actors that take all that waits.
+
+    Of these it says whether they also fire when what they were to fire for has been taken.
+    """
+
+    places: tuple[Place, ...]
+    actors: dict[str, bool]
+
+
+def postings(graph: ModelGraph) -> Postings | None:
+    """What there is to be known of posts, if ties are posted anywhere."""
+    if not any(rules.are_posted for rules in graph.rules.values()):
+        return None
+    rules = {path: graph.rules_at(path) for path in graph.actors}
+    actors = {path: each.are_ptolemys for path, each in rules.items() if each.are_posted}
+    return Postings(tuple(place for _, place in _unfolded(graph)), actors)
+
+
+def _unfolded(graph: ModelGraph) -> list[tuple[list[str], Place]]:
+    """What fires in the order of ranks: the paths of each rank, and its place among what is posted."""
     regions = dependencies(graph)
-    order: list[list[str]] = []
+    numbers = {director: number for number, director in enumerate(graph.clocks)}
+    order: list[tuple[list[str], Place]] = []
 
-    def unfold(director: str) -> None:
+    def unfold(director: str, around: Place) -> None:
         inputs, outputs = graph.borders(director)
-        order.extend([port] for port in inputs)
-        modal = graph.modal.get(director)
-        if modal is not None:  # its conductor is first, and its machine last
-            order.append([director])
-        for turn in _turns(graph, director, depths(graph, director, regions[director])):
-            if turn[0] in graph.clocks:
-                unfold(turn[0])
-            else:
-                order.append(turn)
-        order.extend([port] for port in outputs)
+        group = 0
 
-    unfold("")
-    return {path: rank for rank, paths in enumerate(order) for path in paths}
+        def add(paths: list[str], *, beside: bool = False) -> None:
+            nonlocal group
+            group += not beside
+            if paths[0] in graph.clocks and paths[0] != director:
+                unfold(paths[0], (*around, (group, numbers[paths[0]])))
+            else:
+                order.append((paths, (*around, (group, 0))))
+
+        for port in inputs:
+            add([port])
+        if director in graph.modal:  # its conductor is first, and its machine last
+            add([director])
+        for paths, is_tied in _turns(graph, director, depths(graph, director, regions[director])):
+            add(paths, beside=is_tied and graph.rules[director].are_posted)
+        for port in outputs:
+            add([port])
+        if graph.refires(director):
+            add([director])
+
+    unfold("", ())
+    return order
 
 
 def dependencies(graph: ModelGraph) -> dict[str, Region]:
@@ -54,6 +94,8 @@ def dependencies(graph: ModelGraph) -> dict[str, Region]:
         if hop.delay is None:
             hops[graph.director_over(hop)].append(hop)
     for detour in graph.detours:
+        if detour.waits:
+            continue
         hops[graph.director_over(detour)].append(detour)
     regions: dict[str, Region] = {}
     for director in reversed(graph.clocks):  # inner ones first: the outer ones need to know what depends on what
@@ -69,7 +111,7 @@ def dependencies(graph: ModelGraph) -> dict[str, Region]:
                 region.setdefault(port, {})
             if member in graph.clocks:
                 for port in inputs:
-                    if _acts(graph, member, regions[member], port):
+                    if graph.rules[member].are_ptolemys or _acts(graph, member, regions[member], port):
                         region[port].update(dict.fromkeys(outputs))
                 continue
             for output in graph.actors[member].outputs.values():
@@ -134,10 +176,11 @@ def depths(graph: ModelGraph, director: str, region: Region) -> dict[str, int]:
     return result
 
 
-def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> list[list[str]]:
+def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[tuple[list[str], bool]]:
     """The firings within a tag in their order: each a composite, or an actor and those of its inputs that go with it.
 
     If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a turn of their own.
+    With each goes whether it is tied with the one before.
     """
     turns: list[tuple[int, int, list[str]]] = []
     modal = graph.modal.get(director)
@@ -150,5 +193,9 @@ def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> list[list
             found.setdefault(depth[port], []).append(port)
         turns += [(deep, graph.priorities.get(member, 0), paths) for deep, paths in found.items()]
     # The sort is stable: the order of declaration decides ties.
-    order = [paths for _, _, paths in sorted(turns, key=lambda turn: turn[:2])]
-    return order if modal is None else [*order, [modal.machine, *ports_of(graph, modal.machine)[0]]]
+    before: tuple[int, int] | None = None
+    for deep, priority, paths in sorted(turns, key=lambda turn: turn[:2]):
+        yield paths, (deep, priority) == before
+        before = deep, priority
+    if modal is not None:
+        yield [modal.machine, *ports_of(graph, modal.machine)[0]], False

@@ -84,13 +84,17 @@ class PartText:
 
 @dataclass(frozen=True)
 class ConnectionText:
-    """One entry of ``connections``; with ``to_all``, of several on both sides each goes to all, else in pairs."""
+    """One entry of ``connections``; with ``to_all``, of several on both sides each goes to all, else in pairs.
+
+    If it is ``shared``, it is one channel at each port.
+    """
 
     sources: tuple[Text, ...]
     destinations: tuple[Text, ...]
     position: Position
     delay: Node | None = None
     to_all: bool = False
+    shared: bool = False
     removes: Position | None = None  # where it is said that these are taken away from the inherited ones
 
 

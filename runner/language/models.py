@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from keyword import iskeyword, kwlist
 from typing import Any
 
@@ -10,6 +11,7 @@ from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
 from ..catalogue import TAKES, Measure, take_problem
+from ..graph import LIKE, PTOLEMY, TIES
 from ..text import (
     MAX_SEED,
     NAME,
@@ -205,6 +207,20 @@ def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
 
 # -- composite classes --------------------------------------------------------------------------------------------
 
+
+def _rules(**defaults: str) -> dict[str, Key]:
+    """What a director goes by."""
+    said = {"ties": TIES, "like": LIKE}
+    return {
+        key: Key(node_as(schema_of(each)), f"{each.doc[:1].upper()}{each.doc[1:]} (default: {defaults[key]}).")
+        for key, each in said.items()
+    }
+
+
+MODEL_DIRECTOR = Construct(
+    "What the director of the model goes by, and those inside that say nothing else.",
+    _rules(ties="declared", like="epicycle"),
+)
 DIRECTOR = Construct(
     "A director of its own, with a local clock.",
     {
@@ -212,6 +228,7 @@ DIRECTOR = Construct(
             node_as(computed("number", unit="s")), "The local time when the run begins (default: as around it)."
         ),
         "drift": Key(node_as(computed("number", unit="1")), "How fast local time goes, 1 being as fast as around it."),
+        **_rules(ties="as around it", like="as around it"),
     },
 )
 DOC = Key(TEXT, "What it shows or does.")
@@ -373,6 +390,20 @@ def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
     return MetricText(name, port, {key: each for key, each in entries.items() if key != "of"}, entry.key.position)
 
 
+def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry]:
+    """What is said of the model's own director."""
+    if isinstance(node, Scalar) and node.value == PTOLEMY:
+        reader.problems.add(f"{what} is not a mapping", node.position, f"write 'director: {{like: {PTOLEMY}}}'")
+        return {}
+    if isinstance(node, Mapping):
+        for key in [key for key in ("start", "drift") if key in node.entries]:
+            message = f"{what} has no {key!r}: the time of a run begins at 0 and goes on as it does"
+            hint = "give it to the director of a composite, whose local time may be another one"
+            reader.problems.add(message, node.entries[key].key.position, hint)
+        node = replace(node, entries={key: each for key, each in node.entries.items() if key not in ("start", "drift")})
+    return MODEL_DIRECTOR.entries(reader, node, what) or {}
+
+
 METRICS = named(ref("metric"), _metric)
 LIBRARY = Construct("", {"doc": DOC, "include": INCLUDE, "composites": COMPOSITES})
 MODEL = Construct(
@@ -389,6 +420,7 @@ MODEL = Construct(
         "include": INCLUDE,
         "parameters": PARAMETERS,
         "composites": COMPOSITES,
+        "director": Key(Shape(ref("model_director"), _model_director), MODEL_DIRECTOR.doc, "the director of {what}"),
         "actors": ACTORS,
         "connections": COMPOSITE.keys["connections"],
         "aspects": ASPECTS,
@@ -400,7 +432,8 @@ MODEL = Construct(
         "figures": Key(parts("figure"), "Pictures of a run: 'name: {type, ...}'."),
     },
 )
-_OF_FILE = Construct("", {key: each for key, each in MODEL.keys.items() if key not in COMPOSITE.keys})
+_OF_ROOT = {key for key, each in MODEL.keys.items() if COMPOSITE.keys.get(key) is each}  # as of other composites
+_OF_FILE = Construct("", {key: each for key, each in MODEL.keys.items() if key not in _OF_ROOT})
 
 
 def model_of(node: Node, problems: Problems) -> ModelText | None:
@@ -410,8 +443,10 @@ def model_of(node: Node, problems: Problems) -> ModelText | None:
     if entries is None:
         return None
     said = _OF_FILE.values(reader, entries, "the model", node.position)
-    own = {key: entry for key, entry in entries.items() if key in COMPOSITE.keys}
-    return ModelText(composite(reader, said.pop("name", "model"), own, node.position), **said)
+    own = {key: entry for key, entry in entries.items() if key in _OF_ROOT}
+    director = said.pop("director", None)
+    root = composite(reader, said.pop("name", "model"), own, node.position)
+    return ModelText(replace(root, director=director), **said)
 
 
 def library_of(node: Node, problems: Problems) -> ModelText | None:

@@ -68,6 +68,11 @@ CONNECTION = Construct(
             called="'all' of a connection",
             name="to_all",
         ),
+        "shared": Key(
+            FLAG,
+            "All that it joins is one channel at each port, as by a relation in Ptolemy; otherwise each of its ways is one.",
+            called="'shared' of a connection",
+        ),
         "delay": Key(
             node_as(computed("number", 0.0, unit="s")),
             "How long a token takes, such as 100 ms; 0 is the next microstep.",

@@ -36,6 +36,7 @@ from .models import (
     LIBRARY,
     METRIC,
     MODEL,
+    MODEL_DIRECTOR,
     PARAMETER,
     PORT,
     RESERVED,
@@ -55,6 +56,7 @@ CONSTRUCTS = {
     "A parameter": PARAMETER,
     "A port of a composite": PORT,
     "A director": DIRECTOR,
+    "The director of the model": MODEL_DIRECTOR,
     "A connection": CONNECTION,
     "A pointcut": POINTCUT,
     "Beside the parameters of an actor or aspect": Construct("", BESIDE),
@@ -99,6 +101,7 @@ def json_schema(
         "claim": CLAIM.schema,
         "dimension": dimension_schema(),
         "director": DIRECTOR.schema,
+        "model_director": MODEL_DIRECTOR.schema,
         "composite": composite_schema(),
         "port_declaration": PORT.schema,
         "changed_actor": _changed("actor"),
@@ -206,6 +209,6 @@ def _type(name: str, cls: type, kind: str) -> Schema:
             **dict.fromkeys(_beside(kind), True),  # whose rules stand where the type does
             **{key: {**schema_of(parameter), "description": about(parameter)} for key, parameter in declared.items()},
         },
-        "required": [key for key, parameter in declared.items() if parameter.required],
+        "required": [key for key, parameter in declared.items() if parameter.required and not parameter.differs],
         "additionalProperties": False,
     }

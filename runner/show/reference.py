@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from operator import attrgetter
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -215,15 +217,28 @@ def facts(reference: TypeReference) -> list[str]:
 
 
 def _port_row(port: PortReference) -> list[str]:
+    notes = ", ".join(_notes(port))
+    if port.ptolemy:
+        options: dict[str, Any] = {option: value for option, value in port.ptolemy.items() if option != "type"}
+        there = _notes(replace(port, **options)) or [
+            "required" if port.direction == "input" else "depends on all inputs"
+        ]
+        notes += ("; " if notes else "") + f"like Ptolemy {', '.join(there)}"
+    return [port.name, port.type, notes, port.doc]
+
+
+def _notes(port: PortReference) -> list[str]:
+    """What there is to say of a port."""
     is_input, inputs = port.direction == "input", port.depends_on
     notes = {
         "optional": is_input and not port.required,
         "does not trigger": is_input and not port.triggers,
+        "keeps what is not taken out": is_input and port.keep,
         # Such a port may stand in a loop.
         f"depends at once on {' and '.join(inputs or ()) or 'no input'}": not is_input and inputs is not None,
         "any number of connections": port.multi,
     }
-    return [port.name, port.type, ", ".join(note for note, holds in notes.items() if holds), port.doc]
+    return [note for note, holds in notes.items() if holds]
 
 
 def _parameter_row(parameter: ParameterReference) -> list[str]:
@@ -235,4 +250,6 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
     else:
         kind += bounds_text(parameter.min, parameter.above, parameter.max, "{:g}".format)
     default = "required" if parameter.required else shown(parameter.default)
+    if parameter.differs:
+        default += f"; like Ptolemy {shown(parameter.ptolemy)}"
     return [parameter.name, kind, parameter.unit, default, parameter.doc]

@@ -30,7 +30,9 @@ class Gate(Actor):
     input = InputPort(float | str, multi=True, doc="what comes")
     control = InputPort(Any, required=False, doc="opens it")
     output = OutputPort(float, depends_on=("input",), doc="what goes")
-    mode = Parameter(str, "open", choices=("open", "shut"), doc="how it begins")
+    spare = InputPort(Any, required=False, ptolemy={"required": True, "keep": True}, doc="like there")
+    late = OutputPort(float, depends_on=(), ptolemy={"depends_on": None}, doc="what goes there")
+    mode = Parameter(str, "open", choices=("open", "shut"), ptolemy="shut", doc="how it begins")
     delay = Parameter(float, unit="s", min=0.0, doc="how long it takes")
     corner = array_parameter((2,), (0.5, 1.0), unit="m", max=3.0, doc="where it is")
 
@@ -45,12 +47,14 @@ Those of `input`, that is; an array such as [1] is as good as any.
 input port  type                                  what it is
 input       float | str  any number of connections  what comes
 control     any          optional                   opens it
+spare       any          optional; like Ptolemy keeps what is not taken out  like there
 
 output port  type                            what it is
 output       float  depends at once on input  what goes
+late         float  depends at once on no input; like Ptolemy depends on all inputs  what goes there
 
 parameter  type                    unit  default   what it is
-mode       open or shut                  open      how it begins
+mode       open or shut                  open; like Ptolemy shut      how it begins
 delay      number >= 0             s     required  how long it takes
 corner     list of 2 numbers <= 3  m     [0.5, 1]  where it is
 """
@@ -109,6 +113,8 @@ def test_one_aspect_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
         "max": 1,
         "choices": [],
         "doc": "probability that a message is lost",
+        "differs": False,
+        "ptolemy": None,
     }
 
 

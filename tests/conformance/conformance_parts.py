@@ -72,25 +72,6 @@ class MicrostepDelay(Actor):
             self.wake_in(0)
 
 
-class _OfVariable(Actor):
-    """What has to do with a variable of the model, which Epicycle does not have: its parameters are fixed in a run.
-
-    An assignment counts from the tag after, as Ptolemy makes it when all actors of a tag have fired.
-    """
-
-    variable = Parameter(str)
-    initial: Parameter[Any] = Parameter(object)
-
-    def assignments(self) -> list[tuple[Tag, Any]]:
-        """The assignments of this run so far."""
-        found: list[tuple[Tag, Any]] = vars(self.context.environment).setdefault(self.variable, [])
-        return found
-
-    def value(self) -> Any:
-        """The value of the variable at this tag."""
-        return next((value for tag, value in reversed(self.assignments()) if tag < self.tag), self.initial)
-
-
 class TimeOfSeveral(CurrentTime):
     """A CurrentTime to which two senders are connected: there these share one channel."""
 
@@ -103,33 +84,10 @@ class MicrostepOfSeveral(CurrentMicrostep):
     trigger: InputPort[Any] = InputPort(Any, multi=True)
 
 
-class SetVariable(_OfVariable):
-    """Assigns a token to a variable, and sends the value that it still has."""
-
-    input: InputPort[Any] = InputPort(Any)
-    output: OutputPort[Any] = OutputPort(Any)
-
-    def fire(self) -> None:
-        self.assignments().append((self.tag, self.input.value))
-        self.output.send(self.value())
-
-
-class ConstOfVariable(_OfVariable):
-    """Sends the value of a variable."""
-
-    trigger: InputPort[Any] = InputPort(Any)
-    output: OutputPort[Any] = OutputPort(Any)
-
-    def fire(self) -> None:
-        self.output.send(self.value())
-
-
 TYPES = (
     CancelFireAtTest,
-    ConstOfVariable,
     MicrostepDelay,
     MicrostepOfSeveral,
-    SetVariable,
     Sink,
     TestActorPortDepth,
     TimeOfSeveral,

@@ -59,6 +59,25 @@ class Moody(Actor):
                 self.output.send(self.now)
 
 
+class Keeper(Actor):
+    """Sends the first tokens of both inputs together; like Ptolemy, it keeps what waits for another one."""
+
+    input: InputPort[Any] = InputPort(multi=True, ptolemy={"keep": True})
+    trigger: InputPort[Any] = InputPort(ptolemy={"keep": True})
+    output: OutputPort[Any] = OutputPort(float)
+
+    def fire(self) -> None:
+        if not self.trigger.keep:
+            for token, _ in zip(self.input.tokens, self.trigger.tokens, strict=False):
+                self.output.send(token)
+        elif self.trigger.waiting():
+            for channel in range(self.input.width):
+                if self.input.waiting(channel):
+                    self.output.send(self.input.get(channel))
+                    self.trigger.get()
+                    return
+
+
 class Patient(Process):
     """Reads and waits in turn, and yields to SimPy's own events."""
 
@@ -94,7 +113,7 @@ ODD: dict[str, list[Any]] = {
     "beyond": [1.5, -0.0, 1e308, -1e308, 5e-324, float("inf"), float("-inf"), float("nan")],
     "mixed": [1.5, -0.0, 2, 0, -7, 2**53 + 1, True, False, np.float64(0.5)],
 }
-TYPES = [Moody, Patient, Ticker, Join, Odd]
+TYPES = [Keeper, Moody, Patient, Ticker, Join, Odd]
 EXPRESSIONS = (
     "a + b", "a - b", "time - a", "a + 2 * b", "a / b", "-a * b - time", "a > b", "a > 0 and not b > 1", "a or b",
     "a if a > b else -b", "max(a, 0.5) ** 2 // (b + 1)", "sqrt(a * a + b * b) % 2", "a < b <= 1", "1 / (a * b)", "-a",
@@ -187,6 +206,7 @@ def _between(numbers: Numbers) -> tuple[dict[str, Any], list[str]]:
         ({"type": "Sampler"}, ["input", "trigger"]),
         ({"type": "MostRecent"}, ["input", "trigger"]),
         ({"type": "Moody"}, ["input"]),
+        ({"type": "Keeper"}, ["input", "trigger", "input"]),
         ({"type": "Patient"}, ["input"]),
         ({"type": "Join"}, ["input", "input"]),
     ]
@@ -200,6 +220,7 @@ ASPECTS: list[dict[str, Any]] = [
     {"type": "Duplicate", "probability": 0.3},
     {"type": "Probe"},
 ]
+RULES: list[dict[str, Any]] = [{"ties": "posted"}, {"like": "ptolemy"}, {"like": "ptolemy", "ties": "declared"}]
 AT_ACTORS: list[dict[str, Any]] = [
     {"type": "ExecutionTime", "time": "50 ms"},
     {"type": "CrashRestart", "mtbf": 1.5, "repair": 0.3},
@@ -239,19 +260,37 @@ def network(numbers: Numbers) -> dict[str, Any]:
     if numbers.random() < 0.15:
         path = numbers.choice([name for name in actors if name != "sink"])
         model.setdefault("aspects", {})["two"] = {**numbers.choice(AT_ACTORS), "at": path}
+    prefix = ""
     if numbers.random() < 0.3:
         part = {"actors": dict(actors), "connections": connections, "director": {"start": 1}}
         if numbers.random() < 0.5:
             part["director"] = {"drift": 1.5}
         elif numbers.random() < 0.3:
             del part["director"]
+        if "director" in part and numbers.random() < 0.3:
+            part["director"].update(numbers.choice(RULES))
         model = {"composites": {"Part": part}, "actors": {"part": {"type": "Part"}}}
-        ends = [f"part.{port}" for port in ends]
+        prefix = "part."
+        if numbers.random() < 0.3:  # two of them in another one, each of which may have what the other one sends
+            part |= {"inputs": {"into": None}, "outputs": {"out": None}}
+            part["connections"] = [*connections, {"from": ends[0], "to": "out"}, {"from": "into", "to": "sink.input"}]
+            around: dict[str, Any] = {"actors": {"part": {"type": "Part"}, "twin": {"type": "Part"}}}
+            around["connections"] = [
+                {"from": "part.out", "to": "twin.into"},
+                {"from": "twin.out", "to": "part.into", "delay": numbers.choice(TIMES)},
+            ]
+            if numbers.random() < 0.7:
+                around["director"] = numbers.choice([{}, {"drift": 0.5}, *RULES])
+            model = {"composites": {"Part": part, "Around": around}, "actors": {"around": {"type": "Around"}}}
+            prefix = "around.part."
+        ends = [f"{prefix}{port}" for port in ends]
+    if numbers.random() < 0.4:
+        model["director"] = numbers.choice(RULES)
     model["run"] = {"stop": numbers.choice([3, 6.05]), "seed": numbers.randint(0, 5), "record": ends[:2]}
     metrics: dict[str, Any] = {}
     for place in range(3):
         end = numbers.choice(ends)
-        there = actors[end.removeprefix("part.").partition(".")[0]]
+        there = actors[end.removeprefix(prefix).partition(".")[0]]
         is_number = end.endswith("size") or (there["type"] in SENDS_NUMBERS and there.get("gives") != "any value")
         is_number = is_number and there.get("expression") not in ("a > b", "a < b <= 1", "a > 0 and not b > 1")
         metrics[f"m{place}"] = {"of": end, **numbers.choice([*OF_ANY, *(3 * OF_NUMBERS if is_number else ())])}

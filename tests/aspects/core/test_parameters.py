@@ -120,7 +120,9 @@ def test_a_firing_that_is_put_off_finds_the_value_of_its_time() -> None:
     assert [gain for gain, *_ in sent(results, "g[0]")] == [2.5, 3.5, 4.5, 5.5]
 
 
-@pytest.mark.parametrize("aspect", ["Drift", "Bias, by: 0", "Noise, deviation: 0", "Transform, to: value"])
+@pytest.mark.parametrize(
+    "aspect", ["Drift", "Bias, by: 0", "Noise, deviation: 0", "Transform, to: value", "Replace, to: value"]
+)
 def test_at_strength_zero_the_log_is_the_same(aspect: str) -> None:
     for at in ("'g[*].gain'", "s.factor", "{type: Gauge, parameter: at}"):
         assert run(model(f"it: {{type: {aspect}, at: {at}}}"), seed=3).digest == run(model(""), seed=3).digest

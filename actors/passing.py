@@ -1,0 +1,225 @@
+"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Previous, Register, Wire, BooleanSelect,
+Commutator, Sequencer, Default, IsPresent."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from .core import ABSENT, Actor, EpicycleError, InputPort, OutputPort, Parameter, brief, present, rounds
+from .expression import FormulaParameter, of_token
+from .flow import ByChannel, MostRecent
+from .matching import matched
+
+
+class Filter(ByChannel):
+    """Hands on the tokens for which a condition holds; the others are lost.
+
+    Ptolemy: ``EventFilter``, ``TrueGate``.
+    """
+
+    condition = FormulaParameter("token", doc="which tokens pass; of the token's fields, token, time")
+
+    def fire(self) -> None:
+        for channel, tokens in enumerate(self.input.by_channel()):
+            for token in tokens:
+                passes = of_token(self.condition, token, time=self.now)
+                if not isinstance(passes, bool):
+                    raise EpicycleError(f"{self.condition} gives {passes!r} for {brief(token)}, not true or false")
+                if passes:
+                    self.send(token, channel)
+
+
+class Inhibit(ByChannel):
+    """Hands on what comes unless an ``inhibit`` token comes with it; the opposite of a ``Sampler``.
+
+    Ptolemy: ``Inhibit``.
+    """
+
+    inhibit = InputPort(multi=True, doc="when to hand on nothing")
+
+    def fire(self) -> None:
+        for tokens, inhibits in rounds(self.input, self.inhibit):
+            for channel, token in enumerate(tokens):
+                if token is not ABSENT and not present(inhibits):
+                    self.send(token, channel)
+
+
+class FirstOfInstant(Actor):
+    """Hands on the first token of each instant; those that come at the same time, also at later microsteps, are lost.
+
+    Ptolemy: ``SuppressSimultaneousEvents``.
+    """
+
+    input = InputPort(doc="the stream")
+    output = OutputPort(doc="one token of each instant")
+
+    def initialize(self) -> None:
+        self._last: int | None = None
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            if self._last != self.tag.time:
+                self._last = self.tag.time
+                self.output.send(token)
+
+
+class Previous(Actor):
+    """Sends for each token the one that came before it; for the first ``initial``, or nothing if that is not given.
+
+    Ptolemy: ``Previous``.
+    """
+
+    input = InputPort(doc="the stream")
+    output = OutputPort(doc="the stream, one token behind")
+
+    initial: Parameter[Any] = Parameter(object, None, doc="what is sent for the first token")
+
+    def initialize(self) -> None:
+        self._before = self.initial
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            if self._before is not None:
+                self.output.send(self._before)
+            self._before = token
+
+
+class Register(MostRecent):
+    """Sends the latest token of each channel from before this tag whenever it is triggered, as often as that happens.
+
+    The output does not depend on the input at once: the actor may stand in a loop.  Ptolemy: ``Register``.
+    """
+
+    output = OutputPort(multi=True, depends_on=("trigger",), doc="channel by channel what the input got before")
+
+    def fire(self) -> None:
+        self.send_latest()
+        self.note()
+
+
+class Wire(ByChannel):
+    """Sends the latest token of every channel whenever one comes on any of them.
+
+    A channel on which no token has come yet sends ``initial``, or nothing if that is not given.  Ptolemy: ``Wire``.
+    """
+
+    initial: Parameter[Any] = Parameter(object, None, doc="what is sent for a channel before its first token")
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._latest: list[Any] = [self.initial] * self.input.width
+
+    def fire(self) -> None:
+        for (tokens,) in rounds(self.input):
+            for channel, token in enumerate(tokens):
+                if token is not ABSENT:
+                    self._latest[channel] = token
+                if self._latest[channel] is not None:
+                    self.send(self._latest[channel], channel)
+
+
+class BooleanSelect(Actor):
+    """Each ``control`` token lets the next token of ``true_input`` or of ``false_input`` pass, as it says.
+
+    Tokens wait until they are chosen, and control tokens until there is one for them, on each channel if there are
+    several.  Ptolemy: ``BooleanSelect``.
+    """
+
+    true_input = InputPort(multi=True, keep=True, required=False, doc="what passes for a control token that is true")
+    false_input = InputPort(multi=True, keep=True, required=False, doc="what passes for one that is false")
+    control = InputPort(bool, keep=True, doc="which input is next")
+    output = OutputPort(multi=True, doc="what passes, channel by channel")
+
+    def initialize(self) -> None:
+        self._control: bool | None = None
+
+    def fire(self) -> None:
+        if self._control is None and self.control.present:
+            self._control = self.control.get()
+        if self._control is None:
+            return
+        chosen = self.true_input if self._control else self.false_input
+        if all(chosen.waiting(channel) for channel in range(chosen.width)):
+            for channel in range(chosen.width):
+                self.output.send(chosen.get(channel), None if chosen.width == 1 else channel)
+            self._control = None
+
+
+class Commutator(Actor):
+    """Hands on what comes at the channels of its input in turn, ``block`` tokens of each; tokens wait for their turn.
+
+    Ptolemy: ``Commutator``.
+    """
+
+    input = InputPort(multi=True, doc="a channel for each connection, in their order")
+    output = OutputPort(doc="the tokens in turn")
+
+    block = Parameter(int, 1, min=1, doc="how many tokens a channel sends in its turn, as soon as it has them")
+
+    def initialize(self) -> None:
+        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+        self._next = 0
+
+    def fire(self) -> None:
+        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
+            queue.extend(tokens)
+        while len(queue := self._waiting[self._next]) >= self.block:
+            for _ in range(self.block):
+                self.output.send(queue.popleft())
+            self._next = (self._next + 1) % len(self._waiting)
+
+
+class Sequencer(Actor):
+    """Hands tokens on in the order of their numbers, which count up from ``first``; each waits until it is its turn.
+
+    The k-th token has the k-th number.  Ptolemy: ``Sequencer``, where the number is called ``sequenceNumber``.
+    """
+
+    input = InputPort(keep=True, doc="the tokens")
+    number = InputPort(int, keep=True, doc="the place of each in the sequence")
+    output = OutputPort(doc="the tokens in the order of their numbers")
+
+    first = Parameter(int, 0, doc="the first number")
+
+    def initialize(self) -> None:
+        self._waiting: dict[int, Any] = {}
+        self._next = self.first
+
+    def fire(self) -> None:
+        for values in matched([self.input, self.number]):
+            if values["number"] >= self._next:
+                self._waiting[values["number"]] = values["input"]
+        while self._next in self._waiting:
+            self.output.send(self._waiting.pop(self._next))
+            self._next += 1
+
+
+class Default(Actor):
+    """Hands on what comes at ``preferred``, and otherwise, if nothing does, what comes at ``alternate``.
+
+    Ptolemy: ``Default``.
+    """
+
+    preferred = InputPort(doc="what goes before")
+    alternate = InputPort(doc="what is handed on at tags at which nothing comes at 'preferred'")
+    output = OutputPort(ptolemy={"depends_on": ("preferred",)}, doc="one or the other")
+
+    def fire(self) -> None:
+        for preferred, alternate in rounds(self.preferred, self.alternate):
+            for token in (present(preferred) or present(alternate))[:1]:
+                self.output.send(token)
+
+
+class IsPresent(ByChannel):
+    """Tells for each channel whether a token has come on it, whenever one has on any of them.
+
+    Ptolemy: ``IsPresent``.
+    """
+
+    output = OutputPort(bool, multi=True, doc="channel by channel whether there is a token")
+
+    def fire(self) -> None:
+        for (tokens,) in rounds(self.input):
+            for channel, token in enumerate(tokens):
+                self.send(token is not ABSENT, channel)

@@ -1,0 +1,53 @@
+"""The command that makes a model of a file of Ptolemy II."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..printing import complain, tell
+from .options import DONE, TYPES, Command, option, own_types
+
+
+def _run(options: argparse.Namespace) -> int:
+    from epicycle.actors import EpicycleError
+
+    from ..build import load_model
+    from ..moml import import_moml
+
+    types = own_types(options)
+    if options.out is not None and options.out.suffix not in (".yaml", ".yml"):
+        raise EpicycleError(f"{options.out} is not the name of a model file: it ends in .yaml")
+    found = import_moml(options.file, lambda path: load_model(path, types=types), types)
+    for note in found.notes:
+        complain(f"note: {note}")
+    if options.out is None:
+        tell(found.text.rstrip("\n"))
+    else:
+        options.out.write_text(found.text, encoding="utf-8")
+        tell(f"wrote {options.out}")
+    return DONE
+
+
+import_ = Command(  # "import" is no name in Python
+    "import",
+    "make a model of a MoML file of Ptolemy II",
+    "Import a model of Ptolemy II: a MoML file with a DE director becomes a model in YAML, in which "
+    "'director: {like: ptolemy}' lets all be as it is there. Layout, icons and views are left out. Each other thing "
+    "that has no counterpart is told in a line, here and at the head of the model. Test actors become checks, which "
+    "'epicycle run' judges. A model that cannot be said is refused with the reasons (exit code 2), and nothing is "
+    "written. No other file is read.",
+    (
+        option("file", metavar="MODEL.xml", type=Path, help="the MoML file"),
+        option(
+            "-o",
+            "--out",
+            metavar="MODEL.yaml",
+            type=Path,
+            help="write to this file; without it, the model is printed",
+        ),
+        TYPES,
+    ),
+    ("build", "moml"),
+    _run,
+)

@@ -1,0 +1,47 @@
+"""Rules: what a director goes by where there is a choice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from epicycle.actors import Parameter
+
+POSTED, PTOLEMY = "posted", "ptolemy"
+TIES: Parameter[str | None] = Parameter(
+    str,
+    None,
+    choices=("declared", POSTED),
+    doc="in which order actors of one tag, depth and priority fire: as they are declared, or as what they fire for was "
+    "posted",
+)
+LIKE: Parameter[str | None] = Parameter(
+    str,
+    None,
+    choices=("epicycle", PTOLEMY),
+    doc="whose rules and defaults count inside; ptolemy: ties are posted, the outputs of a composite with a director "
+    "depend on all its inputs, and parameters and ports are as in Ptolemy II unless given",
+)
+
+
+@dataclass(frozen=True)
+class Rules:
+    """In which order actors fire that could fire in any, and whose rules and defaults count else."""
+
+    ties: str = "declared"
+    like: str = "epicycle"
+
+    def inside(self, ties: str | None, like: str | None) -> Rules:
+        """The rules of a director within, which are these unless it says otherwise; ``like`` says which ties go."""
+        if ties is None:
+            ties = self.ties if like is None else POSTED if like == PTOLEMY else "declared"
+        return Rules(ties, like or self.like)
+
+    @property
+    def are_posted(self) -> bool:
+        """Whether what was posted first fires first."""
+        return self.ties == POSTED
+
+    @property
+    def are_ptolemys(self) -> bool:
+        """Whether all is as in Ptolemy."""
+        return self.like == PTOLEMY

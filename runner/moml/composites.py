@@ -1,0 +1,453 @@
+"""Composites of a file as composite classes of the model language: their parts, wires, directors and parameters."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from epicycle.actors import Actor as OwnActor
+
+from ..catalogue import installed
+from .actors import Actor, face_of, is_decoration, is_layout, plain
+from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
+from .counterpart import UNSAID, Counterpart, counterpart_of_type
+from .directors import director_of, fires_whole, said_of
+from .entities import Entity, Property, kind
+from .modes import is_machine, machine_part
+from .names import Names, snake
+from .notes import Notes
+from .parts import Level, Part
+from .reach import leave_out_idle
+from .relations import End, Net, PortFace, Wiring
+from .scope import Scope, is_text, is_variable
+from .syntax import ExpressionError
+from .table import counterpart_of
+from .variables import Variables
+from .whole import whole_ports
+from .writing import Flow
+
+COMPOSITES = frozenset({
+    "TypedCompositeActor", "CompositeActor", "CompositeEntity", "ModalModel", "Refinement", "ModalRefinement",
+    "TypedAtomicActorComposite", "DECompositeActor", "ThreadedComposite", "CaseRefinement", "TypedOpaqueComposite",
+    *MODELS,
+})  # fmt: skip
+
+
+class Conversion:
+    """Goes through a model and makes its sections; what they share is here."""
+
+    def __init__(self, model: Entity, notes: Notes, own: Mapping[str, type[OwnActor]]) -> None:
+        self.model = model
+        self.notes = notes
+        self.classes: dict[str, dict[str, Any]] = {}
+        self._known: dict[str, str] = {}  # the class of a body
+        known = installed()
+        self._class_names = Names([*known.actors, *known.aspects, *own])
+        self.rows: dict[int, Counterpart | None] = {}
+        for each in model.everything():
+            is_row = not is_composite(each) and not is_machine(each)
+            self.rows[id(each)] = self._row(each, own) if is_row else None
+        self._scopes: dict[int, Scope] = {}
+        self._nets: dict[int, list[Net]] = {}
+        self.version = version_of(model)
+        self.levels: dict[int, Level] = {}
+        self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
+        self.variables = Variables(self)
+        self.idle: set[int] = set()  # what never fires
+        self.wiring = Wiring(model, self.face, self._width)
+        self.triggers = self._iterations()
+        leave_out_idle(self)
+
+    def _row(self, entity: Entity, own: Mapping[str, type[OwnActor]]) -> Counterpart | None:
+        found = own.get(kind(entity))
+        return counterpart_of(entity.java) if found is None else counterpart_of_type(found)
+
+    # -- what wires need ------------------------------------------------------------------------------------------
+
+    def face(self, entity: Entity, port: str) -> PortFace | None:
+        """The direction of a port, and whether it is a multiport; None if nothing is to be wired to it."""
+        if id(entity) in self.idle:
+            return None
+        if (id(entity), port) in self.variables.ports:
+            return PortFace("input", False)
+        if is_request(entity) or is_response(entity):
+            return PortFace("output" if is_request(entity) else "input", False)
+        row = self.rows.get(id(entity))
+        if row is not None and port in row.ports and not row.has_port(port):
+            return None
+        found = face_of(row, entity, port)
+        if found is None and row is None and not is_composite(entity) and not is_machine(entity):
+            return PortFace("output" if port.startswith("output") else "input", True)
+        return found
+
+    def _width(self, composite: Entity, relation: str) -> int | None:
+        said = composite.relations[relation].text("width")
+        if said is None or not said.strip():
+            return None
+        try:
+            found = self.scope_of(composite).value(said)
+        except ExpressionError as error:
+            self.notes.note(f"{relation}: its width {said!r}: {error}")
+            return None
+        return found if isinstance(found, int) and found >= 0 else None
+
+    def scope_of(self, entity: Entity) -> Scope:
+        """The scope of a composite anywhere in the model."""
+        if not self._scopes:
+            self._enter(self.model, None)
+        return self._scopes[id(entity)]
+
+    def _enter(self, entity: Entity, around: Scope | None) -> None:
+        waiting = [(entity, around)]
+        while waiting:
+            each, outer = waiting.pop()
+            row = self.rows.get(id(each))
+            said = {} if row is None else row.parameters
+            defaults = {name: one.default for name, one in said.items() if one.default is not UNSAID}
+            scope = self._scopes[id(each)] = Scope(each, outer, defaults)
+            waiting += [(child, scope) for child in each.entities.values()]
+
+    def path_of(self, composite: Entity, child: Entity) -> str:
+        """Where something is, for messages."""
+        names, around = [child.name], composite
+        while (outer := self.container_of(around)) is not None:
+            names.append(around.name)
+            around = outer
+        return ".".join(reversed(names))
+
+    def _iterations(self) -> dict[tuple[int, str], str]:
+        """The inputs of composites that trigger what fires in each iteration of their director, by its trigger."""
+        found = {}
+        for composite in self.model.everything():
+            director = director_of(composite) if composite is not self.model else None
+            if director is None or not fires_whole(director):
+                continue
+            inputs = [
+                name for name, port in composite.ports.items() if port.flag("input") and composite.links.get(name)
+            ]
+            for child in composite.entities.values() if inputs else ():
+                row = self.rows.get(id(child))
+                if row is not None and "trigger" in row.ports and not composite.links.get(f"{child.name}.trigger"):
+                    found[id(composite), f"{child.name}.trigger"] = inputs[0]
+        return found
+
+    # -- composites -----------------------------------------------------------------------------------------------
+
+    def level(self, entity: Entity, path: str, at: str = "", outer: Level | None = None) -> Level:
+        """What is known of a composite before its parts are."""
+        names = Names(), Names(), Names(in_expressions=True)
+        level = Level(entity, path, at, outer, self.scope_of(entity), *names)
+        self.levels[id(entity)] = level
+        for name, said in entity.properties.items():
+            is_parameter = is_variable(said) and not is_layout(said) and not is_decoration(said)
+            if is_parameter and self._stays(name, said, level) and self.variables.find(level.scope, name) is None:
+                level.own_names[name] = level.parameters.of(name)
+        return level
+
+    def _stays(self, name: str, said: Property, level: Level) -> bool:
+        """Whether a parameter can be one of ours."""
+        try:
+            value = level.scope(name)
+            plain(value)
+        except (ExpressionError, KeyError, ValueError):
+            return False
+        return value is not None and (not isinstance(value, str) or is_text(said))
+
+    def body(self, level: Level) -> dict[str, Any]:
+        """The sections of a composite, or of the model."""
+        entity = level.entity
+        for name in entity.ports:
+            level.names.take(level.ports.of(name))
+        for child in entity.entities.values():
+            if is_request(child) or is_response(child):
+                level.requests[child.name] = level.ports.of(child.name)
+                level.names.take(level.requests[child.name])
+        for port, ours in level.ports.renamed().items():
+            self.notes.note(f"{level.told(port)} is called {ours}")
+        actors: dict[str, Flow] = {}
+        for child in entity.entities.values():
+            if child.name in level.requests:
+                continue
+            self._about_ports(child, level)
+            self._about_links(child, level)
+            part = level.parts[child.name] = self._part(child, level)
+            if part is not None:
+                actors[part.name] = part.entry
+                if part.name != child.name:
+                    self.notes.note(f"{level.told(child.name)} is called {part.name}")
+        connections = self._connections(level)
+        following = self.variables.add(level, actors, connections)
+        connections += level.added_connections
+        found: dict[str, Any] = {}
+        if entity.doc:
+            found["doc"] = " ".join(entity.doc.split())
+        inputs, outputs = self._borders(level)
+        if inputs:
+            found["inputs"] = inputs
+        if outputs:
+            found["outputs"] = outputs
+        if actors:
+            found["actors"] = actors
+        if connections:
+            found["connections"] = connections
+        aspects = {**aspects_of(self, level), **following}
+        if aspects:
+            found["aspects"] = aspects
+        self._about_properties(level)
+        return found
+
+    def _about_ports(self, entity: Entity, level: Level) -> None:
+        """What the file says of ports and has no counterpart."""
+        for port in entity.ports.values():
+            for said in port.properties.values():
+                known = said.name in ("input", "output", "multiport") or is_layout(said) or is_decoration(said)
+                if not known and said.value:
+                    path = (
+                        f"{level.told(entity.name)}.{port.name}"
+                        if entity is not level.entity
+                        else level.told(port.name)
+                    )
+                    self.notes.note(f"{path}.{said.name} = {said.value!r}: has no counterpart")
+
+    def _about_links(self, child: Entity, level: Level) -> None:
+        """Ports to which something is linked, and that actors of ours do not have."""
+        row = self.rows.get(id(child))
+        if row is None or row.is_view:
+            return
+        for name in row.ports:
+            if not row.has_port(name) and level.entity.links.get(f"{child.name}.{name}"):
+                self.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
+
+    def _about_properties(self, level: Level) -> None:
+        for name, said in level.entity.properties.items():
+            if is_layout(said) or is_decoration(said) or is_variable(said) or kind(said).endswith("Director"):
+                continue
+            if said.value is not None or said.java:
+                self.notes.note(f"{level.told(name)}, a {kind(said) or 'property'}: has no counterpart")
+
+    def parameters(self, level: Level) -> dict[str, Any]:
+        """The parameters that something inside names."""
+        found = {}
+        for name, ours in level.own_names.items():
+            if name in level.used:
+                found[ours] = plain(level.scope(name))
+        return found
+
+    def _borders(self, level: Level) -> tuple[list[str], list[str]]:
+        found: tuple[list[str], list[str]] = ([], [])
+        for port in level.entity.ports:
+            face = self.face(level.entity, port)
+            if face is not None:
+                for channel in range(self._channels(level.entity, port)):
+                    found[face.direction == "output"].append(self.port_name(level.ports, port, channel))
+        for name, ours in level.requests.items():
+            found[is_response(level.entity.entities[name])].append(ours)
+        for each in self.variables.of(level.entity):
+            if each.is_port and each.name not in level.entity.ports:
+                found[0].append(level.ports.of(each.name))
+        found[1].extend(level.added_outputs)
+        return found
+
+    def _channels(self, entity: Entity, port: str) -> int:
+        """How many ports of ours stand for a port of a composite."""
+        face = self.face(entity, port)
+        if face is None or not face.multi:
+            return 1
+        return max(self.wiring.width(entity, port), self._outer_width(entity, port), 1)
+
+    def _outer_width(self, entity: Entity, port: str) -> int:
+        around = self.container_of(entity)
+        return 0 if around is None else self.wiring.width(around, f"{entity.name}.{port}")
+
+    def container_of(self, entity: Entity) -> Entity | None:
+        """The composite in which an entity is; None for the model."""
+        return self._containers.get(id(entity))
+
+    def is_linked(self, entity: Entity, port: str) -> bool:
+        """Whether something is linked to a port from outside."""
+        around = self.container_of(entity)
+        return around is not None and bool(around.links.get(f"{entity.name}.{port}"))
+
+    def nets_of(self, composite: Entity) -> list[Net]:
+        """What is joined in a composite."""
+        if id(composite) not in self._nets:
+            self._nets[id(composite)] = self.wiring.nets(composite) if id(composite) in self.wiring.groups else []
+        return self._nets[id(composite)]
+
+    def port_name(self, names: Names, port: str, channel: int) -> str:
+        """Our name for a channel of a composite's port: each channel is a port by itself."""
+        return names.of(port) if channel == 0 else names.of(f"{port}_{channel}")
+
+    def _part(self, child: Entity, level: Level) -> Part | None:
+        if is_aspect(child):
+            return None
+        name = level.names.of(child.name)
+        if is_machine(child):
+            return machine_part(self, child, level, name)
+        if is_composite(child):
+            return self.composite_part(child, level, name)
+        row = self.rows[id(child)]
+        if id(child) in self.idle:
+            return None
+        if row is None:
+            self._unknown(child, level)
+            return None
+        if row.is_view and not self._is_watched(child, level):
+            self.notes.count("view")
+            return None
+        actor = Actor(
+            child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
+            f".{self.model.name}.{level.told(child.name)}", self._seed(), whole_ports(self, level.entity, child),
+            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
+        )  # fmt: skip
+        actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
+        actor.convert()
+        level.used |= actor.used
+        part = Part(name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports)
+        if actor.row.type == "SetVariable":
+            self.variables.note_setter(child, level, part)
+        return part
+
+    def _seed(self) -> object:
+        """The seed that all random actors share: a value that one of them gives counts for the others."""
+        for each in self.model.everything():
+            said, row = each.properties.get("seed"), self.rows.get(id(each))
+            if said is not None and row is not None and row.type in ("Random", "PoissonClock"):
+                try:
+                    if (seed := self.scope_of(each).value_of(said)) not in (0, None):
+                        return seed
+                except ExpressionError:
+                    continue
+        return 0
+
+    def _unknown(self, child: Entity, level: Level) -> None:
+        told = level.told(child.name)
+        linked = [
+            port.rpartition(".")[2]
+            for port, links in level.entity.links.items()
+            if port.startswith(f"{child.name}.") and links
+        ]
+        if not linked and is_layout(child):
+            return
+        if not linked:
+            self.notes.note(
+                f"{told} is a {child.java}, has no counterpart, and is left out: nothing is connected to it"
+            )
+        elif all(self._only_takes(child, port) for port in linked):
+            self.notes.note(f"{told} is a {child.java}, has no counterpart, and is left out: it only takes what comes")
+        else:
+            self.notes.error(f"{told} is a {child.java}, which has no counterpart")
+
+    def _only_takes(self, child: Entity, port: str) -> bool:
+        face = self.face(child, port)
+        return face is not None and face.direction == "input" and (port.startswith("input") or port in child.ports)
+
+    def _is_watched(self, child: Entity, level: Level) -> bool:
+        """Whether a view cannot be left out: an aspect stands there, or it takes a channel of a multiport."""
+        if is_decorated(child):
+            return True
+        relations = {
+            link.relation
+            for port, links in level.entity.links.items()
+            if port.startswith(f"{child.name}.")
+            for link in links
+        }
+        for port, links in level.entity.links.items():
+            face = self.wiring._face(level.entity, port)
+            is_one = face is not None and face.multi and face.direction == "output" and "." in port and len(links) > 1
+            if is_one and relations & {link.relation for link in links}:
+                return True
+        return False
+
+    def composite_part(self, child: Entity, level: Level, name: str) -> Part:
+        """A composite as an instance of a class of ours."""
+        inner = self.level(child, level.told(child.name), f"{level.at}{name}.", level)
+        body = self.body(inner)
+        values = self.parameters(inner)
+        if (director := director_of(child)) is not None:
+            found = said_of(director, inner.told(director.name), inner.scope, self.notes, of_model=False)
+            if body.get("actors"):
+                body = _with_director(body, found)
+        entry = self.instance(child, body, values)
+        for said in child.properties.values():
+            if said.name == "_priority" or kind(said) == "Priority":
+                entry["priority"] = inner.scope.value_of(said)
+        return Part(name, entry)
+
+    def class_name(self, name: str) -> str:
+        """A name like this for a further class."""
+        return self._class_names.fresh(name)
+
+    def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow:
+        """The entry of an instance; its class is one that is there already, if that says the same."""
+        # A parameter takes values of the kind of its default.
+        key = json.dumps([body, sorted((name, type(value).__name__) for name, value in values.items())], default=str)
+        if key not in self._known:
+            name = self._class_names.fresh(child.of_class.rpartition(".")[2] or child.name)
+            self._known[key] = name
+            ordered = {"doc": body.pop("doc")} if "doc" in body else {}
+            self.classes[name] = {**ordered, **({"parameters": Flow(values)} if values else {}), **body}
+        name = self._known[key]
+        default = self.classes[name].get("parameters", {})
+        changed = {each: value for each, value in values.items() if not _same(default[each], value)}
+        return Flow({"type": name, **changed})
+
+    # -- wires ----------------------------------------------------------------------------------------------------
+
+    def _connections(self, level: Level) -> list[Any]:
+        from .wires import connections_of
+
+        return connections_of(self, level)
+
+    def end(self, level: Level, end: End) -> tuple[str, bool] | None:
+        """Our name for one end of a net, and whether tokens come from there; None if it is left out."""
+        entity = level.entity if not end.actor else level.entity.entities.get(end.actor)
+        face = None if entity is None else self.face(entity, end.port)
+        if entity is None or face is None:
+            return None
+        if not end.actor:
+            return self.port_name(level.ports, end.port, end.channel), face.direction == "input"
+        if end.actor in level.requests:
+            return level.requests[end.actor], is_request(entity)
+        part = level.parts.get(end.actor)
+        if part is None or end.port in part.unwired:
+            return None
+        return f"{part.name}.{self.port_of(entity, part, end.port, end.channel)}", face.direction == "output"
+
+    def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str:
+        """Our name for the port of a child."""
+        if port in part.ports:
+            return part.ports[port]
+        if part.row is None:
+            return self.port_name(self.levels[id(entity)].ports, port, channel)
+        if port in part.row.ports:
+            return part.row.ports[port].ours
+        return part.row.parameters[port].ours if port in part.row.parameters else snake(port)
+
+
+def version_of(model: Entity) -> tuple[int, int]:
+    """The version of Ptolemy that wrote a model; a recent one if that is not said."""
+    said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
+    return (int(said[1]), int(said[2])) if said is not None else (11, 0)
+
+
+def is_composite(entity: Entity) -> bool:
+    """Whether it is a graph of its own."""
+    return kind(entity) in COMPOSITES or (
+        bool(entity.entities)
+        and counterpart_of(entity.java) is None
+        and not entity.java.startswith("ptolemy.actor.lib.hoc")
+    )
+
+
+def _with_director(body: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
+    """The body with its director in the usual place."""
+    said = {key: value for key, value in found.items() if key != "stop"}
+    front: dict[str, Any] = {key: body[key] for key in ("doc", "inputs", "outputs") if key in body}
+    return {**front, "director": Flow(said), **{key: value for key, value in body.items() if key not in front}}
+
+
+def _same(one: object, other: object) -> bool:
+    return type(one) is type(other) and one == other

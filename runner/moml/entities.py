@@ -1,0 +1,313 @@
+"""What a MoML file builds: entities with ports, relations and links; classes are opened up in their instances.
+
+MoML is a list of things to do: an element makes what it names, or changes what is there.  An instance of a class that
+the file defines begins as a copy of it, so what comes out knows no classes any more, only which one an entity was of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from dataclasses import dataclass, field
+
+from .document import Element, MomlError
+
+MAX_ENTITIES = 20_000
+ABSTRACT_COMPOSITE = "ptolemy.actor.TypedCompositeActor"
+
+
+@dataclass
+class Property:
+    """An attribute of anything: its Java class, its text, and attributes of its own."""
+
+    name: str
+    java: str = ""
+    value: str | None = None
+    line: int = 0
+    properties: dict[str, Property] = field(default_factory=dict)
+    configure: str = ""
+    own: bool = True  # whether it is said here, and not by a class
+
+    def text(self, name: str) -> str | None:
+        """The value of one of its attributes."""
+        found = self.properties.get(name)
+        return None if found is None else found.value
+
+
+def kind(said: Property) -> str:
+    """The name of its Java class, without the package."""
+    return said.java.rpartition(".")[2]
+
+
+@dataclass
+class Port(Property):
+    """A port, as far as the file says something of it."""
+
+    def flag(self, name: str) -> bool:
+        """Whether it is an ``input``, ``output`` or ``multiport``."""
+        found = self.properties.get(name)
+        return found is not None and (found.value or "true").strip() != "false"
+
+
+@dataclass
+class Relation(Property):
+    """A relation, or the transition of a state machine."""
+
+
+@dataclass
+class Link:
+    """A port's link to a relation; ``relation`` is None for one that only takes a place."""
+
+    port: str  # "actor.port", or "port" of the composite itself
+    relation: str | None
+    line: int
+    order: int  # in which they were made
+
+
+@dataclass
+class Entity(Property):
+    """An actor, a composite, or a state."""
+
+    ports: dict[str, Port] = field(default_factory=dict)
+    entities: dict[str, Entity] = field(default_factory=dict)
+    classes: dict[str, Entity] = field(default_factory=dict)
+    relations: dict[str, Relation] = field(default_factory=dict)
+    # The links of each port, in the order of its channels; of the composite's own ports those inside.
+    links: dict[str, list[Link]] = field(default_factory=dict)
+    joined: list[tuple[str, str, int]] = field(default_factory=list)  # relations that are linked, and in which order
+    of_class: str = ""  # the class of the file that it is an instance of
+    doc: str = ""
+
+    def everything(self) -> Iterator[Entity]:
+        """It and all within."""
+        yield self
+        for each in self.entities.values():
+            yield from each.everything()
+
+
+Tell = Callable[[str, int], None]
+
+
+class Builder:
+    """Does what the elements of the file of that name say; ``tell`` takes what cannot be done."""
+
+    def __init__(self, name: str, tell: Tell) -> None:
+        self._file = name
+        self._tell = tell
+        self._count = self._links = 0
+
+    def build(self, root: Element) -> Entity:
+        """The model of a file; raises ``MomlError``."""
+        while root.tag == "group" and len(root.children) == 1:
+            root = root.children[0]
+        if root.tag not in ("entity", "class", "model"):
+            raise MomlError(f"{self._file}:{root.line}: <{root.tag}> is no model: MoML begins with <entity>")
+        return self._made(root, [])
+
+    def _made(self, element: Element, around: list[Entity]) -> Entity:
+        """A new entity or class."""
+        name = self._name(element)
+        java = element.get("extends") or element.get("class") or ABSTRACT_COMPOSITE
+        pattern = self._class(java, around)
+        if pattern is None:
+            self._enter(1, element)
+            made = Entity(name, java, line=element.line)
+        else:
+            self._enter(sum(1 for _ in pattern.everything()), element)
+            made = deepcopy(pattern)
+            made.name, made.line = name, element.line
+            made.of_class = pattern.of_class if element.tag != "class" and pattern.of_class else pattern.name
+            _inherited(made)
+        if element.get("source"):
+            self._tell(f"{name}: the file {element.get('source')!r} is not read", element.line)
+        self._fill(made, element, around)
+        return made
+
+    def _enter(self, count: int, element: Element) -> None:
+        self._count += count
+        if self._count > MAX_ENTITIES:
+            raise MomlError(f"{self._file}:{element.line}: the model comes to more than {MAX_ENTITIES:,} entities")
+
+    def _name(self, element: Element) -> str:
+        name = element.get("name")
+        if name is None:
+            raise MomlError(f"{self._file}:{element.line}: <{element.tag}> has no name")
+        return name
+
+    def _class(self, name: str, around: list[Entity]) -> Entity | None:
+        """A class of the file, as it is known inside of entities; None if there is none of that name."""
+        if name.startswith("."):
+            found: Entity | None = around[0] if around else None
+            first, *parts = name[1:].split(".")
+            if found is None or found.name != first:
+                return None
+            return _down(found, parts)
+        parts = name.split(".")
+        for each in reversed(around):
+            if (found := _down(each, parts)) is not None:
+                return found
+        return None
+
+    def _fill(self, entity: Entity, element: Element, around: list[Entity]) -> None:
+        inside = [*around, entity]
+        for child in element.children:
+            self._do(entity, child, inside)
+
+    def _do(self, entity: Entity, child: Element, inside: list[Entity]) -> None:
+        """What one element says of the entity that it stands in."""
+        match child.tag:
+            case "property":
+                self._property(entity, child)
+            case "port":
+                port = entity.ports.setdefault(self._name(child), Port(self._name(child), line=child.line))
+                self._about(port, child)
+            case "entity" | "model" | "class":
+                self._child(entity, child, inside)
+            case "relation":
+                name = self._name(child)
+                relation = entity.relations.setdefault(name, Relation(name, line=child.line))
+                self._about(relation, child)
+            case "link":
+                self._link(entity, child)
+            case "unlink":
+                self._unlink(entity, child)
+            case "deleteEntity" | "deletePort" | "deleteRelation" | "deleteProperty":
+                self._delete(entity, child)
+            case "rename":
+                entity.name = self._name(child)
+            case "group":
+                for each in child.children:
+                    self._do(entity, each, inside)
+            case "doc":
+                entity.doc = child.text.strip()
+            case "director":  # as the first MoML had it
+                self._property(entity, child)
+            case "configure":
+                entity.configure = child.text.strip()
+            case "input" | "import":
+                self._tell(f"the file {child.get('source')!r} is not read", child.line)
+            case "display" | "rendition" | "location" | "vertex":
+                pass
+            case tag:
+                self._tell(f"<{tag}> is not understood, and left out", child.line)
+
+    def _child(self, entity: Entity, child: Element, inside: list[Entity]) -> None:
+        name = self._name(child)
+        *path, last = name.split(".") if not name.startswith(".") else [name]
+        home = _down(entity, path) if path else entity
+        if home is None:
+            self._tell(f"there is no {'.'.join(path)!r} for {name!r}", child.line)
+            return
+        kin = home.classes if child.tag == "class" else home.entities
+        if last in kin and (child.get("class") is None or last in home.entities):
+            self._fill(kin[last], child, inside)  # more of what is there
+            return
+        made = self._made(Element(child.tag, {**child.attributes, "name": last}, child.line, child.children), inside)
+        kin[last] = made
+
+    def _property(self, owner: Property, element: Element) -> None:
+        name = self._name(element)
+        *path, last = name.split(".")
+        for each in path:
+            owner = owner.properties.setdefault(each, Property(each, line=element.line))
+        found = owner.properties.setdefault(last, Property(last, line=element.line))
+        self._about(found, element)
+
+    def _about(self, owner: Property, element: Element) -> None:
+        """What an element says of a property, port or relation."""
+        owner.java = element.get("class") or owner.java
+        owner.line, owner.own = element.line, True
+        if (value := element.get("value")) is not None:
+            owner.value = value
+        for child in element.children:
+            if child.tag in ("property", "director"):
+                self._property(owner, child)
+            elif child.tag == "configure":
+                owner.configure = child.text.strip()
+            elif child.tag == "deleteProperty":
+                owner.properties.pop(child.get("name") or "", None)
+            elif child.tag == "entity" and child.get("name"):  # a model inside of an attribute
+                owner.properties.setdefault(str(child.get("name")), Property(str(child.get("name")), line=child.line))
+
+    # -- links ----------------------------------------------------------------------------------------------------
+
+    def _next(self) -> int:
+        self._links += 1
+        return self._links
+
+    def _link(self, entity: Entity, element: Element) -> None:
+        one, other = element.get("relation1"), element.get("relation2")
+        if one is not None and other is not None:
+            entity.joined.append((one, other, self._next()))
+            return
+        port, relation = element.get("port"), element.get("relation")
+        if port is None:
+            self._tell("a link that names no port is left out", element.line)
+            return
+        if relation is not None and relation not in entity.relations:
+            self._tell(f"{port} is linked to {relation!r}, which does not exist: left out", element.line)
+            return
+        links = entity.links.setdefault(port, [])
+        place = _number(element.get("insertAt") or element.get("insertInside"))
+        if place is None:
+            links.append(Link(port, relation, element.line, self._next()))
+            return
+        if place > 1000:
+            self._tell(f"{port} is linked at place {place}, which is too far: left out", element.line)
+            return
+        links += [Link(port, None, element.line, 0) for _ in range(place - len(links))]
+        links.insert(place, Link(port, relation, element.line, self._next()))
+
+    def _unlink(self, entity: Entity, element: Element) -> None:
+        one, other = element.get("relation1"), element.get("relation2")
+        if one is not None and other is not None:
+            entity.joined = [pair for pair in entity.joined if {*pair[:2]} != {one, other}]
+            return
+        links = entity.links.get(element.get("port") or "", [])
+        place = _number(element.get("index") or element.get("insideIndex"))
+        if place is not None and place < len(links):
+            del links[place]
+        elif (relation := element.get("relation")) is not None:
+            links[:] = [each for each in links if each.relation != relation]
+
+    def _delete(self, entity: Entity, element: Element) -> None:
+        name = self._name(element)
+        match element.tag:
+            case "deleteEntity":
+                entity.entities.pop(name, None)
+                for port in [port for port in entity.links if port.rpartition(".")[0] == name]:
+                    del entity.links[port]
+            case "deletePort":
+                home = _down(entity, [element.get("entity") or ""]) if element.get("entity") else entity
+                if home is not None:
+                    home.ports.pop(name, None)
+                entity.links.pop(f"{element.get('entity')}.{name}" if element.get("entity") else name, None)
+            case "deleteRelation":
+                entity.relations.pop(name, None)
+                for links in entity.links.values():
+                    links[:] = [each for each in links if each.relation != name]
+                entity.joined = [pair for pair in entity.joined if name not in pair]
+            case _:
+                entity.properties.pop(name, None)
+
+
+def _inherited(entity: Entity) -> None:
+    """Note that what is here so far comes from a class."""
+    for each in entity.everything():
+        for owner in (each, *each.ports.values()):
+            for said in owner.properties.values():
+                said.own = False
+
+
+def _down(entity: Entity, names: list[str]) -> Entity | None:
+    """What lies inside of an entity, by its name there."""
+    for name in names:
+        found = entity.classes.get(name) or entity.entities.get(name)
+        if found is None:
+            return None
+        entity = found
+    return entity
+
+
+def _number(text: str | None) -> int | None:
+    return int(text) if text is not None and text.isdecimal() and len(text) < 7 else None

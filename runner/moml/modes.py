@@ -1,0 +1,405 @@
+"""Modal models and state machines: states, transitions with guards and actions, refinements."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+from .actors import is_decoration, is_layout, plain, seconds
+from .directors import director_of, said_of
+from .entities import Entity, Property, Relation, kind
+from .names import Names
+from .parts import Converting, Level, Part
+from .scope import is_variable
+from .syntax import Binary, Call, Const, ExpressionError, Name, Tree
+from .translate import names_of, translated
+from .writing import Flow
+
+MACHINES = frozenset({"FSMActor", "ModalController", "InterfaceAutomaton", "FSMActorModal"})
+_RESERVED = ("mode", "trigger", "time", "mode_time", "error", "machine")
+_PRESENT = "_isPresent"
+_WORD = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
+_QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
+_LAST_WITH_HISTORY = (9, 0)  # versions up to here took transitions for those with history
+_FLAGS = {"preemptive": "preemptive", "immediate": "immediate", "nondeterministic": "nondeterministic",
+          "defaultTransition": "else", "error": "error"}  # fmt: skip
+
+
+def controller_of(entity: Entity) -> Entity | None:
+    """The machine of an entity: itself, or what is inside of a modal model; None if it has none."""
+    if kind(entity) in MACHINES:
+        return entity
+    director = director_of(entity)
+    if director is not None and (named := (director.text("controllerName") or "").strip().strip('"')):
+        found = entity.entities.get(named)
+        return found if found is not None and kind(found) in MACHINES else None
+    return next(
+        (each for each in entity.entities.values() if kind(each) in MACHINES and each.name == "_Controller"), None
+    )
+
+
+def is_machine(entity: Entity) -> bool:
+    """Whether it is a state machine, with or without refinements."""
+    return controller_of(entity) is not None
+
+
+@dataclass
+class _Machine:
+    """One machine that is being imported."""
+
+    conversion: Converting
+    entity: Entity  # the modal model, or the machine itself
+    controller: Entity
+    path: str
+    at: str
+    outer: Level
+    ports: Names  # of ports and variables
+    states: Names = field(default_factory=Names)
+    variables: dict[str, str] = field(default_factory=dict)  # ours
+    asked: set[str] = field(default_factory=set)  # names in guards and actions
+    sent: set[str] = field(default_factory=set)  # outputs of actions
+
+    def __post_init__(self) -> None:
+        self.scope = self.conversion.scope_of(self.controller)
+        owner = self.entity if self.entity.ports else self.controller
+        said = {**self.controller.ports, **owner.ports}
+        self.inputs = {
+            name: self.ports.of(name) for name, port in said.items() if port.flag("input") and not port.flag("output")
+        }
+        self.outputs = {name: self.ports.of(name) for name, port in said.items() if port.flag("output")}
+        for transition in self.controller.relations.values():
+            for name, _ in self._actions(transition, "setActions"):
+                if (
+                    "." not in name
+                    and "(" not in name
+                    and name not in self.outputs
+                    and self.scope.find(name) is not None
+                ):
+                    self.variables[name] = self.ports.of(name)
+
+    def tell(self, text: str) -> None:
+        self.conversion.notes.note(f"{self.path}: {text}")
+
+    # -- what is written ------------------------------------------------------------------------------------------
+
+    def written(self) -> dict[str, Any]:
+        """What is said of modes and transitions."""
+        modes: dict[str, Any] = {}
+        initial = self._named_state("initialStateName")
+        finals = (self.controller.text("finalStateNames") or "").split(",")
+        for state in self._states():
+            said: dict[str, Any] = {}
+            refinements = [each.strip() for each in (state.text("refinementName") or "").split(",") if each.strip()]
+            if len(refinements) > 1:
+                self.tell(f"{state.name} has {len(refinements)} refinements, and only {refinements[0]} is one here")
+            if refinements and self.entity is not self.controller:
+                said |= self._refinement(refinements[0], self.states.of(state.name))
+            if self._flag(state, "isFinalState") or state.name in [each.strip() for each in finals]:
+                said["final"] = True
+            if self._flag(state, "isInitialState"):
+                initial = state.name
+            modes[self.states.of(state.name)] = Flow(said) if said else None
+        transitions = [each for each in map(self._transition, self.controller.relations.values()) if each is not None]
+        found: dict[str, Any] = {}
+        if self.variables:
+            found["variables"] = Flow({ours: plain(self._initial(name)) for name, ours in self.variables.items()})
+        found["modes"] = modes if any(modes.values()) else list(modes)
+        first = self.states.of(initial) if initial is not None else None
+        if first is not None and first in modes and first != next(iter(modes)):
+            found["initial"] = first
+        if transitions:
+            found["transitions"] = transitions
+        if not modes:
+            self.conversion.notes.error(f"{self.path} has no states")
+        self._tell_readers()
+        for name, ours in {**self.ports.renamed(), **self.states.renamed()}.items():
+            self.tell(f"{name} is called {ours}")
+        return found
+
+    def _tell_readers(self) -> None:
+        """What in refinements is computed of variables, and would change with them."""
+        for name in self.variables:
+            pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
+            for child in self.entity.entities.values() if self.entity is not self.controller else ():
+                for each in child.everything() if child is not self.controller else ():
+                    for said in each.properties.values():
+                        if is_variable(said) and pattern.search(said.value or ""):
+                            self.tell(f"{each.name}.{said.name} goes by what {name} is at the start")
+
+    def _states(self) -> list[Entity]:
+        return list(self.controller.entities.values())
+
+    def _named_state(self, name: str) -> str | None:
+        said = (self.controller.text(name) or "").strip().strip('"')
+        return said if said in self.controller.entities else None
+
+    def _initial(self, name: str) -> object:
+        try:
+            value = self.scope(name)
+        except (ExpressionError, KeyError) as error:
+            self.conversion.notes.error(f"{self.path}.{name}: {error}")
+            return 0
+        return 0 if value is None else value
+
+    def _flag(self, owner: Property, name: str) -> bool:
+        said = (owner.text(name) or "").strip()
+        if said in ("", "false"):
+            return False
+        try:
+            return self.scope.value(said) is True
+        except ExpressionError as error:
+            self.tell(f"{owner.name}.{name} = {said!r}: {error}")
+            return False
+
+    def _refinement(self, name: str, mode: str) -> dict[str, Any]:
+        """The class of a refinement, which knows its ports by the names that they have outside."""
+        child = self.entity.entities.get(name)
+        if child is None:
+            self.conversion.notes.error(f"{self.path}: there is no refinement {name!r}")
+            return {}
+        found = refinement_of(self, child, f"{self.path}.{name}", mode)
+        return {"refinement": found["type"] if len(found) == 1 else found}
+
+    # -- transitions ----------------------------------------------------------------------------------------------
+
+    def _transition(self, transition: Relation) -> Any:
+        source, target = self._ends(transition.name)
+        if source is None or target is None:
+            self.tell(f"the transition {transition.name} does not lead from one state to another, and is left out")
+            return None
+        flags = [ours for name, ours in _FLAGS.items() if self._flag(transition, name)]
+        if self._has_history(transition) and self._leads_to_refinement(target):
+            flags.append("history")
+        if self._flag(transition, "termination"):
+            self.conversion.notes.error(f"{self.path}.{transition.name}: termination transitions have no counterpart")
+        if (transition.text("refinementName") or "").strip():
+            self.conversion.notes.error(
+                f"{self.path}.{transition.name}: a refinement of a transition has no counterpart"
+            )
+        try:
+            said = {} if "else" in flags else self._guard(transition)
+            actions = [*self._said_actions(transition, "outputActions"), *self._said_actions(transition, "setActions")]
+        except ExpressionError as error:
+            self.conversion.notes.error(f"{self.path}.{transition.name}: {error}")
+            return None
+        if actions:
+            said["do"] = "; ".join(actions)
+        return _line(self.states.of(source), self.states.of(target), flags, said)
+
+    def _ends(self, name: str) -> tuple[str | None, str | None]:
+        """The states that a transition leaves and enters."""
+        source = target = None
+        for port, links in self.controller.links.items():
+            state, _, end = port.rpartition(".")
+            for link in links:
+                if link.relation == name and state in self.controller.entities:
+                    if end == "outgoingPort":
+                        source = state
+                    elif end == "incomingPort":
+                        target = state
+        return source, target
+
+    def _has_history(self, transition: Relation) -> bool:
+        if "history" in transition.properties:
+            return self._flag(transition, "history")
+        if "reset" in transition.properties:
+            return not self._flag(transition, "reset")
+        return self.conversion.version <= _LAST_WITH_HISTORY
+
+    def _leads_to_refinement(self, state: str) -> bool:
+        found = self.controller.entities.get(state)
+        return (
+            self.entity is not self.controller
+            and found is not None
+            and bool((found.text("refinementName") or "").strip())
+        )
+
+    def _names(self) -> dict[str, str]:
+        """What guards and actions name, and how that is said here."""
+        found: dict[str, str] = {}
+        for name, ours in {**self.inputs, **self._heard()}.items():
+            for suffix in ("", "_0"):
+                found[f"{name}{suffix}"] = ours
+                found[f"{name}{suffix}{_PRESENT}"] = f"{ours}_is_present"
+        return {**found, **self.variables, "time": "time"}
+
+    def _heard(self) -> dict[str, str]:
+        """What refinements send, which guards may ask for."""
+        return {} if self.entity is self.controller else self.outputs
+
+    def _guard(self, transition: Relation) -> dict[str, str]:
+        """``on``, ``after`` and ``when`` of a guard."""
+        text = (transition.text("guardExpression") or "").strip()
+        if not text or text == "true":
+            return {}
+        parts, said, rest = _conjuncts(self.scope.tree(self.scope.filled(text))), dict[str, str](), list[Tree]()
+        names = self._names()
+        for part in parts:
+            match part:
+                case Name(name) if name.endswith(_PRESENT) and name in names and "on" not in said:
+                    said["on"] = names[name].removesuffix("_is_present")
+                case Call(Name("timeout"), (argument,)) if "after" not in said:
+                    said["after"] = self._time(argument, names)
+                case Const(True):
+                    pass
+                case _:
+                    rest.append(part)
+        if rest:
+            whole = rest[0]
+            for part in rest[1:]:
+                whole = Binary("&&", whole, part)
+            said["when"] = translated(whole, names, self.scope)
+        self.asked.update(*map(names_of, parts))
+        return said
+
+    def unwired(self) -> frozenset[str]:
+        """The ports that no guard or action names."""
+        asked = {re.sub(r"(_\d+)?(_isPresent)?\Z", "", name) for name in self.asked} | self.asked
+        unread = {name for name in self.inputs if name not in asked}
+        for name in sorted(unread):
+            self.tell(f"{name} is left out: nothing reads it")
+        return frozenset(unread | {name for name in self.outputs if name not in self.sent})
+
+    def _time(self, tree: Tree, names: dict[str, str]) -> str:
+        text = translated(tree, names, self.scope)
+        try:
+            return str(seconds(float(text)))
+        except ValueError:
+            return text
+
+    def _actions(self, transition: Relation, name: str) -> list[tuple[str, str]]:
+        """What actions set, and to what."""
+        found = []
+        for part in _split(transition.text(name) or ""):
+            target, equals, value = part.partition("=")
+            if equals and target.strip():
+                found.append((target.strip(), value.strip()))
+            elif part.strip():
+                self.tell(f"{transition.name}: the action {part.strip()!r} is not understood, and left out")
+        return found
+
+    def _said_actions(self, transition: Relation, name: str) -> list[str]:
+        said = []
+        for target, text in self._actions(transition, name):
+            port, _, channel = target.partition("(")
+            port = port.strip()
+            if channel and channel.strip(" )") != "0":
+                raise ExpressionError(f"{target} = ...: an action for one channel has no counterpart")
+            ours = self.outputs.get(port) or self.variables.get(port)
+            if ours is None:
+                self.tell(f"{transition.name}: {target} = {text} is left out: {port} is no output and no variable here")
+                continue
+            tree = self.scope.tree(self.scope.filled(text))
+            value = translated(tree, self._names(), self.scope)
+            self.asked |= names_of(tree)
+            self.sent.add(port)
+            said.append(f"{ours} = {value}")
+        return said
+
+
+def _conjuncts(tree: Tree) -> list[Tree]:
+    found, waiting = [], [tree]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, Binary) and each.sign in ("&&", "&"):
+            waiting += [each.right, each.left]
+        else:
+            found.append(each)
+    return found
+
+
+def _split(text: str) -> list[str]:
+    """Actions between semicolons, those in texts and brackets not counted."""
+    masked = _QUOTED.sub(lambda match: "_" * len(match[0]), text)
+    depth, start, found = 0, 0, []
+    for place, character in enumerate(masked):
+        depth += (character in "([{") - (character in ")]}")
+        if character == ";" and depth <= 0:
+            found.append(text[start:place])
+            start = place + 1
+    return [*found, text[start:]]
+
+
+def _line(source: str, target: str, flags: list[str], said: dict[str, str]) -> Any:
+    """A transition on one line, or as a mapping where its words could be mistaken."""
+    if any(_WORD.search(_QUOTED.sub("", each)) for each in said.values()):
+        return Flow({"from": source, "to": target, **dict.fromkeys(flags, True), **said})
+    clauses = [f"{key} {said[key]}" for key in ("on", "after", "when", "do") if key in said]
+    return " ".join([f"{source} -> {target}", *flags, *clauses])
+
+
+# -- as parts of a model ------------------------------------------------------------------------------------------
+
+
+def machine_part(conversion: Converting, child: Entity, level: Level, name: str) -> Part:
+    """A state machine as an actor, a modal model as a composite with modes."""
+    controller = controller_of(child)
+    assert controller is not None
+    path = level.told(child.name)
+    ports = Names(_RESERVED, in_expressions=True)
+    machine = _Machine(conversion, child, controller, path, f"{level.at}{name}.", level, ports)
+    _tell_rest(conversion, child, path, machine)
+    unwired: frozenset[str] = frozenset()
+    if child is controller:
+        entry = Flow({"type": "StateMachine", **machine.written()})
+        unwired = machine.unwired()
+    else:
+        entry = conversion.instance(child, _class(machine), {})
+    if (priority := child.properties.get("_priority")) is not None and priority.value:
+        entry["priority"] = conversion.scope_of(child).value_of(priority)
+    return Part(name, entry, ports={**machine.inputs, **machine.outputs}, unwired=unwired)
+
+
+def _class(machine: _Machine) -> dict[str, Any]:
+    said = machine.written()
+    found: dict[str, Any] = {}
+    if machine.entity.doc:
+        found["doc"] = " ".join(machine.entity.doc.split())
+    if machine.inputs:
+        found["inputs"] = list(machine.inputs.values())
+    if machine.outputs:
+        found["outputs"] = list(machine.outputs.values())
+    return {**found, **said}
+
+
+def refinement_of(around: _Machine, child: Entity, path: str, mode: str) -> Flow:
+    """The refinement of a mode: a composite, perhaps with modes of its own."""
+    conversion, controller, at = around.conversion, controller_of(child), f"{around.at}{mode}."
+    if controller is not None:
+        machine = _Machine(conversion, child, controller, path, at, around.outer, around.ports)
+        _tell_rest(conversion, child, path, machine)
+        return conversion.instance(child, _class(machine), {})
+    level = conversion.level(child, path, at, around.outer)
+    level.ports = around.ports
+    body = conversion.body(level)
+    if (director := director_of(child)) is not None:
+        said = said_of(director, level.told(director.name), level.scope, conversion.notes, of_model=False)
+        for key in said:
+            conversion.notes.note(f"{path}: {key} of the director of a refinement has no counterpart")
+    return conversion.instance(child, body, conversion.parameters(level))
+
+
+def _tell_rest(conversion: Converting, child: Entity, path: str, machine: _Machine) -> None:
+    """Attributes that say nothing here."""
+    known = {
+        "initialStateName",
+        "finalStateNames",
+        "directorClass",
+        "resetOnEachRun",
+        "seed",
+        "_priority",
+        "stateDependentCausality",
+    }
+    for owner in {id(each): each for each in (child, machine.controller)}.values():
+        for name, said in owner.properties.items():
+            if (
+                name in known
+                or is_layout(said)
+                or is_decoration(said)
+                or is_variable(said)
+                or kind(said).endswith("Director")
+            ):
+                continue
+            if said.value is not None or said.java:
+                conversion.notes.note(f"{path}.{name}, a {kind(said) or 'property'}: has no counterpart")

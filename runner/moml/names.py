@@ -1,0 +1,54 @@
+"""Names of a MoML file as names of the model language: kept where it allows them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from keyword import iskeyword
+
+from epicycle.actors.expression import CONSTANTS, FUNCTIONS
+
+_STRANGE = re.compile(r"[^A-Za-z0-9_]+")
+_WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+_TAKEN = {"index", "time", "mode_time", "token", *CONSTANTS, *FUNCTIONS}
+
+
+def snake(name: str) -> str:
+    """``trueOutput`` as ``true_output``."""
+    return _WORDS.sub("_", name).lower()
+
+
+class Names:
+    """The names of one place: each of the file's has one of ours, and no two the same."""
+
+    def __init__(self, taken: Iterable[str] = (), *, in_expressions: bool = False) -> None:
+        self._of: dict[str, str] = {}
+        self._taken = set(taken)
+        self._in_expressions = in_expressions  # where keywords and functions cannot be names
+
+    def of(self, name: str) -> str:
+        """Ours for a name of the file."""
+        if name not in self._of:
+            self._of[name] = self.fresh(name)
+        return self._of[name]
+
+    def fresh(self, name: str) -> str:
+        """A name like this that nothing has yet."""
+        base = _STRANGE.sub("_", name.strip()).strip("_") if _STRANGE.search(name) else name
+        if not base or not base[0].isalpha():
+            base = f"_{base}" if base[:1] != "_" else base
+        if self._in_expressions and (iskeyword(base) or base in _TAKEN):
+            base += "_"
+        found, number = base, 2
+        while found in self._taken:
+            found, number = f"{base}_{number}", number + 1
+        self._taken.add(found)
+        return found
+
+    def take(self, name: str) -> None:
+        """Let nothing be called this."""
+        self._taken.add(name)
+
+    def renamed(self) -> dict[str, str]:
+        """Those that could not be kept."""
+        return {name: ours for name, ours in self._of.items() if name != ours}

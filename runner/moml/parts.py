@@ -1,0 +1,77 @@
+"""What is known of the composites of a file while they are imported, and what becomes of their parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from .counterpart import Counterpart
+from .entities import Entity
+from .names import Names
+from .notes import Notes
+from .relations import End, Net, PortFace, Wiring
+from .scope import Scope
+from .writing import Flow
+
+
+@dataclass
+class Part:
+    """What a child of a composite becomes: its name and entry, and its ports by their names there."""
+
+    name: str
+    entry: Flow
+    row: Counterpart | None = None  # of an actor
+    ports: Mapping[str, str] = field(default_factory=dict)
+    unwired: frozenset[str] = frozenset()  # ports there for which there is none of ours
+
+
+@dataclass
+class Level:
+    """One composite that is being imported."""
+
+    entity: Entity
+    path: str  # as messages tell it
+    at: str  # where it is in the written model: "" or a path with a dot behind it
+    outer: Level | None
+    scope: Scope
+    names: Names  # of its actors
+    ports: Names
+    parameters: Names
+    own_names: dict[str, str] = field(default_factory=dict)  # parameters that may stay names, and ours for them
+    used: set[str] = field(default_factory=set)
+    parts: dict[str, Part | None] = field(default_factory=dict)
+    requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are actors there
+    added_outputs: list[str] = field(default_factory=list)  # by which something in it sets a variable around it
+    added_connections: list[str] = field(default_factory=list)
+
+    def told(self, name: str) -> str:
+        """The path of something within, for messages."""
+        return f"{self.path}.{name}" if self.path else name
+
+
+class Converting(Protocol):
+    """The import of a model, as those know it who do a part of it."""
+
+    model: Entity
+    notes: Notes
+    version: tuple[int, int]  # of Ptolemy
+    rows: dict[int, Counterpart | None]
+    levels: dict[int, Level]
+    idle: set[int]
+    triggers: dict[tuple[int, str], str]
+    wiring: Wiring
+
+    def face(self, entity: Entity, port: str) -> PortFace | None: ...
+    def scope_of(self, entity: Entity) -> Scope: ...
+    def container_of(self, entity: Entity) -> Entity | None: ...
+    def path_of(self, composite: Entity, child: Entity) -> str: ...
+    def is_linked(self, entity: Entity, port: str) -> bool: ...
+    def nets_of(self, composite: Entity) -> list[Net]: ...
+    def end(self, level: Level, end: End) -> tuple[str, bool] | None: ...
+    def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str: ...
+    def level(self, entity: Entity, path: str, at: str = "", outer: Level | None = None) -> Level: ...
+    def body(self, level: Level) -> dict[str, Any]: ...
+    def parameters(self, level: Level) -> dict[str, Any]: ...
+    def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow: ...
+    def composite_part(self, child: Entity, level: Level, name: str) -> Part: ...

@@ -1,0 +1,64 @@
+"""Actors that never fire: with an input that they need and nothing that sends to it."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from epicycle.actors import InputPort, declared_ports
+
+from ..catalogue import built_in
+from .entities import Entity
+from .parts import Converting
+from .wires import Counting
+
+MAX_ROUNDS = 200
+
+
+def leave_out_idle(conversion: Converting) -> None:
+    """Leave out what can never fire, and then what nothing is left for."""
+    for _ in range(MAX_ROUNDS):
+        counting = Counting(conversion)
+        composites = list(conversion.model.everything())
+        idle = [(each, found) for each in composites for found in _idle(conversion, each, counting)]
+        if not idle:
+            return
+        for composite, (child, port) in idle:
+            conversion.idle.add(id(child))
+            path = conversion.path_of(composite, child)
+            conversion.notes.note(f"{path} is left out: it never fires, for nothing sends to its {port}")
+
+
+def _idle(conversion: Converting, composite: Entity, counting: Counting) -> list[tuple[Entity, str]]:
+    found = []
+    for child in composite.entities.values():
+        row = conversion.rows.get(id(child))
+        if row is None or row.is_view or id(child) in conversion.idle:
+            continue
+        kind = built_in().actors.get(row.type)
+        if kind is None:
+            continue
+        if row.needs and not any(_is_fed(conversion, composite, child, name, counting) for name in row.needs):
+            found.append((child, " and ".join(sorted(row.needs))))
+            continue
+        declared = declared_ports(kind)
+        several = Counter(said.ours for said in row.ports.values())
+        for name, said in row.ports.items():
+            port = declared.get(said.ours) if several[said.ours] == 1 else None
+            if (
+                isinstance(port, InputPort)
+                and port.required
+                and not _is_fed(conversion, composite, child, name, counting)
+            ):
+                found.append((child, name))
+                break
+    return found
+
+
+def _is_fed(conversion: Converting, composite: Entity, child: Entity, port: str, counting: Counting) -> bool:
+    """Whether anything sends to a port."""
+    path = f"{child.name}.{port}"
+    for net in conversion.nets_of(composite):
+        is_here = any(each.actor == child.name and each.port == port for each in net.ends)
+        if is_here and counting.senders(composite, net.ends):
+            return True
+    return conversion.triggers.get((id(composite), path), "") != ""

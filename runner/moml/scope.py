@@ -1,0 +1,130 @@
+"""What the names in expressions mean: the attributes of an entity, and of all that it is in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from .entities import Entity, Property
+from .syntax import ExpressionError, Tree, parse
+from .values import CONSTANTS, evaluate, java_text
+
+TEXTS = ("StringParameter", "FileParameter", "StringAttribute", "PortParameterString", "TextAttribute", "DateAttribute",
+         "ColorAttribute", "CommitActionsAttribute", "OutputActionsAttribute", "FileOrDirectoryParameter")  # fmt: skip
+_VARIABLES = ("Parameter", "Variable", "ParameterSet")
+_REFERENCE = re.compile(r"\$(?:(\$)|\{([A-Za-z_][\w.]*)\}|\(([A-Za-z_][\w.]*)\)|([A-Za-z_]\w*))")
+MAX_DEPTH = 50
+
+
+def is_text(said: Property) -> bool:
+    """Whether the value is taken as it is written, but for ``$name``."""
+    return said.java.rpartition(".")[2] in TEXTS or said.text("_stringMode") == "true"
+
+
+def is_variable(said: Property) -> bool:
+    """Whether expressions may name it."""
+    kind = said.java.rpartition(".")[2]
+    return said.value is not None and (kind.endswith(_VARIABLES) or kind in ("", "Priority"))
+
+
+class Scope:
+    """The attributes of one entity, within those of its surroundings."""
+
+    def __init__(
+        self, entity: Property, around: Scope | None = None, defaults: Mapping[str, object] | None = None
+    ) -> None:
+        self.entity = entity
+        self.around = around
+        self.defaults = defaults or {}
+        self._values: dict[str, object] = {}
+        self._open: set[str] = set()
+
+    def inside(self, entity: Entity, defaults: Mapping[str, object] | None = None) -> Scope:
+        """What an entity within knows."""
+        return Scope(entity, self, defaults)
+
+    def find(self, name: str) -> Property | None:
+        """The attribute that a name stands for, here or around."""
+        scope: Scope | None = self
+        while scope is not None:
+            if (found := scope.own(name)) is not None:
+                return found
+            scope = scope.around
+        return None
+
+    def own(self, name: str) -> Property | None:
+        """The attribute of that name here."""
+        found = self.entity.properties.get(name)
+        if found is not None and is_variable(found):
+            return found
+        for each in self.entity.properties.values():  # attributes that widen the scope
+            if each.java.endswith(("ScopeExtendingAttribute", "ScopeExtender")) and name in each.properties:
+                return each.properties[name]
+        return None
+
+    def home(self, name: str) -> Scope | None:
+        """Where a name is declared."""
+        scope: Scope | None = self
+        while scope is not None:
+            if scope.own(name) is not None:
+                return scope
+            scope = scope.around
+        return None
+
+    def __call__(self, name: str) -> object:
+        """The value of a name; raises ``KeyError``, or ``ExpressionError`` if its own expression has none."""
+        scope: Scope | None = self
+        while scope is not None:
+            if (found := scope.own(name)) is not None:
+                return scope._value(name, found)
+            if name in scope.defaults:
+                return scope.defaults[name]
+            scope = scope.around
+        raise KeyError(name)
+
+    def _value(self, name: str, said: Property) -> object:
+        if name not in self._values:
+            if name in self._open or len(self._open) > MAX_DEPTH:
+                raise ExpressionError(f"{name!r} is defined by itself")
+            self._open.add(name)
+            try:
+                self._values[name] = self.value_of(said)
+            finally:
+                self._open.discard(name)
+        return self._values[name]
+
+    def value_of(self, said: Property) -> Any:
+        """What an attribute comes to; raises ``ExpressionError``."""
+        text = said.value or ""
+        if is_text(said):
+            return self.filled(text, as_is=said.java.endswith("StringAttribute"))
+        return self.value(text)
+
+    def value(self, text: str) -> Any:
+        """What an expression comes to; None if it is empty."""
+        return evaluate(self.tree(text), self) if text.strip() else None
+
+    def tree(self, text: str) -> Tree:
+        """The expression, with ``$name`` in its texts resolved."""
+        return parse(text)
+
+    def filled(self, text: str, *, as_is: bool = False) -> str:
+        """A text with its ``$name`` filled in."""
+        if as_is or "$" not in text:
+            return text
+
+        def value(match: re.Match[str]) -> str:
+            if match[1]:
+                return "$"
+            name = match[2] or match[3] or match[4]
+            try:
+                return java_text(self(name))
+            except (KeyError, ExpressionError):
+                return match[0]
+
+        return _REFERENCE.sub(value, text)
+
+    def is_constant(self, name: str) -> bool:
+        """Whether a name is one that the language itself knows."""
+        return name in CONSTANTS and self.find(name) is None

@@ -1,0 +1,331 @@
+"""What the words of a row of the table cannot say of an actor."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from epicycle import actors
+from epicycle.actors import declared_parameters
+
+from .names import Names
+from .scope import is_text
+from .syntax import ExpressionError
+from .translate import names_of, translated
+from .writing import Flow
+
+if TYPE_CHECKING:
+    from .actors import Actor
+
+Special = Callable[["Actor"], None]
+
+
+def finite_stop(actor: Actor) -> None:
+    """A stop time, unless it is never."""
+    stop = actor.get("stopTime", math.inf)
+    if not isinstance(stop, (int, float)) or math.isinf(stop) or stop >= 1e300:
+        return
+    actor.told.discard("stopTime")
+
+
+def old_clock(actor: Actor) -> None:
+    """The former Clock makes one cycle more than it says."""
+    finite_stop(actor)
+    count = actor.get("numberOfCycles", -1)
+    if isinstance(count, (int, float)) and count > 0:
+        actor.values["cycles"] = int(count) + 1
+
+
+def positive(*names: str) -> Special:
+    """Parameters that stand for no limit if they are 0 or less."""
+
+    def convert(actor: Actor) -> None:
+        for name in names:
+            value = actor.get(name, 0)
+            if isinstance(value, (int, float)) and value > 0:
+                actor.told.discard(name)
+
+    return convert
+
+
+def single_event(actor: Actor) -> None:
+    """One that is not in the future never comes."""
+    time = actor.get("time", 0.0)
+    if isinstance(time, (int, float)) and time < 0:
+        actor.notes.note(f"{actor.path}.time = {time}: it sends nothing, here at the end of the run or after it")
+        actor.values["time"] = "1e8 s"
+    else:
+        actor.told.discard("time")
+
+
+def text_value(actor: Actor) -> None:
+    """The value of a StringConst is a text as it stands."""
+    actor.values["value"] = actor.text("value").replace("${", "$${")
+
+
+def strict_test(actor: Actor) -> None:
+    """The check of a model: what is expected, on one channel or on several together."""
+    _test(actor, strict=True)
+
+
+def non_strict_test(actor: Actor) -> None:
+    """The same, token by token."""
+    _test(actor, strict=False)
+
+
+def _test(actor: Actor, *, strict: bool) -> None:
+    if actor.get("trainingMode", False) is True:
+        actor.notes.note(f"{actor.path} is in training mode: it checks nothing")
+        _records(actor)
+        return
+    said = actor.said("correctValues")
+    actor.told.add("correctValues")
+    try:
+        values = [True] if said is None else actor.scope.value_of(said)
+    except ExpressionError as error:
+        actor.notes.note(f"{actor.path} checks nothing: correctValues: {error}")
+        _records(actor)
+        return
+    values = values if isinstance(values, list) else [values]
+    by_channel = strict and bool(values) and all(type(each) is list for each in values)
+    if by_channel and actor.widths.get("input", 1) > 1:
+        actor.values["together"] = True
+    elif by_channel and all(len(each) == 1 for each in values):
+        values = [each[0] for each in values]
+    actor.values = {"values": values, **actor.values}
+
+
+def _records(actor: Actor) -> None:
+    actor.values = {"type": "Recorder"}
+    actor.told |= {*actor.row.parameters, "correctValues"}
+
+
+def expression(actor: Actor) -> None:
+    """An Expression, whose inputs are ports that somebody added."""
+    said = actor.said("expression")
+    actor.told.add("expression")
+    text = (said.value if said is not None else "") or ""
+    names = Names(("output", "gives", "hold"), in_expressions=True)
+    for port in actor.entity.ports.values():
+        if port.flag("input"):
+            actor.ports[port.name] = names.of(port.name)
+    for name, ours in names.renamed().items():
+        actor.notes.note(f"{actor.path}.{name} is called {ours}")
+    try:
+        tree = actor.scope.tree(text)
+        known = {**actor.ports, "time": "time", "iteration": "iteration"}
+        ours = translated(tree, known, actor.scope, {*actor.whole, "iteration"})
+    except ExpressionError as error:
+        actor.notes.error(f"{actor.path}: expression: {error}")
+        return
+    if "iteration" in names_of(tree):
+        actor.values["iteration"] = True
+    actor.values["expression"] = _with_all(
+        ours, [each for port, each in actor.ports.items() if actor.widths.get(port, 0)]
+    )
+
+
+def _with_all(text: str, ports: list[str]) -> str:
+    """The expression, in which all ports are named: one that is not would be no port."""
+    left = [each for each in ports if not re.search(rf"(?<!\w){each}(?!\w)", text)]
+    return f"[{text}, {', '.join(left)}][0]" if left else text
+
+
+def formula(template: str, **defaults: object) -> Special:
+    """An Expression for an actor that computes something: ``{name}`` is a parameter, or the port of that name."""
+
+    def convert(actor: Actor) -> None:
+        said: dict[str, str] = {}
+        for name in re.findall(r"\{(\w+)\}", template):
+            if actor.widths.get(name, 0):
+                said[name] = name
+                actor.told.add(name)
+            else:
+                value = actor.get(name, defaults.get(name))
+                said[name] = f"({value!r})" if isinstance(value, (int, float)) and value < 0 else repr(value)
+        actor.values["expression"] = re.sub(r"\{(\w+)\}", lambda match: said[match[1]], template)
+
+    return convert
+
+
+def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Special:
+    """A parameter that is one of some words."""
+
+    def convert(actor: Actor) -> None:
+        word = actor.text(name, default)
+        if word not in words:
+            actor.notes.error(f"{actor.path}.{name} = {word!r}: has no counterpart")
+        else:
+            actor.values[ours] = words[word]
+
+    return convert
+
+
+def math_function(actor: Actor) -> None:
+    """MathFunction, whose modulo has two operands."""
+    word = actor.text("function", "exp")
+    if word == "modulo":
+        actor.values = {
+            "type": "Expression",
+            "expression": "firstOperand - secondOperand * int(firstOperand / secondOperand)",
+        }
+        actor.ports |= {"firstOperand": "firstOperand", "secondOperand": "secondOperand"}
+        return
+    actor.ports |= {"firstOperand": "input"}
+    actor.values["function"] = word
+
+
+def string_compare(actor: Actor) -> None:
+    """StringCompare, as far as texts can be compared here."""
+    words = {"equals": "{0} == {1}", "contains": "{1} in {0}", "startsWith": "{0}[:len({1})] == {1}"}
+    word = actor.text("function", "equals")
+    if word not in words:
+        actor.notes.error(f"{actor.path}.function = {word!r}: has no counterpart")
+        return
+    said = [each if actor.widths.get(each, 0) else repr(actor.text(each)) for each in ("firstString", "secondString")]
+    actor.values["expression"] = words[word].format(*said)
+
+
+def rounding(actor: Actor) -> None:
+    """Round, of which the half goes up and truncation is a function of its own."""
+    words = {"ceil": "ceil(input)", "floor": "floor(input)", "round": "floor(input + 0.5)", "truncate": "int(input)"}
+    word = actor.text("function", "round")
+    actor.values["expression"] = words.get(word, words["round"])
+
+
+def random(law: str, **parameters: str) -> Special:
+    """A Random with a distribution: ``ours="theirs=default"``."""
+
+    def convert(actor: Actor) -> None:
+        found: dict[str, Any] = {"type": law}
+        for ours, said in parameters.items():
+            name, _, default = said.partition("=")
+            if actor.widths.get(name, 0):
+                actor.notes.error(f"{actor.path}.{name}: a distribution that changes in a run has no counterpart")
+            value = actor.get(name, actor.scope.value(default))
+            parameter = declared_parameters(getattr(actors, law))[ours]
+            if parameter.required or parameter.default != value:
+                found[ours] = value
+        actor.values["distribution"] = found
+        generator(actor)
+
+    return convert
+
+
+def java_hash(text: str) -> int:
+    """The hash of a text in Java."""
+    found = 0
+    for character in text:
+        found = (31 * found + ord(character)) % 2**32
+    return found - 2**32 if found >= 2**31 else found
+
+
+def generator(actor: Actor) -> None:
+    """The numbers of Java's generators, where the model fixes them: by a seed of its own, or by the shared one."""
+    own, shared = actor.get("privateSeed"), actor.get("seed", actor.seed)
+    kind = "DRand" if ".colt." in actor.entity.java else "JavaRandom"
+    if (made := actor.text("generatorClass", "DRand")) != "DRand":
+        actor.notes.note(f"{actor.path}.generatorClass = {made!r}: has no counterpart, the numbers are others")
+    elif isinstance(own, int) and not isinstance(own, bool):
+        actor.values["generator"] = {"type": kind, "seed": own}
+    elif isinstance(shared, int) and shared:
+        actor.values["generator"] = {"type": kind, "seed": shared + java_hash(actor.full_name)}
+
+
+def poisson_clock(actor: Actor) -> None:
+    """Its stop time, and its random numbers."""
+    finite_stop(actor)
+    generator(actor)
+
+
+def colt_exponential(actor: Actor) -> None:
+    """Its lambda is the rate."""
+    rate = actor.get("lambda", 1.0)
+    actor.values["distribution"] = {"type": "Exponential", **({} if rate == 1.0 else {"mean": 1.0 / rate})}
+    generator(actor)
+
+
+def colt_gamma(actor: Actor) -> None:
+    """Its alpha is the shape, its lambda the rate."""
+    shape, rate = actor.get("alpha", 1.0), actor.get("lambda", 1.0)
+    actor.values["distribution"] = {"type": "Gamma", "shape": shape, "mean": shape / rate}
+    generator(actor)
+
+
+def colt_negative_binomial(actor: Actor) -> None:
+    """Its p is the probability of what is not counted."""
+    probability = 1.0 - actor.get("p", 0.5)
+    actor.values["distribution"] = {
+        "type": "NegativeBinomial",
+        "successes": actor.get("n", 1),
+        "probability": probability,
+    }
+    generator(actor)
+
+
+def colt_breit_wigner(actor: Actor) -> None:
+    """Its gamma is the width at half the height."""
+    found = {"type": "Cauchy", "median": actor.get("mean", 1.0), "scale": actor.get("gamma", 1.0) / 2.0}
+    cut = actor.get("cut", 1.0)
+    actor.values["distribution"] = found if math.isinf(cut) else {**found, "cut": cut}
+    generator(actor)
+
+
+def fields(direction: str) -> Special:
+    """A RecordAssembler or RecordDisassembler: its ports are the fields."""
+
+    def convert(actor: Actor) -> None:
+        names = [port.name for port in actor.entity.ports.values() if port.flag(direction)]
+        actor.ports |= {name: name for name in names}
+        actor.values["fields"] = names
+
+    return convert
+
+
+def event_filter(actor: Actor) -> None:
+    """EventFilter hands on what is true."""
+
+
+def limiter(actor: Actor) -> None:
+    """Only limits that are finite."""
+    for name, ours in (("top", "high"), ("bottom", "low")):
+        value = actor.get(name, math.inf if name == "top" else -math.inf)
+        if isinstance(value, (int, float)) and not math.isinf(value) and abs(value) < 1.7e308:
+            actor.values[ours] = value
+
+
+def pid(actor: Actor) -> None:
+    """PID, whose input is the error: the gains have the other sign."""
+    for name, ours, default in (("Kp", "proportional", 1.0), ("Ki", "integral", 0.0), ("Kd", "derivative", 0.0)):
+        value = actor.get(name, default)
+        if value:
+            actor.values[ours] = -value
+    actor.values["integration"] = "trapezoid"
+
+
+def no_trigger(*names: str) -> Special:
+    """Parameters that make no difference at their default, and have no counterpart otherwise."""
+
+    def convert(actor: Actor) -> None:
+        for said in names:
+            name, _, default = said.partition("=")
+            value = actor.get(name, actor.scope.value(default))
+            if value != actor.scope.value(default):
+                actor.notes.note(f"{actor.path}.{name} = {value!r}: has no counterpart")
+
+    return convert
+
+
+def both(*parts: Special) -> Special:
+    """One after the other."""
+
+    def convert(actor: Actor) -> None:
+        for each in parts:
+            each(actor)
+
+    return convert
+
+
+__all__ = ["Flow", "is_text"]

@@ -1,0 +1,177 @@
+"""Parameters that change in a run: those that a SetVariable sets, and PortParameters of composites.
+
+Each is a ``Variable`` beside the actors of the composite that declares it; what goes by it has an aspect ``Replace``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .actors import Actor, plain
+from .entities import Entity
+from .parts import Converting, Level, Part
+from .scope import Scope
+from .syntax import ExpressionError, Tree
+from .translate import names_of, translated
+from .writing import Flow
+
+_FIRST = -1000  # a priority: a new value counts for all who fire at that microstep
+
+
+@dataclass
+class Changing:
+    """One parameter that changes."""
+
+    owner: Entity
+    name: str
+    delayed: bool = True
+    is_port: bool = False  # of a composite, by which its values come
+    actor: str = ""  # our name of the Variable
+    setters: list[str] = field(default_factory=list)  # what leads to it, as seen from the owner
+    readers: list[tuple[str, str]] = field(default_factory=list)  # where parameters go by it, and how
+
+
+class Variables:
+    """All parameters of a model that change."""
+
+    def __init__(self, conversion: Converting) -> None:
+        self._conversion = conversion
+        self._found: dict[tuple[int, str], Changing] = {}
+        for entity in conversion.model.everything():
+            if entity.java.endswith(".SetVariable"):
+                self._set_by(entity)
+            elif entity.entities:
+                for name, said in entity.properties.items():
+                    if said.java.endswith(".PortParameter") and conversion.is_linked(entity, name):
+                        self._found[id(entity), name] = Changing(entity, name, delayed=False, is_port=True)
+
+    def _set_by(self, entity: Entity) -> None:
+        scope = self._conversion.scope_of(entity)
+        name = (entity.text("variableName") or "").strip().strip('"')
+        around = self._conversion.container_of(entity)
+        if not name or around is None:
+            return
+        home = None if scope.around is None else scope.around.home(name)
+        owner = around if home is None or not isinstance(home.entity, Entity) else home.entity
+        found = self._found.setdefault((id(owner), name), Changing(owner, name))
+        found.delayed = (entity.text("delayed") or "true").strip() != "false"
+
+    @property
+    def ports(self) -> set[tuple[int, str]]:
+        """The ports of composites by which values come."""
+        return {key for key, each in self._found.items() if each.is_port}
+
+    def of(self, owner: Entity) -> list[Changing]:
+        """Those that a composite declares."""
+        return [each for each in self._found.values() if each.owner is owner]
+
+    def find(self, scope: Scope, name: str) -> Changing | None:
+        """The one that a name means, if it is one."""
+        around: Scope | None = scope
+        while around is not None:
+            if (found := self._found.get((id(around.entity), name))) is not None:
+                return found
+            if around.own(name) is not None:
+                return None
+            around = around.around
+        return None
+
+    def said(self, text: str, scope: Scope) -> tuple[str, Changing] | None:
+        """An expression by what the variables in it send, and one of them; None if there are none in it."""
+        if not self._found:
+            return None
+        try:
+            tree = scope.tree(text)
+            names, found = self._names(tree, scope, 0)
+            return None if found is None else (translated(tree, names, scope), found)
+        except ExpressionError:
+            return None
+
+    def _names(self, tree: Tree, scope: Scope, depth: int) -> tuple[dict[str, str], Changing | None]:
+        names: dict[str, str] = {}
+        some: Changing | None = None
+        for name in sorted(names_of(tree)) if depth < 20 else ():
+            found = self.find(scope, name)
+            if found is not None:
+                names[name] = f"{self.actor_of(found)}.value"
+                some = found
+                continue
+            home = scope.home(name)
+            said = None if home is None else home.own(name)
+            if home is None or said is None or not (said.value or "").strip():
+                continue
+            try:
+                inner = home.tree(said.value or "")
+                deeper, changing = self._names(inner, home, depth + 1)
+                if changing is not None:
+                    names[name], some = f"({translated(inner, deeper, home)})", changing
+            except ExpressionError:
+                continue
+        return names, some
+
+    def actor_of(self, changing: Changing) -> str:
+        """Our name of the Variable."""
+        if not changing.actor:
+            level = self._conversion.levels[id(changing.owner)]
+            changing.actor = level.names.fresh(f"{changing.name}_variable")
+        return changing.actor
+
+    def follow(self, actor: Actor, level: Level, ours: str, text: str) -> None:
+        """Let a parameter of an actor go by the variables that its expression names."""
+        found = self.said(text, actor.scope)
+        if found is not None:
+            expression, changing = found
+            owner = self._conversion.levels[id(changing.owner)]
+            path = f"{level.at}{level.names.of(actor.entity.name)}.{ours}"
+            changing.readers.append((path.removeprefix(owner.at), expression))
+
+    def note_setter(self, entity: Entity, level: Level, part: Part) -> None:
+        """Lead what a SetVariable sends to its variable, through the composites between."""
+        name = (entity.text("variableName") or "").strip().strip('"')
+        changing = self.find(self._conversion.scope_of(level.entity), name)
+        if changing is None:
+            return
+        end, here = f"{part.name}.variable", level
+        if "value" in part.entry:  # what it tells is what the variable is worth
+            owner = self._conversion.levels[id(changing.owner)]
+            path = f"{level.at}{part.name}.value".removeprefix(owner.at)
+            changing.readers.append((path, f"{self.actor_of(changing)}.value"))
+        while here.entity is not changing.owner and here.outer is not None:
+            port = here.names.fresh(f"{changing.name}_set")
+            here.added_outputs.append(port)
+            here.added_connections.append(f"{end} -> {port}")
+            end = f"{here.at.rstrip('.').rpartition('.')[2]}.{port}"
+            here = here.outer
+        changing.setters.append(end)
+
+    def add(self, level: Level, actors: dict[str, Flow], connections: list[object]) -> dict[str, Flow]:
+        """Put the variables of a composite beside its actors; the aspects that come with them."""
+        aspects: dict[str, Flow] = {}
+        for each in self.of(level.entity):
+            if not each.setters and not each.is_port:
+                continue
+            name = self.actor_of(each)
+            actors[name] = Flow(
+                {"type": "Variable", "priority": _FIRST, **({} if each.delayed else {"delayed": False})}
+            )
+            sources = [level.ports.of(each.name)] if each.is_port else each.setters
+            connections += [f"{source} -> {name}.input" for source in sources]
+            for path, expression in each.readers:
+                aspect = level.names.fresh(f"{each.name}_in_{path.replace('.', '_')}")
+                aspects[aspect] = Flow({"type": "Replace", "to": expression, "at": path})
+        return aspects
+
+
+def set_variable(actor: Actor) -> None:
+    """A SetVariable, which begins with the value that the model gives."""
+    name = actor.text("variableName")
+    actor.told.add("delayed")
+    if actor.get("delayed", True) is False:
+        actor.values["delayed"] = False
+    try:
+        around = actor.scope.around
+        value = None if around is None else around(name)
+    except (KeyError, ExpressionError):
+        value = None
+    if value is not None:
+        actor.values["value"] = plain(value)

@@ -1,0 +1,174 @@
+"""Nets as connections: a line each, in an order in which the channels of all multiports are those of the file."""
+
+from __future__ import annotations
+
+import heapq
+from itertools import pairwise
+from typing import Any
+
+from epicycle.actors import declared_ports
+
+from ..catalogue import built_in
+from .modes import is_machine
+from .parts import Converting, Level
+from .relations import End, Net
+from .writing import Flow
+
+
+def connections_of(conversion: Converting, level: Level) -> list[Any]:
+    """The connections of a composite."""
+    counting = Counting(conversion)
+    made = [_Line(conversion, level, net, counting) for net in conversion.nets_of(level.entity)]
+    lines = [each for each in made if each.sources and each.sinks]
+    for each in made:
+        if each.sinks and not each.sources and any("." in sink for sink in each.sinks):
+            level_path = level.told(each.sinks[0])
+            conversion.notes.note(f"{level_path} is connected to nothing that sends")
+    written = [each.written() for each in _ordered(lines, conversion, level)]
+    for (composite, path), port in conversion.triggers.items():
+        actor, _, name = path.rpartition(".")
+        if composite == id(level.entity) and (part := level.parts.get(actor)) is not None:
+            ours = conversion.port_of(level.entity.entities[actor], part, name, 0)
+            written.append(f"{level.ports.of(port)} -> {part.name}.{ours}")
+    return written
+
+
+class _Line:
+    """One connection, with what is to be known of its ends."""
+
+    def __init__(self, conversion: Converting, level: Level, net: Net, counting: Counting) -> None:
+        self.ends: list[End] = net.ends
+        self.sources: list[str] = []
+        self.sinks: list[str] = []
+        for end in net.ends:
+            found = conversion.end(level, end)
+            if found is not None and found[0] not in (self.sources if found[1] else self.sinks):
+                (self.sources if found[1] else self.sinks).append(found[0])
+        self.shared = self._is_shared(conversion, level, counting)
+
+    def _is_shared(self, conversion: Converting, level: Level, counts: Counting) -> bool:
+        """Whether it has to be said that all of it is one channel."""
+        if counts.senders(level.entity, self.ends) > 1:
+            return True
+        if counts.receivers(level.entity, self.ends) < 2:
+            return False
+        return any(_sends_by_channel(conversion, level, end) for end in self.ends)
+
+    def written(self) -> Any:
+        sources, sinks = ", ".join(self.sources), ", ".join(self.sinks)
+        if not self.shared:
+            return f"{sources} -> {sinks}"
+        one = [each[0] if len(each) == 1 else each for each in (self.sources, self.sinks)]
+        return Flow({"from": one[0], "to": one[1], "shared": True})
+
+
+def _sends_by_channel(conversion: Converting, level: Level, end: End) -> bool:
+    """Whether this is an output of an actor of ours that has channels."""
+    part = level.parts.get(end.actor)
+    if part is None or part.row is None or end.port not in part.row.ports:
+        return False
+    said = part.row.ports[end.port]
+    kind = built_in().actors.get(part.row.type)
+    if said.face.direction == "input" or kind is None:
+        return False
+    port = declared_ports(kind).get(said.ours)
+    return port is None or port.multi
+
+
+class Counting:
+    """How many actors' outputs lead into a net, and to how many inputs it leads, through the borders of composites."""
+
+    def __init__(self, conversion: Converting) -> None:
+        self._conversion = conversion
+        self._found: dict[tuple[int, str, int, bool], int] = {}  # 0 while it is looked for
+
+    def senders(self, composite: Any, ends: list[End]) -> int:
+        """How many outputs of actors lead to some ends of a net; 2 stands for several."""
+        return self._all(composite, ends, senders=True)
+
+    def receivers(self, composite: Any, ends: list[End]) -> int:
+        """To how many inputs of actors they lead."""
+        return self._all(composite, ends, senders=False)
+
+    def _all(self, composite: Any, ends: list[End], *, senders: bool) -> int:
+        found = 0
+        for end in ends:
+            found += self._beyond(composite, end, senders=senders)
+            if found > 1:
+                break
+        return min(found, 2)
+
+    def _beyond(self, composite: Any, end: End, *, senders: bool) -> int:
+        """How many there are behind one end; 2 stands for several."""
+        conversion = self._conversion
+        child = composite.entities.get(end.actor) if end.actor else composite
+        face = None if child is None else conversion.face(child, end.port)
+        if face is None:
+            return 0
+        comes_from = (face.direction == "output") == bool(end.actor)
+        if comes_from is not senders:
+            return 0
+        if end.actor and (id(child) not in conversion.wiring.groups or is_machine(child)):
+            return 1
+        # On the other side of a composite's port.
+        if end.actor:
+            inside, port = child, f"{end.port}"
+        else:
+            inside, port = conversion.container_of(composite), f"{composite.name}.{end.port}"
+        if inside is None:
+            return 0
+        if is_machine(inside):  # whose refinements are joined with its ports by their names
+            return 1
+        key = (id(inside), port, end.channel, senders)
+        if key not in self._found:
+            self._found[key] = 0
+            for net in conversion.nets_of(inside):
+                here = [each for each in net.ends if f"{each.actor}.{each.port}".lstrip(".") == port]
+                if any(each.channel == end.channel for each in here):
+                    others = [each for each in net.ends if each not in here]
+                    self._found[key] = min(self._found[key] + self._all(inside, others, senders=senders), 2)
+        return self._found[key]
+
+
+def _ordered(lines: list[_Line], conversion: Converting, level: Level) -> list[_Line]:
+    """The lines in their order, but as the channels of every multiport ask for."""
+    channels: dict[str, list[tuple[int, int, int]]] = {}
+    for number, line in enumerate(lines):
+        for end in line.ends:
+            found = conversion.end(level, end)
+            if found is not None:
+                rank = _rank(level, end)
+                channels.setdefault(found[0], []).append((rank, end.channel, number))
+    after: dict[int, set[int]] = {number: set() for number in range(len(lines))}
+    before = dict.fromkeys(after, 0)
+    for taken in channels.values():
+        order = [number for _, _, number in sorted(taken)]
+        for one, other in pairwise(order):
+            if one != other and other not in after[one]:
+                after[one].add(other)
+                before[other] += 1
+    ready = [number for number, count in before.items() if not count]
+    found_order: list[_Line] = []
+    left = set(before)
+    while left:
+        if not ready:
+            ready = [min(left)]
+            conversion.notes.note(f"{level.path or 'the model'}: some channels of multiports are in another order")
+        number = heapq.heappop(ready)
+        if number not in left:
+            continue
+        left.discard(number)
+        found_order.append(lines[number])
+        for other in after[number]:
+            before[other] -= 1
+            if before[other] == 0:
+                heapq.heappush(ready, other)
+    return found_order
+
+
+def _rank(level: Level, end: End) -> int:
+    """Where a port stands among those of one actor that are one port of ours."""
+    part = level.parts.get(end.actor)
+    if part is None or part.row is None:
+        return 0
+    return list(part.row.ports).index(end.port) if end.port in part.row.ports else 0

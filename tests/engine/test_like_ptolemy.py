@@ -1,0 +1,376 @@
+"""``director: {like: ptolemy}``: borders of composites, defaults, aspects that are models, and how Python says it."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import pytest
+
+from epicycle.actors import Actor, Configurable, InputPort, OutputPort, Parameter, ParameterError, PortError, TimeDelay
+from epicycle.aspects import Bus
+from epicycle.runner.build import Model
+from epicycle.runner.engine import Simulation
+from epicycle.runner.text import ModelError
+from tests.engine.engine_parts import Probe, Ticker, load, seen, sends, simulate
+
+
+class Repeat(Actor):
+    """Sends every token twice."""
+
+    input: InputPort[Any] = InputPort(Any)
+    output: OutputPort[Any] = OutputPort(Any)
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self.output.send(token)
+            self.output.send(token)
+
+
+class Hold(Actor):
+    """Takes tokens, and sends none of them at their tag."""
+
+    input: InputPort[Any] = InputPort(Any, required=False)
+    output: OutputPort[Any] = OutputPort(Any, depends_on=())
+
+    def fire(self) -> None:
+        pass
+
+
+class One(Actor):
+    """Takes one token in each firing, or tells what came."""
+
+    input: InputPort[Any] = InputPort(Any, ptolemy={"keep": True, "required": False})
+    output: OutputPort[Any] = OutputPort(Any)
+    told = Parameter(str, "here", ptolemy="there")
+    needed: Parameter[Any] = Parameter(int, ptolemy=3)
+    fallible = Parameter(int, 1, min=0, ptolemy=2)
+    checks: ClassVar[list[int]] = []
+
+    def check(self) -> None:
+        self.checks.append(self.fallible)
+        if self.fallible == self.needed:
+            raise ParameterError("fallible is needed")
+
+    def fire(self) -> None:
+        self.output.send(self.input.get() if self.input.keep else self.input.tokens)
+
+
+TYPES = [Hold, One, Repeat]
+LIKE = "director: {like: ptolemy}\n"
+
+BORDERS = """
+composites:
+  Source:
+    outputs: [out]
+    director: {}
+    actors: {t: {type: Ticker, limit: 1}, twice: {type: Repeat}}
+    connections: [t.output -> twice.input, twice.output -> out]
+  Twice:
+    inputs: [in, other]
+    outputs: [out]
+    director: {}
+    actors: {twice: {type: Repeat}, join: {type: Join}}
+    connections: [in -> twice.input, twice.output -> out, in -> join.input, other -> join.input]
+actors:
+  t: {type: Ticker, limit: 1}
+  twice: {type: Repeat}
+  source: {type: Source}
+  c: {type: Twice}
+  probe: {type: Probe}
+  middle: {type: Probe}
+connections: [t.output -> twice.input, twice.output -> c.in, t.output -> c.other, c.out -> probe.input,
+              source.out -> middle.input]
+"""
+
+
+def test_a_composite_fires_again_at_a_tag_for_tokens_that_wait_at_its_inputs() -> None:
+    """What is left at its outputs follows at the next microsteps, as it does without."""
+    simulation, results = simulate(BORDERS, types=TYPES)
+    assert seen(simulation, "middle") == [(0.0, 1, (0,)), (0.0, 2, (0,))]
+    assert seen(simulation) == [(0.0, microstep, (0,)) for microstep in (1, 2, 3, 4)]
+    assert [row[1:] for row in sends(results, "c.join")] == [
+        (1, "c.join.output", [[0], [0]]),
+        (2, "c.join.output", [[0], []]),
+    ]
+    simulation, results = simulate(LIKE + BORDERS, types=TYPES)
+    assert seen(simulation, "middle") == [(0.0, 1, (0,)), (0.0, 2, (0,))]
+    assert seen(simulation) == [(0.0, 1, (0, 0)), (0.0, 2, (0,)), (0.0, 3, (0,))]
+    assert [row[1:] for row in sends(results, "c.join")] == [
+        (1, "c.join.output", [[0], [0]]),
+        (1, "c.join.output", [[0], []]),
+    ]
+
+
+NEXT = """
+composites:
+  C:
+    parameters: {between: }
+    director: {}
+    actors:
+      first: {type: Wakes, at: [5]}
+      second: {type: Wakes, at: "${[between]}"}
+  Around: {parameters: {between: }, director: {}, actors: {c: {type: C, between: "${between}"}}}
+actors:
+  early: {type: TYPE, between: 0.5}
+  alone: {type: Wakes, at: [1], then: 5}
+  late: {type: TYPE, between: 3}
+"""
+
+
+class Wakes(Actor):
+    """Wakes up at times, at the last of which it asks for another one; sends at whole multiples of 5 s."""
+
+    is_source: ClassVar[bool] = True
+    output: OutputPort[Any] = OutputPort(Any)
+    at: Parameter[Any] = Parameter(object)
+    then = Parameter(float, 0.0)
+
+    def initialize(self) -> None:
+        for time in self.at:
+            self.wake_at(time)
+
+    def fire(self) -> None:
+        if self.now == self.at[-1] and self.then:
+            self.wake_at(self.then)
+        if self.now == 5:
+            self.output.send(self.now)
+
+
+@pytest.mark.parametrize("kind", ["C", "Around"])
+def test_a_composite_is_posted_for_what_comes_first_in_it(kind: str) -> None:
+    """Whenever it has fired: for 5 s after its firing between, which is before the other actor's or behind it."""
+    inner = ".c" if kind == "Around" else ""
+    ours = [f"early{inner}.first", f"late{inner}.first"]
+    text = NEXT.replace("TYPE", kind)
+    for head, order in (
+        ("director: {ties: posted}\n", [*ours, "alone"]),
+        (LIKE, [ours[0], "alone", ours[1]]),
+        ("director: {like: ptolemy, ties: declared}\n", [ours[0], "alone", ours[1]]),
+        ("", [ours[0], "alone", ours[1]]),
+    ):
+        _, results = simulate(head + text, types=[*TYPES, Wakes])
+        assert [port.rpartition(".")[0] for _, _, port, _ in sends(results)] == order
+    _, results = simulate(LIKE + text.replace("between: 0.5", "between: 4"), types=[*TYPES, Wakes])
+    assert [port.rpartition(".")[0] for _, _, port, _ in sends(results)] == ["alone", ours[1], ours[0]]
+
+
+LOOP = """
+composites:
+  C:
+    inputs: [first, second]
+    outputs: [out]
+    director: {DIRECTOR}
+    actors: {hold: {type: Hold}, gain: {type: Scale}}
+    connections: [first -> gain.input, gain.output -> out, second -> hold.input]
+actors: {a: {type: Ticker}, c: {type: C}, g: {type: Scale}}
+connections: [a.output -> c.first, c.out -> g.input, g.output -> c.second]
+"""
+
+
+@pytest.mark.parametrize(
+    ("head", "director", "is_right"),
+    [("", "", True), ("", "like: ptolemy", False), (LIKE, "", False), (LIKE, "like: epicycle", True)],
+)
+def test_outputs_of_a_composite_depend_on_all_inputs(head: str, director: str, is_right: bool) -> None:
+    text = head + LOOP.replace("DIRECTOR", director)
+    if is_right:
+        load(text, types=TYPES)
+        return
+    with pytest.raises(ModelError) as caught:
+        load(text, types=TYPES)
+    (problem,) = caught.value.problems
+    assert problem.message == "a loop without delay: c -> g -> c"
+    assert "c has a director like Ptolemy's: all its outputs depend on all its inputs" in problem.help
+
+
+def test_a_delay_keeps_microsteps() -> None:
+    text = """
+actors: {t: {type: Ticker, limit: 1}, twice: {type: Repeat}, delay: {type: TimeDelay}, probe: {type: Probe}}
+connections: [{from: t.output, to: twice.input, delay: 0}, twice.output -> delay.input, delay.output -> probe.input]
+"""
+    assert seen(simulate(text, types=TYPES)[0]) == [(1.0, 1, (0, 0))]
+    # Both tokens come at (0 s, 2), and leave one after the other.
+    assert seen(simulate(LIKE + text, types=TYPES)[0]) == [(1.0, 2, (0,)), (1.0, 3, (0,))]
+    assert seen(simulate(LIKE + text.replace("TimeDelay", "TimeDelay, steps: false"), types=TYPES)[0]) == [
+        (1.0, 1, (0, 0))
+    ]
+    assert seen(simulate(LIKE + text.replace("TimeDelay", "TimeDelay, delay: 0"), types=TYPES)[0]) == [
+        (0.0, 3, (0,)),
+        (0.0, 4, (0,)),
+    ]
+
+
+@pytest.mark.parametrize(("factor", "plain", "stepping"), [(0, [1, 1, 1], [2, 3, 4]), (1, [1, 1, 1], [1, 1, 1])])
+def test_a_bus_that_takes_no_time_takes_a_microstep_a_message(
+    factor: int, plain: list[int], stepping: list[int]
+) -> None:
+    text = f"""
+actors: {{t: {{type: Ticker, limit: 1}}, one: {{type: Probe}}, two: {{type: Probe}}, three: {{type: Probe}}}}
+connections: ["t.output -> one.input, two.input, three.input"]
+aspects: {{bus: {{type: Bus, factor: {factor}, at: ["*.input"]}}}}
+"""
+    for head, microsteps in (("", plain), (LIKE, stepping)):
+        simulation, _ = simulate(head + text)
+        got = [seen(simulation, name) for name in ("one", "two", "three")]
+        assert got == [[(factor * (n + 1.0), step, (0,))] for n, step in enumerate(microsteps)]
+
+
+ASPECT = """
+composites:
+  Resource:
+    inputs: [request]
+    outputs: [response]
+    director: {}
+    actors: {own: {type: Ticker, period: 0.5}, pass: {type: Merge, discard: false}}
+    connections: [request -> pass.input, pass.output -> response]
+actors: {t: {type: Ticker}, probe: {type: Probe}}
+connections: [t.output -> probe.input]
+aspects: {resource: {type: Resource, at: probe.input}}
+"""
+
+
+def test_requests_wait_for_the_turn_of_an_aspect_that_is_a_model() -> None:
+    """Its own clock lets it fire at each second, but before the request comes: at the next microstep it fires again."""
+    simulation, results = simulate(ASPECT, until=1)
+    assert seen(simulation) == [(0.0, 1, (0,)), (1.0, 1, (1,))]
+    simulation, results = simulate(LIKE + ASPECT, until=1)
+    # At 0 s the aspect is posted behind the source; at 1 s, its clock has asked after the source, too.
+    assert seen(simulation) == [(0.0, 1, (0,)), (1.0, 1, (1,))]
+    late = ASPECT.replace("own: {type: Ticker, period: 0.5}, ", "")
+    simulation, results = simulate(LIKE + late, until=1)
+    assert seen(simulation) == [(0.0, 2, (0,)), (1.0, 2, (1,))]
+    asked = [(r.tag.seconds, r.tag.microstep) for r in results.log.records if r.event == "requested"]
+    assert asked == [(0.0, 2), (1.0, 2)]
+
+
+def test_defaults_are_inherited_inwards() -> None:
+    text = """
+director: {like: ptolemy}
+composites:
+  Inner:
+    actors: {one: {type: One}, two: {type: One, told: me, needed: 1}}
+  Opaque: {director: {drift: 2}, actors: {inner: {type: Inner}}}
+  Other: {director: {like: epicycle}, actors: {one: {type: One, needed: 5}, t: {type: Ticker}},
+          connections: [t.output -> one.input]}
+actors: {one: {type: One}, opaque: {type: Opaque}, other: {type: Other}}
+"""
+    model = load(text, types=TYPES)
+    told = {path: (one.told, one.needed, one.input.keep) for path, one in model.graph.actors.items() if path[-1] != "t"}
+    assert told == {  # type: ignore[comparison-overlap]
+        "one": ("there", 3, True),
+        "opaque.inner.one": ("there", 3, True),
+        "opaque.inner.two": ("me", 1, True),
+        "other.one": ("here", 5, False),
+    }
+    with pytest.raises(ModelError) as caught:
+        load("actors: {one: {type: One}}", types=TYPES)
+    assert [problem.message for problem in caught.value.problems] == ["one: One needs a value for 'needed'"]
+
+
+def test_python_says_the_same() -> None:
+    model = Model("m", like="ptolemy", stop=3)
+    one = model.add(One("one", needed=4))
+    delay = model.add(TimeDelay("delay", steps=False))
+    assert (one.told, one.needed, one.fallible, one.input.keep, delay.steps) == ("there", 4, 2, True, False)
+    assert One.checks[-2:] == [1, 2]  # once more, with Ptolemy's
+    ticker = model.add(Ticker("t"))
+    model.connect(ticker.output, one.input)
+    model.connect(ticker.output, delay.input)
+    bus = Bus(factor=0)
+    model.weave("bus", bus, at=one.input)
+    assert bus.steps
+    inside = model.composite("inside", director=True, like="epicycle")
+    assert inside.add(TimeDelay("delay")).steps is False
+    plain = model.composite("plain")
+    assert plain.add(TimeDelay("delay")).steps is True
+    posted = model.composite("posted", director=True, ties="declared")
+    rules = model.graph.rules
+    assert (rules[""].ties, rules["inside"].ties, rules["posted"].ties) == ("posted", "declared", "declared")
+    assert rules[posted.path].like == "ptolemy"
+    for composite in (inside, plain):
+        composite.add(Ticker("t"))
+        composite.connect("t.output -> delay.input")
+    results = Simulation(model, keep_log=True).run()
+    assert [row[1:2] for row in sends(results, "one")] == [(2,)] * 4
+
+
+MISTAKES: list[tuple[Any, str]] = [
+    (
+        lambda: Model("m", like="Ptolemy"),
+        "m: director.like: 'Ptolemy' is not one of epicycle, ptolemy, did you mean 'ptolemy'?",
+    ),
+    (lambda: Model("m", ties="first"), "m: director.ties: 'first' is not one of declared, posted"),
+    (
+        lambda: Model("m").composite("c", director=True, ties=3),  # type: ignore[arg-type]
+        "c: director.ties: 3 is not one of declared, posted",
+    ),
+    (lambda: Model("m").composite("c", like="ptolemy"), "c: 'like' is for a director of its own, and c has none"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), MISTAKES)
+def test_mistakes_in_python(call: Any, message: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        call()
+    assert [problem.message for problem in caught.value.problems] == [message]
+
+
+def test_ports_that_keep_tokens_without_a_model() -> None:
+    port: InputPort[Any] = InputPort(keep=True, multi=True).bind(Probe("p"))
+    port.width = 2
+    for token, channel in ((1, 0), (2, 1), (3, 0), (4, 0)):
+        port.receive(token, channel)
+    assert (port.waiting(0), port.waiting(1), port.tokens) == (3, 1, (1, 2, 3, 4))
+    assert (port.get(0), port.get(0), port.tokens) == (1, 3, (2, 4))
+    assert (port.get(1), port.present) == (2, True)
+    with pytest.raises(PortError) as caught:
+        port.get(1)
+    assert str(caught.value) == "p. has no token on channel 1; ask 'waiting' before 'get'"
+    # What an execution aspect takes out is what has come since the actor fired; what was left stays before it.
+    port.kept = 1
+    port.receive(5, 1)
+    taken = port.take()
+    assert (taken, port.tokens) == (([5], [1]), (4,))
+    port.give(taken)
+    assert (port.tokens, port.by_channel()) == ((4, 5), [[4], [5]])
+
+
+KEPT = """
+director: {like: ptolemy}
+actors: {t: {type: Ticker, limit: 3}, twice: {type: Repeat}, one: {type: One}}
+connections: [t.output -> twice.input, twice.output -> one.input]
+"""
+
+
+def test_kept_tokens_and_aspects_of_execution() -> None:
+    """Each firing is put off as a whole, and fires as often as it takes tokens out."""
+    assert [row[:2] + row[3:] for row in sends(simulate(KEPT, types=TYPES)[1], "one")] == [
+        (time, 1, time) for time in (0.0, 1.0, 2.0) for _ in range(2)
+    ]
+    aspect = "aspects: {work: {type: ExecutionTime, time: 1500 ms, at: one}}"
+    got = [row[:2] + row[3:] for row in sends(simulate(KEPT + aspect, types=TYPES)[1], "one")]
+    assert got == [(1.5, 1, 0), (1.5, 1, 0), (3.0, 1, 1), (3.0, 1, 1), (4.5, 1, 2), (4.5, 1, 2)]
+
+
+def test_a_crash_costs_the_tokens_that_are_kept() -> None:
+    text = "actors: {t: {type: Ticker}, one: {type: Never}}\nconnections: [t.output -> one.input]\n"
+    aspect = "aspects: {crash: {type: CrashRestart, mtbf: 100 ms, repair: 100 ms, at: one, until: 1500 ms}}"
+    for more, left in (("", 6), (aspect, 4)):
+        simulation, _ = simulate(text + more, until=5, types=[*TYPES, Never])
+        never = simulation["one"]
+        assert isinstance(never, Never)
+        assert never.input.waiting() == left
+
+
+class Never(Actor):
+    """Takes nothing out."""
+
+    input: InputPort[Any] = InputPort(Any, keep=True)
+
+    def fire(self) -> None:
+        pass
+
+
+def test_what_has_no_other_default_remembers_nothing() -> None:
+    assert "_configured" not in vars(Probe("p"))
+    assert "_configured" not in vars(Configurable())

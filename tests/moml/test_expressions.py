@@ -1,0 +1,179 @@
+"""The expression language of Ptolemy II: what it comes to, and how it is said here."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from epicycle.actors.expression import evaluate as own_evaluate
+from runner.moml.syntax import ExpressionError, parse
+from runner.moml.translate import translated
+from runner.moml.values import Rows, evaluate
+
+PARAMETERS: dict[str, Any] = {
+    "n": 3,
+    "x": 0.5,
+    "name": "joe",
+    "items": [1, 2, 3],
+    "rec": {"a": 1, "b": [4, 5]},
+    "yes": True,
+}
+
+
+def value(text: str) -> Any:
+    def scope(name: str) -> object:
+        return PARAMETERS[name]
+
+    return evaluate(parse(text), scope)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1 + 2 * 3", 7),
+        ("2^3^2", 64),
+        ("-2^2", -4),
+        ("7 / 2", 3),
+        ("-7 / 2", -3),
+        ("7 / 2.0", 3.5),
+        ("6 / 2", 3),
+        ("1.0", 1.0),
+        ("1e3", 1000.0),
+        ("7L", 7),
+        ("0x1F", 31),
+        ("5ub", 5),
+        ("2.5d", 2.5),
+        ("-7 % 3", -1),
+        ("7.5 % 2", 1.5),
+        ("1 > 2 ? 3 : 4", 4),
+        ("true && !false", True),
+        ("true || false", True),
+        ("n == 3.0", True),
+        ("1 != 1", False),
+        ("3 & 5", 1),
+        ("3 | 5", 7),
+        ("3 # 5", 6),
+        ("1 << 4", 16),
+        ("32 >> 2", 8),
+        ("~0", -1),
+        ('"a" + 1 + 2.0', "a12.0"),
+        ("'a' + true", "atrue"),
+        ("{1, 2.0}", [1.0, 2.0]),
+        ("{}", []),
+        ('{a = 1, b = "x"}', {"a": 1, "b": "x"}),
+        ("{1, 2} + {3, 4}", [4, 6]),
+        ("2 * {1, 2}", [2, 4]),
+        ("[1, 2; 3, 4]", Rows([[1, 2], [3, 4]])),
+        ("[0 : 2 : 5]", Rows([[0, 2, 4]])),
+        ("items(1)", 2),
+        ("items.get(2)", 3),
+        ("items.length()", 3),
+        ("rec.a", 1),
+        ("rec.b(0)", 4),
+        ('rec.get("a")', 1),
+        ("max(items)", 3),
+        ("min(4, 2)", 2),
+        ("sum(items)", 6),
+        ("abs(-x)", 0.5),
+        ("floor(2.7)", 2.0),
+        ("ceil(2.1)", 3.0),
+        ("round(2.5)", 3),
+        ("PI", math.pi),
+        ("Infinity", math.inf),
+        ("MaxInt", 2147483647),
+        ("sqrt(16)", 4.0),
+        ("cast(int, 2.7)", 2),
+        ("cast(double, 2)", 2.0),
+        ("cast(string, 2.5)", "2.5"),
+        ("repeat(3, 0)", [0, 0, 0]),
+        ("x * n", 1.5),
+        ("append({1}, {2})", [1, 2]),
+        ("subarray(items, 1, 2)", [2, 3]),
+        ("1.0 / 0.0", math.inf),
+        ('1E10 + ""', "1.0E10"),
+        ('0.0001 + ""', "1.0E-4"),
+        ('(n > 2 && yes) ? name : ""', "joe"),
+        ("1 // one\n + 2", 3),
+        ("1 /* one */ + 2", 3),
+        ('"a\\n\\"b\\""', 'a\n"b"'),
+        ("neighborhood(1.0, 1.1, 0.2)", True),
+        ("contains(items, 2)", True),
+    ],
+)
+def test_values(text: str, expected: Any) -> None:
+    found = value(text)
+    assert (found, type(found)) == (expected, type(expected))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "'' is not understood: it ends too early"),
+        ("1 +", "'1 +' is not understood: it ends too early"),
+        ("(1", "'(1' is not understood: expected ')'"),
+        ("1 2", "'1 2' is not understood: 2 was not expected"),
+        ("1 ` 2", "'1 ` 2' is not understood at '` 2'"),
+        ("2i + 1", "2i: complex numbers are not known here"),
+        ("{|a = 1|}", "'{|a = 1|}': unions are not known here"),
+        ("function(y:int) y + 1", "'function(y:int) y + 1': functions of one's own are not known here"),
+        ("unheard", "'unheard' is not known"),
+        ("random()", "the function 'random' is not known here"),
+        ("items(7)", "there is no element 7"),
+        ("1 / 0", "it cannot be computed: division by zero"),
+        ("9^9^9^9^9", "it cannot be computed: the result is too large"),
+        ("true + 1", "it cannot be computed: True is not a number"),
+        ("repeat(1000000, 1)", "it has more than 10,000 elements"),
+        ("[0 : 1 : 1000000]", "it has more than 10,000 elements"),
+        ("(" * 70 + "1" + ")" * 70, f"{'(' * 57 + '...'!r} is not understood: nested deeper than 40 levels"),
+    ],
+)
+def test_what_has_no_value(text: str, message: str) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        value(text)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a + n", "a + 3"),
+        ("a * (b + 1)", "a * (b + 1)"),
+        ("a - (b - 1)", "a - (b - 1)"),
+        ("a - b - 1", "a - b - 1"),
+        ("a > 1 && !t", "a > 1 and not t"),
+        ("t || a == b", "t or a == b"),
+        ("t ? a : b", "a if t else b"),
+        ("(t ? a : b) + 1", "(a if t else b) + 1"),
+        ("a^2", "a ** 2"),
+        ("-a^2", "-a ** 2"),
+        ("(-a)^2", "(-a) ** 2"),
+        ("items(0) + a", "1 + a"),
+        ("array(a)", "array[a]"),
+        ("array.length()", "len(array)"),
+        ("r.f", "r['f']"),
+        ("{a, b}", "[a, b]"),
+        ("{v = a, w = 2}", "{'v': a, 'w': 2}"),
+        ("max(a, n)", "max(a, 3)"),
+        ("floor(a)", "float(floor(a))"),
+        ('"t = " + a', "'t = ' + str(a)"),
+        ("a % 2", "a % 2"),
+        ("a * -1", "a * -1"),
+        ("Infinity * a", "inf * a"),
+        ("cast(int, a)", "int(a)"),
+        ("log10(a)", "log(a, 10)"),
+    ],
+)
+def test_how_it_is_said(text: str, expected: str) -> None:
+    names = {name: name for name in ("a", "b", "t", "r", "array")}
+
+    def scope(name: str) -> object:
+        return PARAMETERS[name]
+
+    found = translated(parse(text), names, scope)
+    assert found == expected
+    given = {"a": 2, "b": 5, "t": True, "r": {"f": 1.5}, "array": [7, 8, 9]}
+    ours = own_evaluate(found, given)
+    theirs = evaluate(parse(text), lambda name: given[name] if name in given else PARAMETERS[name])
+    assert (ours, type(ours)) == (theirs, type(theirs))
