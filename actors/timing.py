@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from bisect import insort
 from collections import deque
 from typing import Any
@@ -50,28 +49,31 @@ class TimeDelay(Actor):
 class _Steps:
     """What a delay holds that keeps microsteps: as in Ptolemy, where an actor has a firing for each token that comes.
 
-    In each of them one leaves at most that is due, and what is left is looked at again at the next microstep.
+    In each of them one leaves at most that is due, and what is left is looked at again at the next microstep.  Of those
+    that are to leave at one time, a new one is the last, or the first if its microstep is below that of the very last.
     """
 
     def __init__(self, actor: TimeDelay) -> None:
         self._actor = actor
-        self._line: list[tuple[int, int, int, Any]] = []  # tokens with their times, microsteps and numbers
-        self._number = 0
+        self._line: list[tuple[Tag, Any]] = []  # in the order in which they leave
 
     def put(self, token: Any, delay: float) -> None:
         """Keep a token for ``delay`` seconds; 0 is the next microstep."""
-        now, wake = self._actor.tag, self._actor.wake_in(delay)
-        microstep = now.microstep if wake.time > now.time else wake.microstep
-        heapq.heappush(self._line, (wake.time, microstep, self._number, token))
-        self._number += 1
+        now, wake, line = self._actor.tag, self._actor.wake_in(delay), self._line
+        tag = Tag(wake.time, now.microstep if wake.time > now.time else wake.microstep)
+        is_last = not line or tag.microstep >= line[-1][0].microstep
+        place = len(line)
+        while place and (line[place - 1][0].time > tag.time or (line[place - 1][0].time == tag.time and not is_last)):
+            place -= 1
+        line.insert(place, (tag, token))
 
     def due(self) -> list[Any]:
         """Take out what leaves now."""
-        now, found = self._actor.tag, list[Any]()
+        now, line, found = self._actor.tag, self._line, list[Any]()
         most = max(1, len(self._actor.input.tokens))
-        while self._line and self._line[0][:2] <= now and len(found) < most:
-            found.append(heapq.heappop(self._line)[3])
-        if self._line and self._line[0][0] <= now.time:
+        while line and line[0][0] <= now and len(found) < most:
+            found.append(line.pop(0)[1])
+        if line and line[0][0].time <= now.time:
             self._actor.wake_in(0)
         return found
 

@@ -6,7 +6,17 @@ from typing import Any, ClassVar
 
 import pytest
 
-from epicycle.actors import Actor, Configurable, InputPort, OutputPort, Parameter, ParameterError, PortError, TimeDelay
+from epicycle.actors import (
+    Actor,
+    Configurable,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    PortError,
+    Tag,
+    TimeDelay,
+)
 from epicycle.aspects import Bus
 from epicycle.runner.build import Model
 from epicycle.runner.engine import Simulation
@@ -198,6 +208,24 @@ connections: [{from: t.output, to: twice.input, delay: 0}, twice.output -> delay
         (0.0, 3, (0,)),
         (0.0, 4, (0,)),
     ]
+
+
+def test_tokens_of_a_delay_that_leave_at_one_time() -> None:
+    """A new one is the last of them, unless its microstep is below that of the last of all: then it is the first."""
+    model = Model("m", like="ptolemy", stop=4)
+    delay = model.add(TimeDelay("delay"))
+    source = model.add(Wakes("source", at=[0]))
+    model.connect(source.output, delay.input)
+    simulation = Simulation(model)
+    simulation.advance(until=0.5)
+    held: Any = simulation[delay].__dict__["_held"]
+    for seconds, token in ((2.0, "a"), (1.0, "b"), (2.0, "c"), (3.0, "d"), (1.0, "e")):
+        held.put(token, seconds)
+    assert [token for _, token in held._line] == ["b", "e", "a", "c", "d"]
+    last, token = held._line[-1]
+    held._line[-1] = Tag(last.time, 9), token
+    held.put("f", 2.0)
+    assert [token for _, token in held._line] == ["b", "e", "f", "a", "c", "d"]
 
 
 @pytest.mark.parametrize(("factor", "plain", "stepping"), [(0, [1, 1, 1], [2, 3, 4]), (1, [1, 1, 1], [1, 1, 1])])
