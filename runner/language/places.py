@@ -70,7 +70,7 @@ CONNECTION = Construct(
         ),
         "shared": Key(
             FLAG,
-            "All that it joins is one channel at each port, as by a relation in Ptolemy; otherwise each of its ways is one.",
+            "All that it joins is one channel at each port, as a relation is in Ptolemy; if not, each of its ways is.",
             called="'shared' of a connection",
         ),
         "delay": Key(
