@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 from epicycle.actors import Actor as OwnActor
@@ -51,6 +52,7 @@ class Conversion:
             self.rows[id(each)] = self._row(each, own) if is_row else None
         self._scopes: dict[int, Scope] = {}
         self._nets: dict[int, list[Net]] = {}
+        self._at: dict[int, dict[tuple[str, str], list[Net]]] = {}
         self.version = version_of(model)
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
@@ -276,6 +278,15 @@ class Conversion:
             self._nets[id(composite)] = self.wiring.nets(composite) if id(composite) in self.wiring.groups else []
         return self._nets[id(composite)]
 
+    def nets_at(self, composite: Entity, actor: str, port: str) -> list[Net]:
+        """The nets at a port of a child, or with no actor at a port of the composite itself."""
+        if id(composite) not in self._at:
+            found = self._at[id(composite)] = {}
+            for net in self.nets_of(composite):
+                for place in dict.fromkeys((end.actor, end.port) for end in net.ends):
+                    found.setdefault(place, []).append(net)
+        return self._at[id(composite)].get((actor, port), [])
+
     def port_name(self, names: Names, port: str, channel: int) -> str:
         """Our name for a channel of a composite's port: each channel is a port by itself."""
         return names.of(port) if channel == 0 else names.of(f"{port}_{channel}")
@@ -299,7 +310,7 @@ class Conversion:
             return None
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
-            f".{self.model.name}.{level.told(child.name)}", self._seed(), whole_ports(self, level.entity, child),
+            f".{self.model.name}.{level.told(child.name)}", self._seed, whole_ports(self, level.entity, child),
             {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
         )  # fmt: skip
         actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
@@ -310,6 +321,7 @@ class Conversion:
             self.variables.note_setter(child, level, part)
         return part
 
+    @cached_property
     def _seed(self) -> object:
         """The seed that all random actors share: a value that one of them gives counts for the others."""
         for each in self.model.everything():

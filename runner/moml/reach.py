@@ -57,8 +57,6 @@ def _idle(conversion: Converting, composite: Entity, counting: Counting) -> list
 def _is_fed(conversion: Converting, composite: Entity, child: Entity, port: str, counting: Counting) -> bool:
     """Whether anything sends to a port."""
     path = f"{child.name}.{port}"
-    for net in conversion.nets_of(composite):
-        is_here = any(each.actor == child.name and each.port == port for each in net.ends)
-        if is_here and counting.senders(composite, net.ends):
-            return True
+    if any(counting.senders(composite, net.ends) for net in conversion.nets_at(composite, child.name, port)):
+        return True
     return conversion.triggers.get((id(composite), path), "") != ""
