@@ -14,13 +14,13 @@ from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
 from .counterpart import UNSAID, Counterpart, counterpart_of_type
-from .directors import director_of, fires_whole, said_of
+from .directors import director_of, said_of
 from .entities import Entity, Property, kind
 from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
 from .parts import Level, Part
-from .reach import leave_out_idle
+from .reach import iterations, leave_out_idle
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
@@ -59,7 +59,7 @@ class Conversion:
         self.variables = Variables(self)
         self.idle: set[int] = set()  # what never fires
         self.wiring = Wiring(model, self.face, self._width)
-        self.triggers = self._iterations()
+        self.triggers = iterations(self)
         leave_out_idle(self)
 
     def _row(self, entity: Entity, own: Mapping[str, type[OwnActor]]) -> Counterpart | None:
@@ -118,22 +118,6 @@ class Conversion:
             names.append(around.name)
             around = outer
         return ".".join(reversed(names))
-
-    def _iterations(self) -> dict[tuple[int, str], str]:
-        """The inputs of composites that trigger what fires in each iteration of their director, by its trigger."""
-        found = {}
-        for composite in self.model.everything():
-            director = director_of(composite) if composite is not self.model else None
-            if director is None or not fires_whole(director):
-                continue
-            inputs = [
-                name for name, port in composite.ports.items() if port.flag("input") and composite.links.get(name)
-            ]
-            for child in composite.entities.values() if inputs else ():
-                row = self.rows.get(id(child))
-                if row is not None and "trigger" in row.ports and not composite.links.get(f"{child.name}.trigger"):
-                    found[id(composite), f"{child.name}.trigger"] = inputs[0]
-        return found
 
     # -- composites -----------------------------------------------------------------------------------------------
 
