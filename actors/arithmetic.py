@@ -41,7 +41,7 @@ class AddSubtract(Actor):
     def fire(self) -> None:
         for plus, minus in rounds(self.plus, self.minus):
             above, below = present(plus), present(minus)
-            if all(isinstance(token, (int, float)) for token in above + below):
+            if self.output.type is float or all(isinstance(token, (int, float)) for token in above + below):
                 self.output.send(elementary.total(above) - elementary.total(below))
             else:
                 self.output.send(reduce(_less, below, reduce(_added, above[1:], above[0] if above else 0)))
@@ -124,9 +124,8 @@ class Extreme(Actor):
 
 
 class Scale(Actor):
-    """Multiplies each token: ``factor * input + offset``.
+    """Multiplies each token: ``factor * input + offset``; under ``like: ptolemy`` of a list each item.
 
-    Of a list each item is; under ``like: ptolemy`` the port takes lists.
     Ptolemy: ``Scale``, ``AddSubtract`` with a constant.
     """
 
@@ -138,7 +137,7 @@ class Scale(Actor):
 
     def fire(self) -> None:
         for token in self.input.tokens:
-            if isinstance(token, (int, float)):
+            if self.output.type is float or isinstance(token, (int, float)):
                 self.output.send(self.factor * token + self.offset)
             else:
                 scaled = _item_by_item(token, self.factor, operator.mul)

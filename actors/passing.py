@@ -1,4 +1,4 @@
-"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Previous, Register, Wire, BooleanSelect,
+"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Previous, Register, LatestOfAll, BooleanSelect,
 Commutator, Sequencer, Default, IsPresent."""
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class Register(MostRecent):
         self.note()
 
 
-class Wire(ByChannel):
+class LatestOfAll(ByChannel):
     """Sends the latest token of every channel whenever one comes on any of them.
 
     A channel on which no token has come yet sends ``initial``, or nothing if that is not given.  Ptolemy: ``Wire``.

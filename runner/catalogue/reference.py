@@ -114,7 +114,8 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
                 port.doc,
                 getattr(port, "triggers", True),
                 getattr(port, "keep", False),
-                port.ptolemy,
+                port.ptolemy
+                and {key: type_name(each) if key == "type" else each for key, each in port.ptolemy.items()},
             )
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),

@@ -316,7 +316,7 @@ cdef class RecorderForm(Native):
 SOURCES = (
     ("accumulation.py", "Counter", "511f83c57109ba7d"),
     ("accumulation.py", "Integrator", "a12ab980076fc006"),
-    ("arithmetic.py", "AddSubtract", "d542b33b8ebab49e"),
+    ("arithmetic.py", "AddSubtract", "208b5fc20a1e18d8"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),
     ("distributions.py", "Gamma", "561c0e5a4a78963b"),
     ("distributions.py", "Normal", "41b7f712051a423b"),
@@ -338,7 +338,7 @@ SOURCES = (
     ("sources.py", "Clock", "e8869bd338027fbd"),
     ("sources.py", "PoissonClock", "47664d47db418e38"),
     ("sources.py", "_Ticking", "3720b339ddf2994e"),
-    ("arithmetic.py", "Scale", "d30f43b614b1f20e"),
+    ("arithmetic.py", "Scale", "8aa8628e425a69a5"),
     ("timing.py", "TimeDelay", "2525e8b2de82467c"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),

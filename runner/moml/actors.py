@@ -8,6 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from epicycle.actors import ParameterError, declared_parameters
+
+from ..catalogue import built_in
 from .counterpart import UNSAID, Counterpart, ParameterSaid
 from .entities import Entity, Property
 from .notes import Notes
@@ -102,7 +105,8 @@ class Actor:
         for name, row in self.row.parameters.items():
             if name not in self.told:
                 self._parameter(name, row)
-        self.values = {**self.row.fixed, **self.values}
+        given = {name: value for name, value in self.values.items() if not self._is_default(name, value)}
+        self.values = {**self.row.fixed, **given}
         for name, said in self.entity.properties.items():
             if name in self.told or name in self.row.parameters or name in _UNIMPORTANT or not said.value:
                 continue
@@ -114,6 +118,19 @@ class Actor:
                 self._limit(name)
             elif not self._is_only_named(name, said):
                 self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: has no counterpart")
+
+    def _is_default(self, name: str, value: object) -> bool:
+        """Whether our actor has this value anyway, under a director that is like Ptolemy's."""
+        kind = built_in().actors.get(self.row.type)
+        parameter = None if kind is None or "type" in self.values else declared_parameters(kind).get(name)
+        if parameter is None or parameter.required or (isinstance(value, str) and "${" in value):
+            return False
+        try:
+            found = parameter.convert(value)
+        except ParameterError:
+            return False
+        default = parameter.ptolemy_value if parameter.differs else parameter.default_value
+        return isinstance(found, (bool, int, float, str)) and type(found) is type(default) and found == default
 
     def _limit(self, name: str) -> None:
         """After so many firings it is over; 0 is no limit."""

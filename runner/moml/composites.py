@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 from epicycle.actors import Actor as OwnActor
@@ -13,13 +14,13 @@ from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
 from .counterpart import UNSAID, Counterpart, counterpart_of_type
-from .directors import director_of, fires_whole, said_of
+from .directors import director_of, said_of
 from .entities import Entity, Property, kind
 from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
 from .parts import Level, Part
-from .reach import leave_out_idle
+from .reach import iterations, leave_out_idle
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
@@ -51,13 +52,14 @@ class Conversion:
             self.rows[id(each)] = self._row(each, own) if is_row else None
         self._scopes: dict[int, Scope] = {}
         self._nets: dict[int, list[Net]] = {}
+        self._at: dict[int, dict[tuple[str, str], list[Net]]] = {}
         self.version = version_of(model)
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
         self.variables = Variables(self)
         self.idle: set[int] = set()  # what never fires
         self.wiring = Wiring(model, self.face, self._width)
-        self.triggers = self._iterations()
+        self.triggers = iterations(self)
         leave_out_idle(self)
 
     def _row(self, entity: Entity, own: Mapping[str, type[OwnActor]]) -> Counterpart | None:
@@ -116,22 +118,6 @@ class Conversion:
             names.append(around.name)
             around = outer
         return ".".join(reversed(names))
-
-    def _iterations(self) -> dict[tuple[int, str], str]:
-        """The inputs of composites that trigger what fires in each iteration of their director, by its trigger."""
-        found = {}
-        for composite in self.model.everything():
-            director = director_of(composite) if composite is not self.model else None
-            if director is None or not fires_whole(director):
-                continue
-            inputs = [
-                name for name, port in composite.ports.items() if port.flag("input") and composite.links.get(name)
-            ]
-            for child in composite.entities.values() if inputs else ():
-                row = self.rows.get(id(child))
-                if row is not None and "trigger" in row.ports and not composite.links.get(f"{child.name}.trigger"):
-                    found[id(composite), f"{child.name}.trigger"] = inputs[0]
-        return found
 
     # -- composites -----------------------------------------------------------------------------------------------
 
@@ -276,6 +262,15 @@ class Conversion:
             self._nets[id(composite)] = self.wiring.nets(composite) if id(composite) in self.wiring.groups else []
         return self._nets[id(composite)]
 
+    def nets_at(self, composite: Entity, actor: str, port: str) -> list[Net]:
+        """The nets at a port of a child, or with no actor at a port of the composite itself."""
+        if id(composite) not in self._at:
+            found = self._at[id(composite)] = {}
+            for net in self.nets_of(composite):
+                for place in dict.fromkeys((end.actor, end.port) for end in net.ends):
+                    found.setdefault(place, []).append(net)
+        return self._at[id(composite)].get((actor, port), [])
+
     def port_name(self, names: Names, port: str, channel: int) -> str:
         """Our name for a channel of a composite's port: each channel is a port by itself."""
         return names.of(port) if channel == 0 else names.of(f"{port}_{channel}")
@@ -299,7 +294,7 @@ class Conversion:
             return None
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
-            f".{self.model.name}.{level.told(child.name)}", self._seed(), whole_ports(self, level.entity, child),
+            f".{self.model.name}.{level.told(child.name)}", self._seed, whole_ports(self, level.entity, child),
             {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
         )  # fmt: skip
         actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
@@ -310,6 +305,7 @@ class Conversion:
             self.variables.note_setter(child, level, part)
         return part
 
+    @cached_property
     def _seed(self) -> object:
         """The seed that all random actors share: a value that one of them gives counts for the others."""
         for each in self.model.everything():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import Actor
+from epicycle.actors import Actor, visible_lines
 
 from .actors import seconds
 from .channels import join_channels
@@ -107,7 +107,7 @@ def _start(said: Mapping[str, Any]) -> float:
 
 def _comment(file: str, notes: Notes) -> list[str]:
     lines = [f"# Imported from {file}, a model of Ptolemy II; {notes.summary()}."]
-    return lines + [f"# - {' '.join(each.split())}" for each in notes.lines]
+    return lines + [f"# - {visible_lines(' '.join(each.split()))}" for each in notes.lines]
 
 
 def _check(text: str, file: str, load: Callable[[Path], object]) -> None:

@@ -7,6 +7,7 @@ from collections import Counter
 from epicycle.actors import InputPort, declared_ports
 
 from ..catalogue import built_in
+from .directors import director_of, fires_whole
 from .entities import Entity
 from .parts import Converting
 from .wires import Counting
@@ -57,8 +58,21 @@ def _idle(conversion: Converting, composite: Entity, counting: Counting) -> list
 def _is_fed(conversion: Converting, composite: Entity, child: Entity, port: str, counting: Counting) -> bool:
     """Whether anything sends to a port."""
     path = f"{child.name}.{port}"
-    for net in conversion.nets_of(composite):
-        is_here = any(each.actor == child.name and each.port == port for each in net.ends)
-        if is_here and counting.senders(composite, net.ends):
-            return True
+    if any(counting.senders(composite, net.ends) for net in conversion.nets_at(composite, child.name, port)):
+        return True
     return conversion.triggers.get((id(composite), path), "") != ""
+
+
+def iterations(conversion: Converting) -> dict[tuple[int, str], str]:
+    """The inputs of composites that trigger what fires in each iteration of their director, by its trigger."""
+    found = {}
+    for composite in conversion.model.everything():
+        director = director_of(composite) if composite is not conversion.model else None
+        if director is None or not fires_whole(director):
+            continue
+        inputs = [name for name, port in composite.ports.items() if port.flag("input") and composite.links.get(name)]
+        for child in composite.entities.values() if inputs else ():
+            row = conversion.rows.get(id(child))
+            if row is not None and "trigger" in row.ports and not composite.links.get(f"{child.name}.trigger"):
+                found[id(composite), f"{child.name}.trigger"] = inputs[0]
+    return found

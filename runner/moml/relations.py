@@ -51,7 +51,10 @@ class Groups:
                 self._of[self._root(one)] = self._root(other)
                 self.joined.setdefault(one, []).append((order, other))
                 self.joined.setdefault(other, []).append((order, one))
-        self.width: dict[str, int | None] = {self._root(name): None for name in self._of}
+        self._members: dict[str, list[str]] = {}
+        for name in self._of:
+            self._members.setdefault(self._root(name), []).append(name)
+        self.width: dict[str, int | None] = dict.fromkeys(self._members)
 
     def _root(self, name: str) -> str:
         while self._of[name] != name:
@@ -72,7 +75,7 @@ class Groups:
 
     def members(self, group: str) -> list[str]:
         """The relations of a group."""
-        return [name for name in self._of if self._root(name) == group]
+        return self._members[group]
 
 
 class Wiring:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle import actors
 from epicycle.actors import declared_parameters
 
+from .actors import plain
 from .names import Names
 from .scope import is_text
 from .syntax import ExpressionError
@@ -84,17 +85,18 @@ def _test(actor: Actor, *, strict: bool) -> None:
     actor.told.add("correctValues")
     try:
         values = [True] if said is None else actor.scope.value_of(said)
-    except ExpressionError as error:
+        written = plain(values if isinstance(values, list) else [values])
+    except (ExpressionError, ValueError) as error:
         actor.notes.note(f"{actor.path} checks nothing: correctValues: {error}")
         _records(actor)
         return
-    values = values if isinstance(values, list) else [values]
-    by_channel = strict and bool(values) and all(type(each) is list for each in values)
+    assert isinstance(written, list)
+    by_channel = strict and isinstance(values, list) and bool(values) and all(type(each) is list for each in values)
     if by_channel and actor.widths.get("input", 1) > 1:
         actor.values["together"] = True
-    elif by_channel and all(len(each) == 1 for each in values):
-        values = [each[0] for each in values]
-    actor.values = {"values": values, **actor.values}
+    elif by_channel and all(len(each) == 1 for each in written):
+        written = [each[0] for each in written]
+    actor.values = {"values": written, **actor.values}
 
 
 def _records(actor: Actor) -> None:

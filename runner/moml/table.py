@@ -134,7 +134,7 @@ _FLOW: Mapping[str, Counterpart] = {
     "EventFilter": counterpart("Filter"),
     "TrueGate": counterpart("Filter"),
     "SuppressSimultaneousEvents": counterpart("FirstOfInstant"),
-    "Wire": counterpart("Wire", "input* | output*", initialValue="value:initial=0"),
+    "Wire": counterpart("LatestOfAll", "input* | output*", initialValue="value:initial=0"),
     "Switch": counterpart("Switch", "input control | output*"),
     "BooleanSwitch": counterpart("BooleanSwitch", "input* control | trueOutput* falseOutput*"),
     "ConfigurationSwitch": counterpart(

@@ -17,11 +17,7 @@ def whole_ports(conversion: Converting, composite: Entity, child: Entity) -> fro
     """The ports of a child at which only whole numbers come, as far as its senders beside it tell."""
     found = set()
     for port in child.ports:
-        nets = [
-            net
-            for net in conversion.nets_of(composite)
-            if any((e.actor, e.port) == (child.name, port) for e in net.ends)
-        ]
+        nets = conversion.nets_at(composite, child.name, port)
         senders = [
             (composite.entities.get(end.actor), end.port)
             for net in nets

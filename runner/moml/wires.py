@@ -112,18 +112,18 @@ class Counting:
             return 1
         # On the other side of a composite's port.
         if end.actor:
-            inside, port = child, f"{end.port}"
+            inside, actor = child, ""
         else:
-            inside, port = conversion.container_of(composite), f"{composite.name}.{end.port}"
+            inside, actor = conversion.container_of(composite), composite.name
         if inside is None:
             return 0
         if is_machine(inside):  # whose refinements are joined with its ports by their names
             return 1
-        key = (id(inside), port, end.channel, senders)
+        key = (id(inside), f"{actor}.{end.port}", end.channel, senders)
         if key not in self._found:
             self._found[key] = 0
-            for net in conversion.nets_of(inside):
-                here = [each for each in net.ends if f"{each.actor}.{each.port}".lstrip(".") == port]
+            for net in conversion.nets_at(inside, actor, end.port):
+                here = [each for each in net.ends if (each.actor, each.port) == (actor, end.port)]
                 if any(each.channel == end.channel for each in here):
                     others = [each for each in net.ends if each not in here]
                     self._found[key] = min(self._found[key] + self._all(inside, others, senders=senders), 2)

@@ -41,7 +41,7 @@ def scalar(value: object, *, flow: bool = False) -> str:
         and not text.startswith("- ")
         and not re.match(r"\.?(inf|nan|\d)", text, re.IGNORECASE)
     )
-    return text if is_plain else json.dumps(text, ensure_ascii=False)
+    return text if is_plain else json.dumps(text, ensure_ascii=not text.isprintable())
 
 
 def line(value: object) -> str:
