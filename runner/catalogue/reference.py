@@ -30,7 +30,8 @@ from epicycle.aspects import Aspect
 class PortReference:
     """A port of an actor type; ``depends_on`` is for outputs, None where it is all inputs.
 
-    ``ptolemy`` is what is else under a director that is like Ptolemy's, by the names of these attributes.
+    ``ptolemy`` is what is else under a director that is like Ptolemy's, by the names of these attributes and as they
+    have it.
     """
 
     name: str
@@ -114,8 +115,7 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
                 port.doc,
                 getattr(port, "triggers", True),
                 getattr(port, "keep", False),
-                port.ptolemy
-                and {key: type_name(each) if key == "type" else each for key, each in port.ptolemy.items()},
+                _in_words(port.ptolemy),
             )
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),
@@ -126,6 +126,13 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
         alters_parameters=issubclass(cls, Aspect) and cls.alters_parameters,
         reports=dict(cls.reports) if issubclass(cls, Aspect) else {},
     )
+
+
+def _in_words(options: Mapping[str, object] | None) -> dict[str, object] | None:
+    """Options of a port, its type by its name."""
+    if options is None:
+        return None
+    return {option: type_name(value) if option == "type" else value for option, value in options.items()}
 
 
 def _parameter(parameter: Parameter[object]) -> ParameterReference:

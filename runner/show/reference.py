@@ -219,10 +219,12 @@ def facts(reference: TypeReference) -> list[str]:
 def _port_row(port: PortReference) -> list[str]:
     notes = ", ".join(_notes(port))
     if port.ptolemy:
-        options: dict[str, Any] = {option: value for option, value in port.ptolemy.items() if option != "type"}
-        there = _notes(replace(port, **options)) or [
-            "required" if port.direction == "input" else "depends on all inputs"
-        ]
+        options: dict[str, Any] = dict(port.ptolemy)
+        there = [options.pop("type")] if "type" in options else []
+        if options:
+            there += _notes(replace(port, **options)) or [
+                "required" if port.direction == "input" else "depends on all inputs"
+            ]
         notes += ("; " if notes else "") + f"like Ptolemy {', '.join(there)}"
     return [port.name, port.type, notes, port.doc]
 

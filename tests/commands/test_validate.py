@@ -117,8 +117,9 @@ m.yaml:19:55: error: e.distribution: Exponential has no parameter 'men', did you
    19 |   e: {type: Server, distribution: {type: Exponential, men: 1 min}}
       |                                                       ^^^
 
-m.yaml:20:42: error: f.distribution: 'Exponentil' is not one of Bernoulli, Choice, Constant, Exponential, Gamma, \
-LogNormal, Normal, RandomInteger, Triangular, Uniform, did you mean 'Exponential'?
+m.yaml:20:42: error: f.distribution: 'Exponentil' is not one of Bernoulli, Binomial, Cauchy, ChiSquare, \
+Choice, Constant, Exponential, Gamma, LogNormal, NegativeBinomial, Normal, Poisson, RandomInteger, StudentT, \
+Triangular, Uniform, VonMises, did you mean 'Exponential'?
    20 |   f: {type: Random, distribution: {type: Exponentil}}
       |                                          ^^^^^^^^^^
 
