@@ -12,8 +12,10 @@ DURATIONS = {
     "collision_avoidance": 0.5,
     "lift_group": 600.0,
     "machine_shop": 40_000.0,
-    "switched_network": 2.0,
-    "warehouse": 3600.0,
+    "pid_loop": 10.0,
+    "switched_network": 1.5,
+    "warehouse": 1800.0,
+    "waypoints": 20.0,
 }
 
 

@@ -287,7 +287,7 @@ def test_a_process_is_halted_in_the_step_in_which_what_it_waits_for_happens(beha
 def test_a_process_that_nobody_else_knows_goes_on_waiting_for_a_token(behave: Callable[..., Results]) -> None:
     def behaviour(actor: Script) -> Generator[Any, Any, None]:
         actor.environment.process(hear(actor))
-        while True:
+        for _ in range(4):
             yield actor.wait(0.3)
             gc.collect()  # a process of SimPy's and the event it waits for hold each other alone
 

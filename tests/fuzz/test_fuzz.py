@@ -12,15 +12,17 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_mutants_of_good_models(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "mutants"), [(1, 500), pytest.param(2, 2_000, marks=pytest.mark.slow)])
+def test_mutants_of_good_models(seed: int, mutants: int) -> None:
     # In a process of its own, which watches what it opens, and whose memory is limited.
-    command = [sys.executable, "-m", "tests.fuzz.fuzz", "--mutants", "1000", "--seed", str(seed), "--jobs", "1"]
+    command = [sys.executable, "-m", "tests.fuzz.fuzz", "--mutants", str(mutants), "--seed", str(seed), "--jobs", "1"]
     done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
-    counted = re.search(r"1,000 mutants: (\d+) rejected, (\d+) accepted, (\d+) run", done.stdout.splitlines()[-2])
+    counted = re.search(
+        rf"{mutants:,} mutants: (\d+) rejected, (\d+) accepted, (\d+) run", done.stdout.splitlines()[-2]
+    )
     assert counted is not None
     rejected, accepted, run = map(int, counted.groups())
-    assert rejected + accepted == 1_000
-    assert rejected > 500
-    assert run > 50
+    assert rejected + accepted == mutants
+    assert rejected > mutants / 2
+    assert run > mutants / 20
