@@ -14,6 +14,18 @@ from epicycle.runner.build import Model, load_model
 from epicycle.runner.engine import Results, Simulation
 
 
+class Repeat(Actor):
+    """Sends every token twice."""
+
+    input: InputPort[Any] = InputPort(Any)
+    output: OutputPort[Any] = OutputPort(Any)
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self.output.send(token)
+            self.output.send(token)
+
+
 class Ticker(Actor):
     """Counts at a period, the first time at once."""
 

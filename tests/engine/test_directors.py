@@ -17,19 +17,7 @@ from epicycle.aspects import JoinPoint, PortAspect
 from epicycle.runner.engine import ActorError
 from epicycle.runner.graph import Clock
 from epicycle.runner.text import ModelError
-from tests.engine.engine_parts import Plan, load, seen, sends, simulate
-
-
-class Repeat(Actor):
-    """Sends every token twice."""
-
-    input: InputPort[Any] = InputPort(Any)
-    output: OutputPort[Any] = OutputPort(Any)
-
-    def fire(self) -> None:
-        for token in self.input.tokens:
-            self.output.send(token)
-            self.output.send(token)
+from tests.engine.engine_parts import Plan, Repeat, load, seen, sends, simulate
 
 
 class Time(Actor):

@@ -21,19 +21,7 @@ from epicycle.aspects import Bus
 from epicycle.runner.build import Model
 from epicycle.runner.engine import Simulation
 from epicycle.runner.text import ModelError
-from tests.engine.engine_parts import Probe, Ticker, load, seen, sends, simulate
-
-
-class Repeat(Actor):
-    """Sends every token twice."""
-
-    input: InputPort[Any] = InputPort(Any)
-    output: OutputPort[Any] = OutputPort(Any)
-
-    def fire(self) -> None:
-        for token in self.input.tokens:
-            self.output.send(token)
-            self.output.send(token)
+from tests.engine.engine_parts import Probe, Repeat, Ticker, load, seen, sends, simulate
 
 
 class Hold(Actor):

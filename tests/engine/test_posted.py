@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Pending
 from epicycle.runner.engine import Firing, Simulation, Tracer
-from tests.engine.engine_parts import load, sends, simulate
+from tests.engine.engine_parts import Repeat, load, sends, simulate
 
 
 class Asker(Actor):
@@ -49,18 +49,6 @@ class Delay(Actor):
         self.output.send((len(due), len(self.input.tokens)))
         for token in self.input.tokens:
             self.held.put(token, 1.0)
-
-
-class Repeat(Actor):
-    """Sends every token twice."""
-
-    input: InputPort[Any] = InputPort(Any)
-    output: OutputPort[Any] = OutputPort(Any)
-
-    def fire(self) -> None:
-        for token in self.input.tokens:
-            self.output.send(token)
-            self.output.send(token)
 
 
 class Pair(Actor):
