@@ -19,10 +19,10 @@ def test_mutants_of_good_models(seed: int, mutants: int) -> None:
     done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     counted = re.search(
-        rf"{mutants:,} mutants: (\d+) rejected, (\d+) accepted, (\d+) run", done.stdout.splitlines()[-2]
+        rf"{mutants:,} mutants: ([\d,]+) rejected, ([\d,]+) accepted, ([\d,]+) run", done.stdout.splitlines()[-2]
     )
     assert counted is not None
-    rejected, accepted, run = map(int, counted.groups())
+    rejected, accepted, run = (int(each.replace(",", "")) for each in counted.groups())
     assert rejected + accepted == mutants
     assert rejected > mutants / 2
     assert run > mutants / 20
