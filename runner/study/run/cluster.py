@@ -208,7 +208,7 @@ class Cluster:
                 else:
                     self._keeper.again(task, "the Dask workers that made it ended, one after the other")
             return
-        except (CancelledError, asyncio.CancelledError) as error:
+        except (CancelledError, asyncio.CancelledError, self._distributed.core.CommClosedError) as error:
             raise self._lost() from error
         except WorkerError:
             raise
