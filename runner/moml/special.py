@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from epicycle import actors
@@ -150,6 +151,42 @@ def formula(template: str, **defaults: object) -> Special:
         actor.values["expression"] = re.sub(r"\{(\w+)\}", lambda match: said[match[1]], template)
 
     return convert
+
+
+def single(port: str) -> Special:
+    """An actor whose channels go their own ways, which ours cannot."""
+
+    def convert(actor: Actor) -> None:
+        if (width := actor.widths.get(port, 0)) > 1:
+            actor.notes.error(f"{actor.path}.{port} has {width} channels, each of which has no counterpart")
+
+    return convert
+
+
+def quantizer(actor: Actor) -> None:
+    """Quantizer: the level that is nearest, of two the lower one; without levels, steps from 0 on."""
+    levels = [float(each) for each in actor.get("levels", [-1.0, 1.0]) or ()]
+    step = float(actor.get("delta", 1.0))
+    if not levels:
+        actor.values["expression"] = f"{step!r} * floor(input / {step!r})"
+        return
+    parts = [f"{low!r} if input <= {(low + high) / 2.0!r} else " for low, high in pairwise(levels)]
+    actor.values["expression"] = "".join(parts) + (repr(levels[-1]) if parts else f"input * 0.0 + {levels[-1]!r}")
+
+
+def decibel(actor: Actor) -> None:
+    """DB: of an amplitude, or of a power, and no less than its ``min``."""
+    factor = 10.0 if actor.get("inputIsPower", False) is True else 20.0
+    least = float(actor.get("min", -100.0))
+    actor.values["expression"] = f"max({factor} * log(input, 10), {least!r}) if input > 0 else {least!r}"
+
+
+def array_sort(actor: Actor) -> None:
+    """ArraySort, in one direction or the other, of equals all or one."""
+    text = "sorted(input)"
+    if actor.get("allowDuplicates", True) is False:
+        text = f"[{text}[k] for k in range(len(input)) if k == 0 or {text}[k] != {text}[k - 1]]"
+    actor.values["expression"] = text if actor.get("ascending", True) is not False else f"{text}[::-1]"
 
 
 def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Special:

@@ -134,6 +134,7 @@ _FLOW: Mapping[str, Counterpart] = {
     "EventFilter": counterpart("Filter"),
     "TrueGate": counterpart("Filter"),
     "SuppressSimultaneousEvents": counterpart("FirstOfInstant"),
+    "SamplerWithDefault": counterpart("MostRecent", "input* trigger* | output*", initialValue="value:initial"),
     "Wire": counterpart("LatestOfAll", "input* | output*", initialValue="value:initial=0"),
     "Switch": counterpart("Switch", "input control | output*"),
     "BooleanSwitch": counterpart("BooleanSwitch", "input* control | trueOutput* falseOutput*"),
@@ -172,6 +173,8 @@ _FLOW: Mapping[str, Counterpart] = {
 }
 
 _GATES = {each: each for each in ("and", "or", "xor", "nand", "nor", "xnor")}
+_DOUBLE = counterpart("Expression", "input=input | output", special=how.formula("float(input)"))
+_DECIBEL = counterpart("Expression", "input=input | output", special=how.decibel)
 _COMPUTING: Mapping[str, Counterpart] = {
     "Comparator": counterpart(
         "Comparator",
@@ -186,7 +189,9 @@ _COMPUTING: Mapping[str, Counterpart] = {
         "LogicGate", "input* | output", special=how.choice("function", "function", "and", _GATES)
     ),
     "LogicGate": counterpart("LogicGate", "input* | output", special=how.choice("logic", "function", "and", _GATES)),
-    "LogicalNot": counterpart("LogicGate", "input* | output*", fixed={"function": "not"}),
+    "LogicalNot": counterpart(
+        "LogicGate", "input* | output*", special=how.single("input"), fixed={"function": "not"}
+    ),
     "AddSubtract": counterpart("AddSubtract", "plus* minus* | output"),
     "MultiplyDivide": counterpart("MultiplyDivide", "multiply* divide* | output"),
     "Scale": counterpart("Scale", "input factor | output", factor="number"),
@@ -220,6 +225,7 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "Expression": counterpart("Expression", "| output", special=how.expression),
     "LookupTable": counterpart("LookupTable", table="list:values"),
     "Limiter": counterpart("Limiter", special=how.limiter),
+    "Quantizer": counterpart("Expression", "input=input | output", special=how.quantizer),
     "Maximum": counterpart("Extreme", "input* | maximumValue=value channelNumber=channel", fixed={"take": "greatest"}),
     "Minimum": counterpart("Extreme", "input* | minimumValue=value channelNumber=channel", fixed={"take": "least"}),
     "Average": counterpart("MovingAverage", fixed={"span": "1e8 s"}),
@@ -239,7 +245,12 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "ArrayMinimum": counterpart("Expression", "input=input | output", special=how.formula("min(input)")),
     "ArrayMaximum": counterpart("Expression", "input=input | output", special=how.formula("max(input)")),
     "ArrayAverage": counterpart("Expression", "input=input | output", special=how.formula("sum(input) / len(input)")),
-    "ArraySort": counterpart("Expression", "input=input | output", special=how.formula("sorted(input)")),
+    "ArraySort": counterpart("Expression", "input=input | output", special=how.array_sort),
+    "DotProduct": counterpart(
+        "Expression",
+        "input1=input1 input2=input2 | output",
+        special=how.formula("sum([input1[k] * input2[k] for k in range(len(input1))])"),
+    ),
     "ArrayContains": counterpart(
         "Expression", "array=array element=element | output", special=how.formula("{element} in array")
     ),
@@ -266,6 +277,13 @@ _COMPUTING: Mapping[str, Counterpart] = {
         "input=input | output",
         special=how.formula("{trueValue} if input else {falseValue}", trueValue=True, falseValue=False),
     ),
+    "DB": _DECIBEL,
+    "dB": _DECIBEL,
+    "LongToDouble": _DOUBLE,
+    "AnythingToDouble": _DOUBLE,
+    "StringToDouble": _DOUBLE,
+    "StringToInt": counterpart("Expression", "input=input | output", special=how.formula("int(input)")),
+    "StringToBoolean": counterpart("Expression", "input=input | output", special=how.formula("input == 'true'")),
     "StringLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
     "StringIndexOf": counterpart(
         "Expression", "searchFor=searchFor inText=inText | output", special=how.formula("{searchFor} in {inText}")
@@ -322,6 +340,22 @@ _VIEWS = frozenset(
         "LEDMatrix",
         "ComputeHistogramPlotter",
         "TableDisplay",
+        "AWTDisplay",
+        "ArrayPlotterXY",
+        "DiscardDoubles",
+        "DiscardDoublesArray",
+        "FileWrite",
+        "ImageDisplay",
+        "LEDArray",
+        "MatrixVisualizer",
+        "ModelDisplay",
+        "Plotter",
+        "SketchedSink",
+        "TimedDisplay",
+        "TimedMonitorValue",
+        "TokenWriter",
+        "TextWriter",
+        "XMLWriter",
     }
 )
 _ALSO = {
