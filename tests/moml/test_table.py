@@ -14,6 +14,7 @@ NEEDED = {
     "RecordAssembler": port("x", "input"),
     "RecordDisassembler": port("x", "output"),
     "Expression": port("x", "input"),
+    "RecordUpdater": port("x", "input"),
 }  # what somebody adds to it
 PARAMETERS: dict[str, dict[str, object]] = {
     "Expression": {"expression": "2 * x"},
