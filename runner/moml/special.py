@@ -432,6 +432,11 @@ def event_filter(actor: Actor) -> None:
     """EventFilter hands on what is true."""
 
 
+def quantum(actor: Actor) -> None:
+    """The quantum of a QuantizedSampler, of which the sign does not count."""
+    actor.values["by"] = abs(actor.get("quantum", 1.0))
+
+
 def limiter(actor: Actor) -> None:
     """Only limits that are finite."""
     for name, ours in (("top", "high"), ("bottom", "low")):

@@ -134,6 +134,7 @@ _FLOW: Mapping[str, Counterpart] = {
     "Previous": counterpart("Previous", initialValue="value:initial"),
     "EventFilter": counterpart("Filter"),
     "TrueGate": counterpart("Filter"),
+    "QuantizedSampler": counterpart("Changes", special=how.quantum),
     "SuppressSimultaneousEvents": counterpart("FirstOfInstant"),
     "SamplerWithDefault": counterpart("MostRecent", "input* trigger* | output*", initialValue="value:initial"),
     "Wire": counterpart("LatestOfAll", "input* | output*", initialValue="value:initial=0"),

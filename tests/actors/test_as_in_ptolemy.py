@@ -182,6 +182,8 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         ("Collect, joined: true", [("input", [[0, [1]]]), ("input", [[1, [2, 3]]])], [[1, 2, 3]]),
         ("RecordAssembler, fields: [x], onto: input", [("input", [[0, {"x": 1, "y": 2}]]), ("x", [[1, 5]])],
          [{"x": 5, "y": 2}]),
+        ("Changes, by: 1", [("input", [[n, token] for n, token in enumerate([0.5, 1.5, 1.6, 0.7, 0.5])])],
+         [0.5, 1.6, 0.5]),
         ("Previous", [("input", [[0, "a"], [1, "b"], [1, "c"]])], ["a", "b"]),
         ("Previous, initial: z", [("input", [[0, "a"], [1, "b"]])], ["z", "a"]),
         ("FirstOfInstant", [("input", [[0, "a"], [0, "b"], [1, "c"]])], ["a", "c"]),

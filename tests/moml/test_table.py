@@ -56,6 +56,7 @@ def test_a_row(tmp_path: Path, name: str) -> None:
     for each, direction in ports.items():
         if direction == "input" and each not in NOT_WIRED:
             values = "{true}" if each in _TRUTHS or name.startswith("Logic") else "{1}"
+            values = '{"a"}' if row.type == "TextFunction" else values
             clocks.append(entity(f"c_{each}", "DiscreteClock", values=values))
             nets.append(f"c_{each}.output A.{each}")
         elif direction == "output":
