@@ -39,6 +39,7 @@ NOT_WIRED = {
     "gamma",
     "cut",
     "secondOperand",
+    "pattern",
 }  # parameters of distributions, and one of two
 _TRUTHS = ("control", "select", "selector", "enable")
 
