@@ -36,6 +36,7 @@ from .generators import DRand, Generator, JavaRandom
 from .logic import Comparator, Equals, LogicGate
 from .passing import (
     BooleanSelect,
+    Changes,
     Commutator,
     Default,
     Filter,
@@ -67,6 +68,7 @@ from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, Wai
 from .variables import SetVariable, Variable
 
 if TYPE_CHECKING:
+    from .blocks import BlockExpression, HoldingExpression
     from .continuous import ODE
     from .control import *
     from .entities import Batch, Collect, Match, RecordAssembler, RecordDisassembler, SetFields, Spread, Unbatch
@@ -74,28 +76,30 @@ if TYPE_CHECKING:
     from .modes import *
     from .resources import Machine, Pool, Station, WaitingLine
     from .robotics import *
+    from .texts import TextFunction
     from .vehicles import *
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",
     "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender", "Barrier",
-    "Batch", "Bernoulli", "Binomial", "BodyState", "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth",
-    "Casadi", "Cauchy", "ChannelError", "ChiSquare", "Choice", "CircularMotion", "Clock", "Collect", "Commutator",
-    "Comparator", "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DRand",
-    "DeadZone", "Default", "Derivative", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution",
-    "Emitter", "EpicycleError", "Equals", "Estimate", "Exponential", "Expression", "Extreme", "Filter", "FilterDesign",
-    "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Function", "Gamma", "Generator", "GoalMonitor",
-    "Histogram", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort", "Integrator", "IsPresent",
-    "JavaRandom", "Latest", "LatestOfAll", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable",
-    "Machine", "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment",
-    "MostRecent", "MovingAverage", "MovingStatistics", "MultiplyDivide", "NegativeBinomial", "NetworkSwitch", "Normal",
-    "Objective", "OutputPort", "Parameter", "ParameterError", "Pending", "Place", "Plan", "Poisson", "PoissonClock",
-    "Pool", "PortError", "PortParameter", "Pose", "Posts", "Previous", "Process", "Pulse", "Quantity", "Quantizer",
-    "Queue", "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal",
-    "RecordAssembler", "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError",
-    "ResettableTimer", "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor",
-    "Sequence", "Sequencer", "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread",
-    "StateMachine", "StateSpace", "Station", "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test",
+    "Batch", "Bernoulli", "Binomial", "BlockExpression", "BodyState", "BooleanSelect", "BooleanSwitch",
+    "BroadcastChannel", "Butterworth", "Casadi", "Cauchy", "Changes", "ChannelError", "ChiSquare", "Choice",
+    "CircularMotion", "Clock", "Collect", "Commutator", "Comparator", "Configurable", "Const", "Constant", "Context",
+    "Counter", "CurrentMicrostep", "CurrentTime", "DRand", "DeadZone", "Default", "Derivative", "Difference",
+    "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter", "EpicycleError", "Equals", "Estimate",
+    "Exponential", "Expression", "Extreme", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator",
+    "FirstOfInstant", "FirstOrder", "Function", "Gamma", "Generator", "GoalMonitor", "Histogram", "HoldingExpression",
+    "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort", "Integrator", "IsPresent", "JavaRandom", "Latest",
+    "LatestOfAll", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter",
+    "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent", "MovingAverage",
+    "MovingStatistics", "MultiplyDivide", "NegativeBinomial", "NetworkSwitch", "Normal", "Objective", "OutputPort",
+    "Parameter", "ParameterError", "Pending", "Place", "Plan", "Poisson", "PoissonClock", "Pool", "PortError",
+    "PortParameter", "Pose", "Posts", "Previous", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Ramp",
+    "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler",
+    "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer",
+    "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor", "Sequence", "Sequencer",
+    "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread", "StateMachine",
+    "StateSpace", "Station", "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TextFunction",
     "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch",
     "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "VonMises", "WaitingLine",
     "WaitingTime", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text",
@@ -111,6 +115,7 @@ __all__ = [
 # Where those of __all__ are that are imported when they are asked for: few models need them, and with robots and what
 # solves differential equations they take as long as all else.
 _LATER = {
+    ".blocks": ("BlockExpression", "HoldingExpression"),
     ".continuous": ("ODE",),
     ".control": (
         "PID", "Butterworth", "DeadZone", "DiscreteFilter", "FilterDesign", "FirstOrder", "Hysteresis", "Limiter",
@@ -122,6 +127,7 @@ _LATER = {
     ".links": ("ArqReceiver", "ArqSender", "Link", "NetworkSwitch"),
     ".modes": ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"),
     ".resources": ("Machine", "Pool", "Station", "WaitingLine"),
+    ".texts": ("TextFunction",),
     ".vehicles": (
         "Ackermann", "InertialSensor", "Pose", "RangeBearingSensor", "RangeScanner", "Unicycle", "WaypointFollower",
     ),

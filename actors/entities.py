@@ -58,26 +58,35 @@ class SetFields(Actor):
 class RecordAssembler(Actor):
     """Makes one token with fields of the tokens of several inputs, which are called like the fields.
 
-    It waits until there is one at each input; others wait in the order of their arrival.
-    Ptolemy: ``RecordAssembler``.
+    It waits until there is one at each input; others wait in the order of their arrival.  ``onto`` is the name of one
+    more input: its tokens have fields of their own, which stay as they are unless they are set here.
+    Ptolemy: ``RecordAssembler``, ``RecordUpdater`` (``onto: input``).
     """
 
     output: OutputPort[Any] = OutputPort(dict, doc="a token with these fields")
 
     fields = texts_parameter(doc="names of the fields, which are the inputs")
+    onto: Parameter[str | None] = Parameter(str, None, doc="name of the input whose tokens are given these fields")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         _check_names(self.fields)
-        return {name: InputPort(doc="a field") for name in self.fields}
+        ports: dict[str, InputPort[Any] | OutputPort[Any]] = {name: InputPort(doc="a field") for name in self.fields}
+        if self.onto in ports:
+            raise ParameterError(f"onto: {self.onto!r} is one of the fields")
+        return ports if self.onto is None else {self.onto: InputPort(doc="tokens with fields"), **ports}
 
     def initialize(self) -> None:
-        self._waiting: dict[str, deque[Any]] = {name: deque() for name in self.fields}
+        self._waiting: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
 
     def fire(self) -> None:
         for name, queue in self._waiting.items():
             queue.extend(self.inputs[name].tokens)
         while all(self._waiting.values()):
-            self.output.send({name: queue.popleft() for name, queue in self._waiting.items()})
+            found = {name: queue.popleft() for name, queue in self._waiting.items()}
+            base = {} if self.onto is None else operand(found.pop(self.onto))
+            if not isinstance(base, Mapping):
+                raise EpicycleError(f"the token {brief(base)} has no fields")
+            self.output.send({**base, **found})
 
 
 class RecordDisassembler(Actor):
@@ -212,11 +221,14 @@ class Unbatch(Actor):
 class Collect(Actor):
     """Makes a list of a token of each channel, as soon as there is one on each; others wait in the order of arrival.
 
-    Ptolemy: ``ElementsToArray``.
+    With ``joined`` the tokens are lists, and one is made of all that is in them.
+    Ptolemy: ``ElementsToArray``, ``ArrayAppend`` (``joined``).
     """
 
     input = InputPort(multi=True, doc="what is collected")
     output: OutputPort[Any] = OutputPort(list, doc="a token of each channel, in their order")
+
+    joined = Parameter(bool, False, doc="whether the tokens are lists that are joined")
 
     def initialize(self) -> None:
         self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
@@ -225,7 +237,13 @@ class Collect(Actor):
         for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
             queue.extend(tokens)
         while all(self._waiting):
-            self.output.send([queue.popleft() for queue in self._waiting])
+            found = [queue.popleft() for queue in self._waiting]
+            if self.joined:
+                for each in found:
+                    if not isinstance(operand(each), list):
+                        raise EpicycleError(f"{brief(each)} is not a list")
+                found = [item for each in found for item in operand(each)]
+            self.output.send(found)
 
 
 class Spread(Actor):

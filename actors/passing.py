@@ -1,5 +1,5 @@
-"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Previous, Register, LatestOfAll, BooleanSelect,
-Commutator, Sequencer, Default, IsPresent."""
+"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Changes, Previous, Register, LatestOfAll,
+BooleanSelect, Commutator, Sequencer, Default, IsPresent."""
 
 from __future__ import annotations
 
@@ -61,6 +61,27 @@ class FirstOfInstant(Actor):
         for token in self.input.tokens:
             if self._last != self.tag.time:
                 self._last = self.tag.time
+                self.output.send(token)
+
+
+class Changes(Actor):
+    """Hands on the first number, and then each that differs by more than ``by`` from the one handed on before.
+
+    Source: M. Miskowicz, Send-on-delta concept, Sensors 6, 2006.  Ptolemy: ``QuantizedSampler``.
+    """
+
+    input = InputPort(float, doc="the numbers")
+    output = OutputPort(float, doc="those that differ")
+
+    by = Parameter(float, 0.0, min=0, doc="how much a number may differ and still be held back")
+
+    def initialize(self) -> None:
+        self._last: float | None = None
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            if self._last is None or abs(token - self._last) > self.by:
+                self._last = token
                 self.output.send(token)
 
 

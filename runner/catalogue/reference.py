@@ -211,7 +211,7 @@ TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "sources": ("Where tokens begin", ("sources", "replay")),
     "computing": (
         "Arithmetic, logic, expressions, sums, statistics",
-        ("accumulation", "arithmetic", "functions", "logic", "statistics"),
+        ("accumulation", "arithmetic", "blocks", "functions", "logic", "statistics", "texts"),
     ),
     "flow": ("Where tokens go, what passes, and what is kept", ("flow", "passing", "variables")),
     "time": ("Delays and timers", ("timing",)),

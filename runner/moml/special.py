@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from epicycle import actors
@@ -136,20 +137,172 @@ def _with_all(text: str, ports: list[str]) -> str:
 
 
 def formula(template: str, **defaults: object) -> Special:
-    """An Expression for an actor that computes something: ``{name}`` is a parameter, or the port of that name."""
+    """An Expression for an actor that computes something: ``{name}`` is a parameter, or the port of that name.
+
+    Where something is linked to such a port, it holds its latest token, and what the parameter says up to the first.
+    """
 
     def convert(actor: Actor) -> None:
         said: dict[str, str] = {}
+        held: dict[str, object] = {}
         for name in re.findall(r"\{(\w+)\}", template):
+            value = actor.get(name, defaults.get(name))
             if actor.widths.get(name, 0):
                 said[name] = name
-                actor.told.add(name)
+                if value is not None:
+                    held[name] = plain(value)
             else:
-                value = actor.get(name, defaults.get(name))
                 said[name] = f"({value!r})" if isinstance(value, (int, float)) and value < 0 else repr(value)
+        if held:
+            actor.values |= {"type": "HoldingExpression", "held": held}
         actor.values["expression"] = re.sub(r"\{(\w+)\}", lambda match: said[match[1]], template)
 
     return convert
+
+
+def array_extract(actor: Actor) -> None:
+    """ArrayExtract, with zeros before and behind."""
+    part = "input[{sourcePosition}:{sourcePosition} + {extractLength}]"
+    is_whole = not any(actor.widths.get(name, 0) for name in ("destinationPosition", "outputArrayLength"))
+    length = None if actor.widths.get("extractLength", 0) else actor.get("extractLength", 1)
+    if not is_whole or actor.get("destinationPosition", 0) != 0 or actor.get("outputArrayLength", 1) != length:
+        zero = "[input[0] * 0]"
+        part = f"({zero} * {{destinationPosition}} + {part} + {zero} * {{outputArrayLength}})[:{{outputArrayLength}}]"
+    positions = {"sourcePosition": 0, "extractLength": 1, "destinationPosition": 0, "outputArrayLength": 1}
+    formula(part, **positions)(actor)
+
+
+_OF_PATTERNS = frozenset("\\^$.|?*+()[]{}")
+
+
+def plain_pattern(*names: str) -> Special:
+    """Patterns that stand for themselves: regular expressions have no counterpart."""
+
+    def convert(actor: Actor) -> None:
+        for name in names:
+            text = actor.text(name)
+            actor.told.discard(name)
+            if actor.widths.get(name, 0) and name == "pattern":
+                actor.notes.error(f"{actor.path}.{name}: regular expressions that come by a port have no counterpart")
+            elif _OF_PATTERNS & set(text):
+                actor.notes.error(f"{actor.path}.{name} = {text!r}: regular expressions have no counterpart")
+
+    return convert
+
+
+def replaced(actor: Actor) -> None:
+    """StringReplace of all that is found, or of the first."""
+    plain_pattern("pattern", "replacement")(actor)
+    actor.told.add("regularExpression")
+    actor.values["function"] = "replace" if actor.get("replaceAll", True) is not False else "replace first"
+
+
+def index_of(actor: Actor) -> None:
+    """StringIndexOf from the beginning on."""
+    if actor.widths.get("startIndex", 0) or actor.get("startIndex", 0) != 0:
+        actor.notes.error(f"{actor.path}.startIndex: a search that begins elsewhere has no counterpart")
+    if actor.get("searchForwards", True) is False:
+        actor.notes.error(f"{actor.path}.searchForwards = false: has no counterpart")
+
+
+def blocks(template: str, number: str = "1", *, items: bool = True, **defaults: object) -> Special:
+    """A BlockExpression: ``{name}`` is a parameter, ``number`` the one that says how long a block is, or a number."""
+
+    def convert(actor: Actor) -> None:
+        found = {name: actor.get(name, value) for name, value in defaults.items()}
+        if not all(isinstance(each, int) for each in found.values()):
+            actor.notes.error(f"{actor.path}: its parameters are no whole numbers")
+            return
+        count = found[number] if number in found else int(number)
+        actor.values |= {"number": count, "expression": template.format(**found)}
+        if items:
+            actor.values["items"] = True
+
+    return convert
+
+
+def up_sample(actor: Actor) -> None:
+    """UpSample, whose phase is the last by default."""
+    factor = actor.get("factor", 2)
+    phase = actor.get("phase", factor - 1)
+    zero = "[block[0] * 0]"
+    actor.values |= {"expression": f"{zero} * {phase} + block + {zero} * {factor - 1 - phase}", "items": True}
+
+
+def chop(actor: Actor) -> None:
+    """Chop: a part of each block, or more than that, with what came before it or zeros."""
+    read, write = actor.get("numberToRead", 128), actor.get("numberToWrite", 64)
+    offset, uses_past = actor.get("offset", 0), actor.get("usePastInputs", True) is not False
+    front, part, zero = "", "block", "[block[0] * 0]"
+    if offset > 0:
+        front = "past + " if uses_past else f"{zero} * {offset} + "
+        if uses_past:
+            actor.values["past"] = [0] * offset
+    elif offset < 0:
+        part = f"block[{-offset}:]"
+    behind = write - (read + offset)
+    text = f"{front}{part}" + (f" + {zero} * {behind}" if behind > 0 else "")
+    text = f"({text})[:{write}]" if behind < 0 else text
+    actor.values |= {"number": read, "expression": text, "items": True}
+
+
+def delay_line(actor: Actor) -> None:
+    """DelayLine: the latest first."""
+    initial = [plain(each) for each in actor.get("initialValues", [0, 0, 0, 0])]
+    actor.values |= {"past": initial[-2::-1], "expression": "block + past[::-1]"}
+
+
+def repeat(actor: Actor) -> None:
+    """Repeat, of single tokens or of blocks."""
+    if (size := actor.get("blockSize", 1)) == 1:
+        return
+    if actor.widths.get("numberOfTimes", 0):
+        actor.notes.error(f"{actor.path}.blockSize = {size!r}: has no counterpart where the number comes by a port")
+    times = actor.get("numberOfTimes", 2)
+    actor.values = {"type": "BlockExpression", "number": size, "expression": f"block * {times}", "items": True}
+
+
+def record_updater(actor: Actor) -> None:
+    """A RecordUpdater, whose further inputs are fields."""
+    names = [port.name for port in actor.entity.ports.values() if port.flag("input") and port.name != "input"]
+    actor.ports |= {name: name for name in names}
+    actor.values |= {"fields": names, "onto": "input"}
+
+
+def single(port: str) -> Special:
+    """An actor whose channels go their own ways, which ours cannot."""
+
+    def convert(actor: Actor) -> None:
+        if (width := actor.widths.get(port, 0)) > 1:
+            actor.notes.error(f"{actor.path}.{port} has {width} channels, each of which has no counterpart")
+
+    return convert
+
+
+def quantizer(actor: Actor) -> None:
+    """Quantizer: the level that is nearest, of two the lower one; without levels, steps from 0 on."""
+    levels = [float(each) for each in actor.get("levels", [-1.0, 1.0]) or ()]
+    step = float(actor.get("delta", 1.0))
+    if not levels:
+        actor.values["expression"] = f"{step!r} * floor(input / {step!r})"
+        return
+    parts = [f"{low!r} if input <= {(low + high) / 2.0!r} else " for low, high in pairwise(levels)]
+    actor.values["expression"] = "".join(parts) + (repr(levels[-1]) if parts else f"input * 0.0 + {levels[-1]!r}")
+
+
+def decibel(actor: Actor) -> None:
+    """DB: of an amplitude, or of a power, and no less than its ``min``."""
+    factor = 10.0 if actor.get("inputIsPower", False) is True else 20.0
+    least = float(actor.get("min", -100.0))
+    actor.values["expression"] = f"max({factor} * log(input, 10), {least!r}) if input > 0 else {least!r}"
+
+
+def array_sort(actor: Actor) -> None:
+    """ArraySort, in one direction or the other, of equals all or one."""
+    text = "sorted(input)"
+    if actor.get("allowDuplicates", True) is False:
+        text = f"[{text}[k] for k in range(len(input)) if k == 0 or {text}[k] != {text}[k - 1]]"
+    actor.values["expression"] = text if actor.get("ascending", True) is not False else f"{text}[::-1]"
 
 
 def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Special:
@@ -177,17 +330,6 @@ def math_function(actor: Actor) -> None:
         return
     actor.ports |= {"firstOperand": "input"}
     actor.values["function"] = word
-
-
-def string_compare(actor: Actor) -> None:
-    """StringCompare, as far as texts can be compared here."""
-    words = {"equals": "{0} == {1}", "contains": "{1} in {0}", "startsWith": "{0}[:len({1})] == {1}"}
-    word = actor.text("function", "equals")
-    if word not in words:
-        actor.notes.error(f"{actor.path}.function = {word!r}: has no counterpart")
-        return
-    said = [each if actor.widths.get(each, 0) else repr(actor.text(each)) for each in ("firstString", "secondString")]
-    actor.values["expression"] = words[word].format(*said)
 
 
 def rounding(actor: Actor) -> None:
@@ -288,6 +430,11 @@ def fields(direction: str) -> Special:
 
 def event_filter(actor: Actor) -> None:
     """EventFilter hands on what is true."""
+
+
+def quantum(actor: Actor) -> None:
+    """The quantum of a QuantizedSampler, of which the sign does not count."""
+    actor.values["by"] = abs(actor.get("quantum", 1.0))
 
 
 def limiter(actor: Actor) -> None:

@@ -8,6 +8,7 @@ or ours has none.  Everything is meant for a model with ``like: ptolemy``.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from . import special as how
 from .counterpart import Counterpart, counterpart, view
@@ -133,7 +134,9 @@ _FLOW: Mapping[str, Counterpart] = {
     "Previous": counterpart("Previous", initialValue="value:initial"),
     "EventFilter": counterpart("Filter"),
     "TrueGate": counterpart("Filter"),
+    "QuantizedSampler": counterpart("Changes", special=how.quantum),
     "SuppressSimultaneousEvents": counterpart("FirstOfInstant"),
+    "SamplerWithDefault": counterpart("MostRecent", "input* trigger* | output*", initialValue="value:initial"),
     "Wire": counterpart("LatestOfAll", "input* | output*", initialValue="value:initial=0"),
     "Switch": counterpart("Switch", "input control | output*"),
     "BooleanSwitch": counterpart("BooleanSwitch", "input* control | trueOutput* falseOutput*"),
@@ -154,9 +157,16 @@ _FLOW: Mapping[str, Counterpart] = {
     "Repeat": counterpart(
         "Repeat",
         "input numberOfTimes=times | output",
-        special=how.no_trigger("blockSize=1"),
+        special=how.repeat,
         numberOfTimes="whole:times",
     ),
+    "DownSample": counterpart(
+        "BlockExpression", special=how.blocks("block[-1 - {phase}]", "factor", items=False, factor=2, phase=0)
+    ),
+    "UpSample": counterpart("BlockExpression", special=how.up_sample),
+    "Chop": counterpart("BlockExpression", special=how.chop),
+    "DelayLine": counterpart("BlockExpression", special=how.delay_line),
+    "RecordUpdater": counterpart("RecordAssembler", "input=input | output", special=how.record_updater),
     "SequenceToArray": counterpart("Batch", "input arrayLength | output", arrayLength="whole:number=1"),
     "ArrayToSequence": counterpart("Unbatch", arrayLength="nothing", enforceArrayLength="nothing"),
     "RecordAssembler": counterpart("RecordAssembler", "| output", special=how.fields("input")),
@@ -172,6 +182,17 @@ _FLOW: Mapping[str, Counterpart] = {
 }
 
 _GATES = {each: each for each in ("and", "or", "xor", "nand", "nor", "xnor")}
+_REPLACE = counterpart(
+    "TextFunction",
+    "stringToEdit=text pattern=other replacement=new | output",
+    special=how.replaced,
+    stringToEdit="text:text",
+    pattern="text:other",
+    replacement="text:new",
+)
+_SIMPLE_REPLACE = replace(_REPLACE, special=None, fixed={"function": "replace"})
+_DOUBLE = counterpart("Expression", "input=input | output", special=how.formula("float(input)"))
+_DECIBEL = counterpart("Expression", "input=input | output", special=how.decibel)
 _COMPUTING: Mapping[str, Counterpart] = {
     "Comparator": counterpart(
         "Comparator",
@@ -186,7 +207,7 @@ _COMPUTING: Mapping[str, Counterpart] = {
         "LogicGate", "input* | output", special=how.choice("function", "function", "and", _GATES)
     ),
     "LogicGate": counterpart("LogicGate", "input* | output", special=how.choice("logic", "function", "and", _GATES)),
-    "LogicalNot": counterpart("LogicGate", "input* | output*", fixed={"function": "not"}),
+    "LogicalNot": counterpart("LogicGate", "input* | output*", special=how.single("input"), fixed={"function": "not"}),
     "AddSubtract": counterpart("AddSubtract", "plus* minus* | output"),
     "MultiplyDivide": counterpart("MultiplyDivide", "multiply* divide* | output"),
     "Scale": counterpart("Scale", "input factor | output", factor="number"),
@@ -220,6 +241,7 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "Expression": counterpart("Expression", "| output", special=how.expression),
     "LookupTable": counterpart("LookupTable", table="list:values"),
     "Limiter": counterpart("Limiter", special=how.limiter),
+    "Quantizer": counterpart("Expression", "input=input | output", special=how.quantizer),
     "Maximum": counterpart("Extreme", "input* | maximumValue=value channelNumber=channel", fixed={"take": "greatest"}),
     "Minimum": counterpart("Extreme", "input* | minimumValue=value channelNumber=channel", fixed={"take": "least"}),
     "Average": counterpart("MovingAverage", fixed={"span": "1e8 s"}),
@@ -239,37 +261,89 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "ArrayMinimum": counterpart("Expression", "input=input | output", special=how.formula("min(input)")),
     "ArrayMaximum": counterpart("Expression", "input=input | output", special=how.formula("max(input)")),
     "ArrayAverage": counterpart("Expression", "input=input | output", special=how.formula("sum(input) / len(input)")),
-    "ArraySort": counterpart("Expression", "input=input | output", special=how.formula("sorted(input)")),
-    "ArrayContains": counterpart(
-        "Expression", "array=array element=element | output", special=how.formula("{element} in array")
-    ),
     "ArrayExtract": counterpart(
         "Expression",
-        "input=input sourcePosition=sourcePosition extractLength=extractLength | output",
-        special=how.formula(
-            "input[{sourcePosition}:{sourcePosition} + {extractLength}]", sourcePosition=0, extractLength=1
-        ),
+        "input=input sourcePosition=sourcePosition extractLength=extractLength "
+        "destinationPosition=destinationPosition outputArrayLength=outputArrayLength | output",
+        special=how.array_extract,
     ),
-    "StringSubstring": counterpart(
+    "ArrayUpdate": counterpart(
         "Expression",
-        "input=input start=start stop=stop | output",
-        special=how.formula("input[{start}:{stop}]", start=0, stop=0),
+        "input=input index=index value=value | output",
+        special=how.formula("input[:{index}] + [{value}] + input[{index} + 1:]", index=0, value=1),
     ),
-    "StringCompare": counterpart(
+    "ArrayRemoveElement": counterpart(
         "Expression",
-        "firstString=firstString secondString=secondString | output",
-        special=how.string_compare,
-        ignoreCase="none",
+        "array=array element=element | output",
+        special=how.formula("[each for each in array if each != {element}]"),
+    ),
+    "ArrayAppend": counterpart("Collect", "input* | output", fixed={"joined": True}),
+    "ArraySort": counterpart("Expression", "input=input | output", special=how.array_sort),
+    "DotProduct": counterpart(
+        "Expression",
+        "input1=input1 input2=input2 | output",
+        special=how.formula("sum([input1[k] * input2[k] for k in range(len(input1))])"),
+    ),
+    "ArrayContains": counterpart(
+        "Expression", "array=array element=element | output", special=how.formula("{element} in array")
     ),
     "BooleanToAnything": counterpart(
         "Expression",
         "input=input | output",
         special=how.formula("{trueValue} if input else {falseValue}", trueValue=True, falseValue=False),
     ),
-    "StringLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
-    "StringIndexOf": counterpart(
-        "Expression", "searchFor=searchFor inText=inText | output", special=how.formula("{searchFor} in {inText}")
+    "DB": _DECIBEL,
+    "dB": _DECIBEL,
+    "LongToDouble": _DOUBLE,
+    "AnythingToDouble": _DOUBLE,
+    "StringToDouble": _DOUBLE,
+    "StringToInt": counterpart("Expression", "input=input | output", special=how.formula("int(input)")),
+    "StringToBoolean": counterpart("Expression", "input=input | output", special=how.formula("input == 'true'")),
+    "StringSubstring": counterpart(
+        "Expression",
+        "input=input start=start stop=stop | output",
+        special=how.formula("input[{start}:] if {stop} == -1 else input[{start}:{stop}]", start=0, stop=0),
     ),
+    "StringCompare": counterpart(
+        "TextFunction",
+        "firstString=text secondString=other | output",
+        special=how.choice(
+            "function",
+            "function",
+            "equals",
+            {"equals": "equals", "contains": "contains", "startsWith": "starts with", "endsWith": "ends with"},
+        ),
+        firstString="text:text",
+        secondString="text:other",
+        ignoreCase="flag",
+    ),
+    "StringFunction": counterpart(
+        "TextFunction",
+        "input=text | output",
+        special=how.choice(
+            "function", "function", "trim", {"trim": "trim", "toLowerCase": "lower", "toUpperCase": "upper"}
+        ),
+    ),
+    "StringIndexOf": counterpart(
+        "TextFunction",
+        "inText=text searchFor=other | output",
+        special=how.index_of,
+        fixed={"function": "find"},
+        inText="text:text",
+        searchFor="text:other",
+        ignoreCase="flag",
+    ),
+    "StringMatches": counterpart(
+        "TextFunction",
+        "matchString=text pattern=other | output",
+        special=how.plain_pattern("pattern"),
+        fixed={"function": "contains"},
+        matchString="text:text",
+        pattern="text:other",
+    ),
+    "StringReplace": _REPLACE,
+    "StringSimpleReplace": _SIMPLE_REPLACE,
+    "StringLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
 }
 
 _SINKS: Mapping[str, Counterpart] = {
@@ -322,6 +396,22 @@ _VIEWS = frozenset(
         "LEDMatrix",
         "ComputeHistogramPlotter",
         "TableDisplay",
+        "AWTDisplay",
+        "ArrayPlotterXY",
+        "DiscardDoubles",
+        "DiscardDoublesArray",
+        "FileWrite",
+        "ImageDisplay",
+        "LEDArray",
+        "MatrixVisualizer",
+        "ModelDisplay",
+        "Plotter",
+        "SketchedSink",
+        "TimedDisplay",
+        "TimedMonitorValue",
+        "TokenWriter",
+        "TextWriter",
+        "XMLWriter",
     }
 )
 _ALSO = {

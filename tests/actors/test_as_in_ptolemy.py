@@ -179,6 +179,11 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         ("Sequencer", [("input", [[n, n] for n in range(5)]), ("number", [[0, 2], [1, 0], [3, 1], [4, 4]])], [1, 2, 0]),
         ("Default", [("preferred", [[0, 1], [2, 3]]), ("alternate", [[0, 7], [1, 8]])], [1, 8, 3]),
         ("Collect", [("input", [[0, 1], [1, 2]]), ("input", [[1, "a"], [1, "b"], [2, "c"]])], [[1, "a"], [2, "b"]]),
+        ("Collect, joined: true", [("input", [[0, [1]]]), ("input", [[1, [2, 3]]])], [[1, 2, 3]]),
+        ("RecordAssembler, fields: [x], onto: input", [("input", [[0, {"x": 1, "y": 2}]]), ("x", [[1, 5]])],
+         [{"x": 5, "y": 2}]),
+        ("Changes, by: 1", [("input", [[n, token] for n, token in enumerate([0.5, 1.5, 1.6, 0.7, 0.5])])],
+         [0.5, 1.6, 0.5]),
         ("Previous", [("input", [[0, "a"], [1, "b"], [1, "c"]])], ["a", "b"]),
         ("Previous, initial: z", [("input", [[0, "a"], [1, "b"]])], ["z", "a"]),
         ("FirstOfInstant", [("input", [[0, "a"], [0, "b"], [1, "c"]])], ["a", "c"]),
@@ -192,6 +197,23 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
          -1.0]),
         ("TimeCompare, nonnegative: true", [("first", [[1, 0], [5, 0]]), ("second", [[0, 0], [2, 0], [3, 0], [6, 0]])],
          [1.0, 1.0]),
+        # An index that comes keeps, and sends nothing.
+        ("HoldingExpression, expression: 'input[index]', held: {index: 0}", [("input", [[0, [1, 2]], [2, [3, 4]], [3,
+         [5, 6]]]), ("index", [[1, 1], [3, 0]])], [1, 4, 5]),
+        ("HoldingExpression, expression: a + b, held: {a: x, b: ''}", [("b", [[0, "y"], [1, "z"]])], ["xy", "xz"]),
+        ("BlockExpression, expression: 'block[1]', number: 2", [("input", [[n, n] for n in range(5)])], [1, 3]),
+        ("BlockExpression, expression: '[block[0], 0.0]', items: true", [("input", [[0, 1.5], [1, 2.5]])],
+         [1.5, 0.0, 2.5, 0.0]),
+        ("BlockExpression, expression: past + block, past: [0, 0]", [("input", [[n, n + 1] for n in range(3)])],
+         [[0, 0, 1], [0, 1, 2], [1, 2, 3]]),
+        ("TextFunction, function: contains, other: b", [("text", [[0, "abc"], [1, "B"]]), ("other", [[2, "B"]])],
+         [True, False, True]),
+        ("TextFunction, function: equals, other: b, ignore_case: true", [("text", [[0, "B"]])], [True]),
+        ("TextFunction, function: replace, other: a, new: xy", [("text", [[0, "aba"]])], ["xybxy"]),
+        ("TextFunction, function: replace first, other: a, new: xy", [("text", [[0, "aba"]])], ["xyba"]),
+        ("TextFunction, function: find", [("text", [[0, "abc"]]), ("other", [[0, "c"], [1, "x"]])], [2, -1]),
+        ("TextFunction, function: split, other: ', '", [("text", [[0, "a, b"]])], [["a", "b"]]),
+        ("TextFunction, function: trim", [("text", [[0, " a "]])], ["a"]),
         ("Commutator", [("input", [[0, "a"], [1, "b"]]), ("input", [[2, "x"], [3, "y"]])], ["a", "x", "b", "y"]),
         ("Commutator, block: 2", [("input", [[0, "a"], [1, "b"], [4, "c"]]), ("input", [[2, "x"], [3, "y"]])],
          ["a", "b", "x", "y"]),
@@ -282,6 +304,10 @@ def test_checks(test: str, feeds: Feeds, message: str) -> None:
         ("AddSubtract", [("plus", [[0, 1]]), ("minus", [[0, "a"]])], "1 and 'a' do not go together"),
         ("Scale, factor: 2", [("input", [[0, "a"]])], "'a' and 2 do not go together"),
         ("Filter", [("input", [[0, 1]])], "'token' gives 1 for 1, not true or false"),
+        ("BlockExpression, expression: 'block[0]', items: true", [("input", [[0, 1]])],
+         "'block[0]' gives 1, which is not a list of items to send"),
+        ("TextFunction, function: replace, other: a", [("text", [[0, "a" * 200]]), ("new", [[0, "b" * 1000]])],
+         "the text becomes longer than 100,000 characters"),
         ("Ramp", [("trigger", [[0, 0], [1, 0], [2, 0]]), ("step", [[0, 0.5]])],
          ("init and step are whole numbers, and so is what is sent, but a step of 0.5 has come; write 'init: 0.0' for "
           "numbers that are not whole")),
@@ -298,6 +324,9 @@ def test_messages(actor: str, feeds: Feeds, message: str) -> None:
     ("actor", "message"),
     [
         ("Pulse, indexes: [1, 0]", "indexes: [1, 0] is not an ascending list of whole numbers from 0 on"),
+        ("RecordAssembler, fields: [input], onto: input", "onto: 'input' is one of the fields"),
+        ("BlockExpression, expression: token", "expression: it knows 'block' and 'past', not 'token'"),
+        ("HoldingExpression, expression: input, held: {index: 1}", "held: 'index' is not in the expression 'input'"),
         ("Pulse, indexes: [0]", "there are 2 values for 1 indexes"),
         ("Sequence, values: [1], repeat: true, hold: true",
          "repeat and hold cannot both be true: after the last value comes the first, or itself"),
@@ -305,7 +334,8 @@ def test_messages(actor: str, feeds: Feeds, message: str) -> None:
     ],
 )  # fmt: skip
 def test_parameters_that_do_not_go_together(actor: str, message: str) -> None:
-    assert problem(f"{{type: {actor}}}", [("input" if "Test" in actor else "trigger", [])]) == f"it: {message}"
+    port = "trigger" if actor.startswith(("Pulse", "Sequence")) else "input"
+    assert problem(f"{{type: {actor}}}", [(port, [])]) == f"it: {message}"
 
 
 def test_a_trigger_of_a_poisson_clock() -> None:

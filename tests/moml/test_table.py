@@ -14,6 +14,7 @@ NEEDED = {
     "RecordAssembler": port("x", "input"),
     "RecordDisassembler": port("x", "output"),
     "Expression": port("x", "input"),
+    "RecordUpdater": port("x", "input"),
 }  # what somebody adds to it
 PARAMETERS: dict[str, dict[str, object]] = {
     "Expression": {"expression": "2 * x"},
@@ -38,6 +39,7 @@ NOT_WIRED = {
     "gamma",
     "cut",
     "secondOperand",
+    "pattern",
 }  # parameters of distributions, and one of two
 _TRUTHS = ("control", "select", "selector", "enable")
 
@@ -55,6 +57,7 @@ def test_a_row(tmp_path: Path, name: str) -> None:
     for each, direction in ports.items():
         if direction == "input" and each not in NOT_WIRED:
             values = "{true}" if each in _TRUTHS or name.startswith("Logic") else "{1}"
+            values = '{"a"}' if row.type == "TextFunction" else values
             clocks.append(entity(f"c_{each}", "DiscreteClock", values=values))
             nets.append(f"c_{each}.output A.{each}")
         elif direction == "output":

@@ -1,0 +1,105 @@
+"""Expressions that look beyond the tokens of one tag: HoldingExpression, BlockExpression."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from .core import (
+    ABSENT,
+    Actor,
+    EpicycleError,
+    InputPort,
+    MappingParameter,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    brief,
+    rounds,
+)
+from .expression import FormulaParameter, operand
+
+
+class HoldingExpression(Actor):
+    """Evaluates an expression, some of whose inputs hold a value from the start.
+
+    Every name in the expression is an input port, as of an ``Expression``.  Those in ``held`` need not be connected:
+    they have the value given there until a token comes, and keep the latest one from then on.  The value is sent
+    whenever there is a token at each of the other inputs; if all are held, whenever one comes.
+    Ptolemy: actors with a ``PortParameter``, such as ``ArrayElement``: ``input[index]`` with ``held: {index: 0}``.
+    """
+
+    output: OutputPort[Any] = OutputPort(doc="the value of the expression")
+
+    expression = FormulaParameter(doc="what is computed; its names are the input ports, 'time' is the time in s")
+    held: Parameter[dict[str, Any]] = MappingParameter(
+        Parameter(object), doc="the inputs that hold a value, and that which they have at the start"
+    )
+
+    def check(self) -> None:
+        for name in self.held:
+            if name not in self.expression.names:
+                raise ParameterError(f"held: {name!r} is not in the expression {self.expression}")
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        names = [name for name in self.expression.names if name != "time"]
+        return {name: InputPort(required=name not in self.held, doc="a name of the expression") for name in names}
+
+    def initialize(self) -> None:
+        self._ports = [port for port in self.inputs.values() if port.width]
+        self._needed = {name for name in self.inputs if name not in self.held}
+        self._values: dict[str, Any] = {name: operand(value) for name, value in self.held.items()}
+
+    def fire(self) -> None:
+        for entries in rounds(*self._ports):
+            came = {port.name: operand(token) for port, (token,) in zip(self._ports, entries, strict=True)
+                    if token is not ABSENT}  # fmt: skip
+            self._values.update({name: token for name, token in came.items() if name in self.held})
+            if self._needed <= came.keys():
+                self.output.send(self.expression({**self._values, **came, "time": self.now}))
+
+
+class BlockExpression(Actor):
+    """Evaluates an expression over blocks of ``number`` tokens each, as soon as a block is full.
+
+    ``block`` is the list of its tokens, ``past`` that of the latest tokens before it: as many as the parameter ``past``
+    gives values for the start.  With ``items`` the value is a list, whose items are sent one by one.
+    Every second token is ``{number: 2, expression: "block[1]"}``; each with two zeros behind it
+    ``{expression: "[block[0], 0, 0]", items: true}``.
+    Ptolemy: ``DownSample``, ``UpSample``, ``Chop``, ``CountTrues``, ``DelayLine``, ``Repeat`` of blocks.
+    """
+
+    input = InputPort(doc="the stream")
+    output: OutputPort[Any] = OutputPort(doc="what is made of each block")
+
+    expression = FormulaParameter(doc="what is computed, over 'block' and 'past'")
+    number = Parameter(int, 1, min=1, doc="how many tokens are a block")
+    past: Parameter[Any] = Parameter(object, (), shape=(None,), doc="the tokens before the first, the oldest first")
+    items = Parameter(bool, False, doc="whether the value is a list whose items are sent one by one")
+
+    def check(self) -> None:
+        for name in self.expression.names:
+            if name not in ("block", "past"):
+                raise ParameterError(f"expression: it knows 'block' and 'past', not {name!r}")
+
+    def initialize(self) -> None:
+        self._block: list[Any] = []
+        self._past = deque((operand(value) for value in self.past), maxlen=len(self.past))
+
+    def fire(self) -> None:
+        for token in self.input.tokens:
+            self._block.append(operand(token))
+            if len(self._block) == self.number:
+                block, self._block = self._block, []
+                value = self.expression({"block": block, "past": list(self._past)})
+                self._past.extend(block)
+                self._send(value)
+
+    def _send(self, value: Any) -> None:
+        if not self.items:
+            self.output.send(value)
+            return
+        if not isinstance(value, list):
+            raise EpicycleError(f"{self.expression} gives {brief(value)}, which is not a list of items to send")
+        for item in value:
+            self.output.send(item)

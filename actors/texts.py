@@ -1,0 +1,75 @@
+"""What is done with texts: TextFunction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from .core import ABSENT, Actor, EpicycleError, OutputPort, Parameter, PortParameter, counted, rounds
+
+MAX_TEXT = 100_000
+FUNCTIONS: Final[dict[str, Callable[[str, str, str], Any]]] = {
+    "lower": lambda text, other, new: text.lower(),
+    "upper": lambda text, other, new: text.upper(),
+    "trim": lambda text, other, new: text.strip(),
+    "equals": lambda text, other, new: text == other,
+    "contains": lambda text, other, new: other in text,
+    "starts with": lambda text, other, new: text.startswith(other),
+    "ends with": lambda text, other, new: text.endswith(other),
+    "find": lambda text, other, new: text.find(other),
+    "find last": lambda text, other, new: text.rfind(other),
+    "replace": lambda text, other, new: text.replace(other, new),
+    "replace first": lambda text, other, new: text.replace(other, new, 1),
+    "split": lambda text, other, new: text.split(other) if other else text.split(),
+}
+_TYPES: Final[dict[str, Any]] = {
+    **dict.fromkeys(("equals", "contains", "starts with", "ends with"), bool),
+    **dict.fromkeys(("find", "find last"), int),
+    "split": list,
+}
+_NAMES = ("text", "other", "new")
+
+
+class TextFunction(Actor):
+    """Does something with a text whenever a token comes at one of its inputs, each of which keeps its latest one.
+
+    ``lower``, ``upper`` and ``trim`` are of ``text`` alone.  ``equals``, ``contains``, ``starts with`` and
+    ``ends with`` tell whether it does so with ``other``, ``find`` and ``find last`` where that is in it, from 0, or -1.
+    ``replace`` and ``replace first`` put ``new`` in its place, ``split`` gives the parts between.
+    Ptolemy: ``StringCompare``, ``StringFunction``, ``StringIndexOf``, ``StringMatches`` and ``StringReplace`` of plain
+    texts.
+    """
+
+    output: OutputPort[Any] = OutputPort(str, doc="what comes of it")
+
+    function = Parameter(str, choices=tuple(FUNCTIONS), doc="what is done")
+    ignore_case = Parameter(bool, False, doc="whether capital letters count as small ones, in both texts")
+    text = PortParameter(str, "", doc="the text")
+    other = PortParameter(str, "", doc="what it is compared with, or what is looked for in it")
+    new = PortParameter(str, "", doc="what is put in the place of what is found")
+
+    def check(self) -> None:
+        self.output.type = _TYPES.get(self.function, str)
+
+    def initialize(self) -> None:
+        self._values: dict[str, str] = {"text": self.text, "other": self.other, "new": self.new}
+
+    def fire(self) -> None:
+        ports = [self.inputs[name] for name in _NAMES if self.inputs[name].width]
+        for entries in rounds(*ports):
+            for port, (token,) in zip(ports, entries, strict=True):
+                if token is not ABSENT:
+                    self._values[port.name] = self._checked(token)
+            text, other, new = (self._values[name] for name in _NAMES)
+            if self.ignore_case:
+                text, other = text.lower(), other.lower()
+            if self.function.startswith("replace") and other and text.count(other) * len(new) > MAX_TEXT:
+                raise EpicycleError(f"the text becomes longer than {counted(MAX_TEXT, 'character')}")
+            self.output.send(FUNCTIONS[self.function](text, other, new))
+
+    def _checked(self, token: Any) -> str:
+        if not isinstance(token, str):
+            raise EpicycleError(f"{token!r} is not a text")
+        if len(token) > MAX_TEXT:
+            raise EpicycleError(f"a text of more than {counted(MAX_TEXT, 'character')} is too long")
+        return token
