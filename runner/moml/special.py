@@ -156,7 +156,7 @@ def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Spec
     """A parameter that is one of some words."""
 
     def convert(actor: Actor) -> None:
-        word = actor.text(name, default)
+        word = actor.text(name, default).lower()
         if word not in words:
             actor.notes.error(f"{actor.path}.{name} = {word!r}: has no counterpart")
         else:
@@ -182,6 +182,7 @@ def math_function(actor: Actor) -> None:
 def string_compare(actor: Actor) -> None:
     """StringCompare, as far as texts can be compared here."""
     words = {"equals": "{0} == {1}", "contains": "{1} in {0}", "startsWith": "{0}[:len({1})] == {1}"}
+    words["endsWith"] = "len({0}) >= len({1}) and {0}[len({0}) - len({1}):] == {1}"
     word = actor.text("function", "equals")
     if word not in words:
         actor.notes.error(f"{actor.path}.function = {word!r}: has no counterpart")
@@ -195,6 +196,32 @@ def rounding(actor: Actor) -> None:
     words = {"ceil": "ceil(input)", "floor": "floor(input)", "round": "floor(input + 0.5)", "truncate": "int(input)"}
     word = actor.text("function", "round")
     actor.values["expression"] = words.get(word, words["round"])
+
+
+def sequence(actor: Actor) -> None:
+    """A Sequence that repeats has nothing to hold."""
+    if actor.get("repeat", False) is True:
+        actor.told.add("holdLastOutput")
+    actor.told.discard("repeat")
+
+
+def execution_time(actor: Actor) -> None:
+    """What it sends is how long the computer took, which no model tells."""
+    actor.notes.note(f"{actor.path} sends how long a computation took, in ms: here 0")
+
+
+def array_extract(actor: Actor) -> None:
+    """ArrayExtract, with zeros before and behind what it takes out."""
+    formula("input[{sourcePosition}:{sourcePosition} + {extractLength}]", sourcePosition=0, extractLength=1)(actor)
+    before, taken, length = (
+        actor.get(name, default)
+        for name, default in (("destinationPosition", 0), ("extractLength", 1), ("outputArrayLength", 1))
+    )
+    behind = length - before - taken
+    if before > 0:
+        actor.values["expression"] = f"[0 * input[0]] * {before} + {actor.values['expression']}"
+    if behind > 0:
+        actor.values["expression"] += f" + [0 * input[0]] * {behind}"
 
 
 def random(law: str, **parameters: str) -> Special:
@@ -279,7 +306,9 @@ def fields(direction: str) -> Special:
     """A RecordAssembler or RecordDisassembler: its ports are the fields."""
 
     def convert(actor: Actor) -> None:
-        names = [port.name for port in actor.entity.ports.values() if port.flag(direction)]
+        names = [
+            port.name for port in actor.entity.ports.values() if port.flag(direction) and actor.widths.get(port.name)
+        ]
         actor.ports |= {name: name for name in names}
         actor.values["fields"] = names
 
@@ -293,7 +322,7 @@ def event_filter(actor: Actor) -> None:
 def limiter(actor: Actor) -> None:
     """Only limits that are finite."""
     for name, ours in (("top", "high"), ("bottom", "low")):
-        value = actor.get(name, math.inf if name == "top" else -math.inf)
+        value = actor.get(name, 1.0 if name == "top" else 0.0)
         if isinstance(value, (int, float)) and not math.isinf(value) and abs(value) < 1.7e308:
             actor.values[ours] = value
 
@@ -302,8 +331,7 @@ def pid(actor: Actor) -> None:
     """PID, whose input is the error: the gains have the other sign."""
     for name, ours, default in (("Kp", "proportional", 1.0), ("Ki", "integral", 0.0), ("Kd", "derivative", 0.0)):
         value = actor.get(name, default)
-        if value:
-            actor.values[ours] = -value
+        actor.values[ours] = -value if value else 0.0
     actor.values["integration"] = "trapezoid"
 
 
