@@ -41,13 +41,15 @@ class Accumulator(Actor):
     """
 
     input = InputPort(float, multi=True, doc="what is added up")
-    reset = InputPort(required=False, doc="sets the sum back, before the tag is added")
+    reset = InputPort(multi=True, required=False, doc="sets the sum back, before the tag is added")
     output = OutputPort(float, doc="the sum; sent for each round of tokens, and at a reset")
 
     initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
     reset_by = Parameter(
         str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset it: any, or those that are true"
     )
+    low: Parameter[float | None] = Parameter(int | float, None, doc="the least that the sum can be")
+    high: Parameter[float | None] = Parameter(int | float, None, doc="the greatest that the sum can be")
 
     def initialize(self) -> None:
         self._sum = self.initial
@@ -57,10 +59,17 @@ class Accumulator(Actor):
             if self.reset_by == "any" or any(token is True for token in self.reset.tokens):
                 self._sum = self.initial
             if not self.input.present:
-                self.output.send(self._sum)
+                self._send()
         for (tokens,) in rounds(self.input):
             self._sum += elementary.total(present(tokens))
-            self.output.send(self._sum)
+            self._send()
+
+    def _send(self) -> None:
+        if self.low is not None and self._sum < self.low:
+            self._sum = self.low
+        if self.high is not None and self._sum > self.high:
+            self._sum = self.high
+        self.output.send(self._sum)
 
 
 class Integrator(Actor):

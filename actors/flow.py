@@ -211,29 +211,36 @@ class Select(Actor):
     """
 
     input = InputPort(multi=True, doc="a channel for each connection, in their order")
-    control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
+    control = InputPort(int, doc="the number of the channel, from 0")
     output = OutputPort(doc="the tokens of the channel chosen")
 
     unread = Parameter(
         str, "lost", choices=("lost", "kept"), ptolemy="kept", doc="what becomes of tokens that are not chosen"
+    )
+    initial: Parameter[int | None] = Parameter(
+        int, 0, min=0, optional=True, doc="the channel before the first token of control; none if null"
     )
 
     def check(self) -> None:
         self.input.keep = self.control.keep = self.unread == "kept"
 
     def initialize(self) -> None:
-        self._channel = 0
+        self._channel = self.initial
 
     def fire(self) -> None:
         if self.unread == "kept":
             if self.control.waiting():
                 self._channel = self.control.get()
-            if 0 <= self._channel < self.input.width and self.input.waiting(self._channel):
+            if (
+                self._channel is not None
+                and 0 <= self._channel < self.input.width
+                and self.input.waiting(self._channel)
+            ):
                 self.output.send(self.input.get(self._channel))
             return
         if self.control.present:
             self._channel = _channel(self.control.value, self.control, self.input.width, "input")
-        for token in self.input.by_channel()[self._channel]:
+        for token in () if self._channel is None else self.input.by_channel()[self._channel]:
             self.output.send(token)
 
 
@@ -282,7 +289,7 @@ class Sampler(ByChannel):
     Ptolemy: ``Sampler``.
     """
 
-    trigger = InputPort(doc="when to hand on")
+    trigger = InputPort(multi=True, doc="when to hand on")
 
     def fire(self) -> None:
         if self.trigger.present:

@@ -45,7 +45,7 @@ class LogicGate(Actor):
 
 
 def _equal(left: Any, right: Any, tolerance: float) -> bool:
-    return bool(left == right) if tolerance == 0 else abs(left - right) <= tolerance
+    return bool(left == right) if tolerance == 0 else bool(right - tolerance <= left <= right + tolerance)
 
 
 COMPARISONS: Final[dict[str, Callable[[Any, Any, float], bool]]] = {
@@ -53,8 +53,8 @@ COMPARISONS: Final[dict[str, Callable[[Any, Any, float], bool]]] = {
     "!=": lambda left, right, tolerance: not _equal(left, right, tolerance),
     "<": lambda left, right, tolerance: bool(left < (right + tolerance if tolerance else right)),
     "<=": lambda left, right, tolerance: bool(left <= (right + tolerance if tolerance else right)),
-    ">": lambda left, right, tolerance: bool(left > (right - tolerance if tolerance else right)),
-    ">=": lambda left, right, tolerance: bool(left >= (right - tolerance if tolerance else right)),
+    ">": lambda left, right, tolerance: bool((left + tolerance if tolerance else left) > right),
+    ">=": lambda left, right, tolerance: bool((left + tolerance if tolerance else left) >= right),
 }
 
 

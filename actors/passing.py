@@ -144,7 +144,8 @@ class BooleanSelect(Actor):
     """Each ``control`` token lets the next token of ``true_input`` or of ``false_input`` pass, as it says.
 
     Tokens wait until they are chosen, and control tokens until there is one for them, on each channel if there are
-    several.  Ptolemy: ``BooleanSelect``.
+    several.  If unread tokens are ``lost``, the latest control token holds, and what is not chosen is gone.
+    Ptolemy: ``BooleanSelect``, with tokens lost ``BooleanMultiplexor``.
     """
 
     true_input = InputPort(multi=True, keep=True, required=False, doc="what passes for a control token that is true")
@@ -152,10 +153,18 @@ class BooleanSelect(Actor):
     control = InputPort(bool, keep=True, doc="which input is next")
     output = OutputPort(multi=True, doc="what passes, channel by channel")
 
+    unread = Parameter(str, "kept", choices=("kept", "lost"), doc="what becomes of tokens that are not chosen")
+
+    def check(self) -> None:
+        self.true_input.keep = self.false_input.keep = self.control.keep = self.unread == "kept"
+
     def initialize(self) -> None:
         self._control: bool | None = None
 
     def fire(self) -> None:
+        if self.unread == "lost":
+            self._hand_on()
+            return
         if self._control is None and self.control.present:
             self._control = self.control.get()
         if self._control is None:
@@ -165,6 +174,16 @@ class BooleanSelect(Actor):
             for channel in range(chosen.width):
                 self.output.send(chosen.get(channel), None if chosen.width == 1 else channel)
             self._control = None
+
+    def _hand_on(self) -> None:
+        """Send what has come where the latest control token says."""
+        if self.control.present:
+            self._control = self.control.value
+        if self._control is not None:
+            chosen = self.true_input if self._control else self.false_input
+            for channel, tokens in enumerate(chosen.by_channel()):
+                for token in tokens:
+                    self.output.send(token, None if chosen.width == 1 else channel)
 
 
 class Commutator(Actor):
@@ -226,7 +245,13 @@ class Default(Actor):
     alternate = InputPort(doc="what is handed on at tags at which nothing comes at 'preferred'")
     output = OutputPort(ptolemy={"depends_on": ("preferred",)}, doc="one or the other")
 
+    both = Parameter(bool, False, ptolemy=True, doc="whether what comes at 'alternate' follows, at the same tag")
+
     def fire(self) -> None:
+        if self.both:
+            for token in (*self.preferred.tokens, *self.alternate.tokens):
+                self.output.send(token)
+            return
         for preferred, alternate in rounds(self.preferred, self.alternate):
             for token in (present(preferred) or present(alternate))[:1]:
                 self.output.send(token)

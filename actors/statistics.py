@@ -60,15 +60,21 @@ class MovingAverage(_Window):
     """The mean of the latest tokens, correctly rounded.
 
     It is sent for each token; until the window is full, the mean is over what has come so far.
-    Ptolemy: ``MovingAverage``.
+    Ptolemy: ``MovingAverage``; over a span without end and ``whole``, ``Average``.
     """
 
+    reset = InputPort(required=False, doc="a token that is true empties the window, before the tag is counted")
     output = OutputPort(float, doc="the mean")
 
+    whole = Parameter(bool, False, doc="whether the mean of whole numbers is one, too, cut off towards zero")
+
     def fire(self) -> None:
+        if any(token is True for token in self.reset.tokens):
+            self.initialize()
         for token in self.input.tokens:
             self._enter(token)
-            self.output.send(float(self._mean))
+            is_whole = self.whole and isinstance(token, int)
+            self.output.send(math.trunc(self._mean) if is_whole else float(self._mean))
 
 
 class MovingStatistics(_Window):

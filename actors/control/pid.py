@@ -104,6 +104,9 @@ class PID(Actor):
         doc="time constant of back_calculation; sqrt(Kd / Ki) if left out, or Kp / Ki without Kd",
     )  # fmt: skip
     initial = Parameter(float, 0.0, doc="I at the start and after a reset")
+    late_reset = Parameter(
+        bool, False, ptolemy=True, doc="whether a reset counts behind the measurement of the tag, not before it"
+    )
 
     def check(self) -> None:
         if self.low > self.high:
@@ -133,7 +136,7 @@ class PID(Actor):
         return self.proportional, self.integral, self.derivative
 
     def fire(self) -> None:
-        if self.reset.present:
+        if self.reset.present and not self.late_reset:
             self._forget()
         self._add_up()
         if self.feedforward.present:
@@ -152,6 +155,8 @@ class PID(Actor):
             self._error = self.setpoint - self._measured
         for token in self.measurement.tokens:
             self._control(finite_number(self.measurement, token))
+        if self.reset.present and self.late_reset:
+            self._forget()
 
     def _add_up(self) -> None:
         """Bring I to the present time, over which the error and the output have been held."""

@@ -306,14 +306,15 @@ def array_sort(actor: Actor) -> None:
 
 
 def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Special:
-    """A parameter that is one of some words."""
+    """A parameter that is one of some words, in small letters or capitals."""
+    known = {word.lower(): each for word, each in words.items()}
 
     def convert(actor: Actor) -> None:
         word = actor.text(name, default)
-        if word not in words:
+        if word.lower() not in known:
             actor.notes.error(f"{actor.path}.{name} = {word!r}: has no counterpart")
         else:
-            actor.values[ours] = words[word]
+            actor.values[ours] = known[word.lower()]
 
     return convert
 
@@ -337,6 +338,18 @@ def rounding(actor: Actor) -> None:
     words = {"ceil": "ceil(input)", "floor": "floor(input)", "round": "floor(input + 0.5)", "truncate": "int(input)"}
     word = actor.text("function", "round")
     actor.values["expression"] = words.get(word, words["round"])
+
+
+def sequence(actor: Actor) -> None:
+    """A Sequence that repeats has nothing to hold."""
+    if actor.get("repeat", False) is True:
+        actor.told.add("holdLastOutput")
+    actor.told.discard("repeat")
+
+
+def execution_time(actor: Actor) -> None:
+    """What it sends is how long the computer took, which no model tells."""
+    actor.notes.note(f"{actor.path} sends how long a computation took, in ms: here 0")
 
 
 def random(law: str, **parameters: str) -> Special:
@@ -421,7 +434,9 @@ def fields(direction: str) -> Special:
     """A RecordAssembler or RecordDisassembler: its ports are the fields."""
 
     def convert(actor: Actor) -> None:
-        names = [port.name for port in actor.entity.ports.values() if port.flag(direction)]
+        names = [
+            port.name for port in actor.entity.ports.values() if port.flag(direction) and actor.widths.get(port.name)
+        ]
         actor.ports |= {name: name for name in names}
         actor.values["fields"] = names
 
@@ -440,7 +455,7 @@ def quantum(actor: Actor) -> None:
 def limiter(actor: Actor) -> None:
     """Only limits that are finite."""
     for name, ours in (("top", "high"), ("bottom", "low")):
-        value = actor.get(name, math.inf if name == "top" else -math.inf)
+        value = actor.get(name, 1.0 if name == "top" else 0.0)
         if isinstance(value, (int, float)) and not math.isinf(value) and abs(value) < 1.7e308:
             actor.values[ours] = value
 
@@ -449,8 +464,7 @@ def pid(actor: Actor) -> None:
     """PID, whose input is the error: the gains have the other sign."""
     for name, ours, default in (("Kp", "proportional", 1.0), ("Ki", "integral", 0.0), ("Kd", "derivative", 0.0)):
         value = actor.get(name, default)
-        if value:
-            actor.values[ours] = -value
+        actor.values[ours] = -value if value else 0.0
     actor.values["integration"] = "trapezoid"
 
 

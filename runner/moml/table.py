@@ -54,6 +54,7 @@ _SOURCES: Mapping[str, Counterpart] = {
         "Sequence",
         "trigger* enable | output",
         needs="trigger enable",
+        special=how.sequence,
         values="list=[1]",
         repeat="flag",
         holdLastOutput="flag:hold",
@@ -61,7 +62,7 @@ _SOURCES: Mapping[str, Counterpart] = {
     "Pulse": counterpart("Pulse", "trigger* | output", values="list", indexes="list", repeat="flag"),
     "CurrentTime": counterpart("CurrentTime", "trigger* | output", stopTime="nothing"),
     "CurrentMicrostep": counterpart("CurrentMicrostep", "trigger* | output"),
-    "GetCurrentMicrostep": counterpart("CurrentMicrostep", "input=trigger | output"),
+    "GetCurrentMicrostep": counterpart("CurrentMicrostep", "trigger* input=trigger | output"),
 }
 
 
@@ -132,8 +133,8 @@ _FLOW: Mapping[str, Counterpart] = {
     "Register": counterpart("Register", "input* trigger* | output*", initialValue="value:initial"),
     "Inhibit": counterpart("Inhibit", "input* inhibit* | output*"),
     "Previous": counterpart("Previous", initialValue="value:initial"),
-    "EventFilter": counterpart("Filter"),
-    "TrueGate": counterpart("Filter"),
+    "EventFilter": counterpart("Filter", "input* | output*"),
+    "TrueGate": counterpart("Filter", "input* | output*"),
     "QuantizedSampler": counterpart("Changes", special=how.quantum),
     "SuppressSimultaneousEvents": counterpart("FirstOfInstant"),
     "SamplerWithDefault": counterpart("MostRecent", "input* trigger* | output*", initialValue="value:initial"),
@@ -145,11 +146,9 @@ _FLOW: Mapping[str, Counterpart] = {
     ),
     "Select": counterpart("Select", "input* control | output"),
     "BooleanSelect": counterpart("BooleanSelect", "trueInput* falseInput* control | output*"),
-    "Multiplexor": counterpart("Select", "input* select=control | output", fixed={"unread": "lost"}),
+    "Multiplexor": counterpart("Select", "input* select=control | output", fixed={"unread": "lost", "initial": None}),
     "BooleanMultiplexor": counterpart(
-        "Expression",
-        "trueInput=trueInput falseInput=falseInput select | output",
-        special=how.formula("trueInput if select else falseInput"),
+        "BooleanSelect", "trueInput falseInput select=control | output", fixed={"unread": "lost"}
     ),
     "Distributor": counterpart("Router", "input* | output*", special=how.no_trigger("blockSize=1")),
     "Commutator": counterpart("Commutator", "input* | output", blockSize="whole:block"),
@@ -176,8 +175,17 @@ _FLOW: Mapping[str, Counterpart] = {
     "Sequencer": counterpart("Sequencer", "input sequenceNumber=number | output", startingSequenceNumber="whole:first"),
     "ElementsToArray": counterpart("Collect", "input* | output"),
     "ArrayToElements": counterpart("Spread", "input | output*"),
-    "Sleep": counterpart("Commutator", "input* | output*", sleepTime="nothing"),
-    "ExecutionTime": counterpart("Commutator", executionTime="nothing"),
+    "Sleep": counterpart("Filter", "input* | output*", fixed={"condition": "True"}, sleepTime="nothing"),
+    "ExecutionTime": counterpart(
+        "Const",
+        "trigger* | output",
+        needs="trigger",
+        special=how.execution_time,
+        fixed={"value": 0},
+        executionTime="nothing",
+        realTime="nothing",
+        granularity="nothing",
+    ),
     "IsPresent": counterpart("IsPresent", "input* | output*"),
 }
 
@@ -229,29 +237,33 @@ _COMPUTING: Mapping[str, Counterpart] = {
     ),
     "Round": counterpart("Expression", "input=input | output", special=how.rounding),
     "Accumulator": counterpart(
-        "Accumulator", "input* reset* | output", init="number:initial", lowerBound="none", upperBound="none"
+        "Accumulator",
+        "input* reset* | output",
+        init="number:initial",
+        lowerBound="number:low",
+        upperBound="number:high",
     ),
     "Counter": counterpart("Counter", "increment* decrement* reset* | output"),
-    "Differential": counterpart("Difference", initialValue="number:initial"),
+    "Differential": counterpart("Difference", fixed={"initial": 0}),
     "Derivative": counterpart("Derivative", "input reset | output"),
     "AverageOverTime": counterpart("TimeAverage"),
     "Integrator": counterpart(
         "Integrator", "input reset | output", fixed={"method": "trapezoid"}, initialValue="number:initial"
     ),
     "Expression": counterpart("Expression", "| output", special=how.expression),
-    "LookupTable": counterpart("LookupTable", table="list:values"),
+    "LookupTable": counterpart("LookupTable", table="list:values=[0, 1]"),
     "Limiter": counterpart("Limiter", special=how.limiter),
     "Quantizer": counterpart("Expression", "input=input | output", special=how.quantizer),
     "Maximum": counterpart("Extreme", "input* | maximumValue=value channelNumber=channel", fixed={"take": "greatest"}),
     "Minimum": counterpart("Extreme", "input* | minimumValue=value channelNumber=channel", fixed={"take": "least"}),
-    "Average": counterpart("MovingAverage", fixed={"span": "1e8 s"}),
+    "Average": counterpart("MovingAverage", "input reset | output", fixed={"span": "1e8 s", "whole": True}),
     "PID": counterpart("PID", "input=measurement reset | output", special=how.pid),
     "IIR": counterpart("DiscreteFilter", numerator="list=[1.0]", denominator="list=[1.0]"),
     "MovingAverage": counterpart("MovingAverage", maxPastInputsToAverage="whole:size=10"),
     "Remainder": counterpart(
         "Expression",
         "input=input | output",
-        special=how.formula("input - {divisor} * int(input / {divisor})", divisor=1.0),
+        special=how.formula("input - {divisor} * round(input / {divisor})", divisor=1.0),
     ),
     "ArrayElement": counterpart(
         "Expression", "input=input index=index | output", special=how.formula("input[{index}]", index=0)
@@ -290,7 +302,7 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "BooleanToAnything": counterpart(
         "Expression",
         "input=input | output",
-        special=how.formula("{trueValue} if input else {falseValue}", trueValue=True, falseValue=False),
+        special=how.formula("{trueValue} if input else {falseValue}", trueValue=1, falseValue=0),
     ),
     "DB": _DECIBEL,
     "dB": _DECIBEL,
@@ -302,7 +314,7 @@ _COMPUTING: Mapping[str, Counterpart] = {
     "StringSubstring": counterpart(
         "Expression",
         "input=input start=start stop=stop | output",
-        special=how.formula("input[{start}:] if {stop} == -1 else input[{start}:{stop}]", start=0, stop=0),
+        special=how.formula("input[{start}:{stop}] if {stop} >= {start} else input[{start}:]", start=0, stop=0),
     ),
     "StringCompare": counterpart(
         "TextFunction",

@@ -177,7 +177,7 @@ def test_a_trigger_that_comes_microsteps_after_the_tick(late: bool, expected: li
         ("Derivative", [("input", [[0, 1], [2, 3], [2, 3], [3, 1], [4, 9]]), ("reset", [[3, 0]])], [1.0, -2.0]),
         ("TimeAverage", [("input", [[0, 1], [2, 3], [4, 0], [8, 1]])], [1.0, 2.0, 1.0]),
         ("Sequencer", [("input", [[n, n] for n in range(5)]), ("number", [[0, 2], [1, 0], [3, 1], [4, 4]])], [1, 2, 0]),
-        ("Default", [("preferred", [[0, 1], [2, 3]]), ("alternate", [[0, 7], [1, 8]])], [1, 8, 3]),
+        ("Default", [("preferred", [[0, 1], [2, 3]]), ("alternate", [[0, 7], [1, 8]])], [1, 7, 8, 3]),
         ("Collect", [("input", [[0, 1], [1, 2]]), ("input", [[1, "a"], [1, "b"], [2, "c"]])], [[1, "a"], [2, "b"]]),
         ("Collect, joined: true", [("input", [[0, [1]]]), ("input", [[1, [2, 3]]])], [[1, 2, 3]]),
         ("RecordAssembler, fields: [x], onto: input", [("input", [[0, {"x": 1, "y": 2}]]), ("x", [[1, 5]])],
