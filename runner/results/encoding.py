@@ -11,6 +11,7 @@ import json
 import math
 import re
 import struct
+import threading
 from collections.abc import Callable, Iterator
 from enum import Enum
 from functools import cache
@@ -28,6 +29,7 @@ _COUNT = struct.Struct("<I").pack
 
 # A NaN has many bit patterns, and machines differ in which one an operation gives.
 _NAN = struct.pack("<cQ", b"f", 0x7FF8000000000000)
+MOST_NESTED = 64
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
@@ -125,14 +127,46 @@ def _scalar(token: Any) -> bytes:
     return _other(token) if isinstance(item, np.generic) else canonical(item)
 
 
+class _Level(threading.local):
+    """How deep in a token the encoder of this thread is."""
+
+    depth = 0
+
+
+_level = _Level()
+
+
+def _nested(encode: Encode) -> Encode:
+    """What encodes a token that holds others, as far as no loop wraps it up again and again.
+
+    A limit of our own: where Python runs out of stack depends on who called, and would differ from core to core.
+    """
+
+    def encode_inside(token: Any) -> bytes:
+        _level.depth += 1
+        try:
+            if _level.depth > MOST_NESTED:
+                raise TokenError(
+                    f"the token is nested more than {MOST_NESTED} levels deep; "
+                    "does a loop put it into a list again and again?"
+                )
+            return encode(token)
+        finally:
+            _level.depth -= 1
+
+    return encode_inside
+
+
 def _sequence(token: Any) -> bytes:
     return b"l" + _COUNT(len(token)) + b"".join([canonical(item) for item in token])
 
 
+@_nested
 def _mapping(token: Any) -> bytes:
     return b"m" + _COUNT(len(token)) + b"".join(sorted(canonical(k) + canonical(v) for k, v in token.items()))
 
 
+@_nested
 def _set(token: Any) -> bytes:
     return b"e" + _COUNT(len(token)) + b"".join(sorted(map(canonical, token)))
 
@@ -146,7 +180,8 @@ _OF_KINDS: tuple[tuple[Any, Encode], ...] = (
     (int, _integer),
     (str, lambda token: b"s" + _text(token)),
     (np.generic, _scalar),
-    ((list, tuple), _sequence),
+    (list, _nested(_sequence)),
+    (tuple, _sequence),
     (dict, _mapping),
     ((set, frozenset), _set),
 )

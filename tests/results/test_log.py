@@ -417,3 +417,16 @@ def test_a_parquet_log_is_written_in_large_pieces(tmp_path: Path) -> None:
     write_log(records, tmp_path / "l.parquet")
     found = pq.ParquetFile(tmp_path / "l.parquet").metadata
     assert [found.row_group(group).num_rows for group in range(found.num_row_groups)] == [10_000, 10_000, 5_000]
+
+
+def test_a_token_that_a_loop_wraps_again_and_again_ends_at_a_limit_of_ours() -> None:
+    # Not where Python runs out of stack, which differs from core to core.
+    token: list[object] = [1.0]
+    for _ in range(63):
+        token = [token]
+    assert EventLog().add(Tag(0, 1), "send", "a", "output", None, "", token) is None
+    with pytest.raises(TokenError) as raised:
+        EventLog().add(Tag(0, 1), "send", "a", "output", None, "", {"inside": token})
+    assert str(raised.value) == (
+        "the token is nested more than 64 levels deep; does a loop put it into a list again and again?"
+    )
