@@ -112,7 +112,8 @@ class ChiSquare(Distribution):
 class StudentT(Distribution):
     """Student's t distribution."""
 
-    freedom = Parameter(float, unit="1", above=0, doc="degrees of freedom")
+    # Below, the sum of squares that it divides by is too small for a float every now and then.
+    freedom = Parameter(float, unit="1", min=0.1, doc="degrees of freedom")
 
     def draw(self, random: Stream) -> float:
         return random.standard_t(self.freedom)

@@ -257,7 +257,15 @@ class _OfDRand(Numbers):
         return elementary.tan((2.0 * self.random() - 1.0) * (math.pi / 2.0))
 
     def vonmises(self, mean: float, concentration: float) -> float:
-        """Von Mises, by the method of Best and Fisher (Applied Statistics 28, 1979)."""
+        """Von Mises, by the method of Best and Fisher (Applied Statistics 28, 1979).
+
+        Raises ``EpicycleError`` where its ratios lose all their digits, and Colt's own loop does not end.
+        """
+        if not 1e-6 <= concentration <= 1e6:
+            raise EpicycleError(
+                f"DRand draws angles whose concentration is from 1e-6 to 1e6, not {concentration:g}: "
+                "leave 'generator' out"
+            )
         tau = 1.0 + math.sqrt(1.0 + 4.0 * concentration * concentration)
         rho = (tau - math.sqrt(2.0 * tau)) / (2.0 * concentration)
         r = (1.0 + rho * rho) / (2.0 * rho)

@@ -231,3 +231,9 @@ def test_messages() -> None:
     with pytest.raises(ActorError) as caught:
         behave(many, [("trigger", [[0, 0]])])
     assert caught.value.reason == ("DRand draws Poisson numbers whose mean is below 10, not 10: leave 'generator' out")
+    narrow = "{type: Random, distribution: {type: VonMises, concentration: 1e7}, generator: {type: DRand, seed: 5}}"
+    with pytest.raises(ActorError) as caught:
+        behave(narrow, [("trigger", [[0, 0]])])
+    assert caught.value.reason == (
+        "DRand draws angles whose concentration is from 1e-6 to 1e6, not 1e+07: leave 'generator' out"
+    )
