@@ -1,47 +1,112 @@
-"""Publishers and subscribers: what is sent by the name of a channel, as wires."""
+"""Publishers and subscribers: what is sent by the name of a channel, as wires.
+
+A channel reaches as far as a director does: all transparent composites under it.  A ``global`` one reaches everywhere.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count, pairwise
 
-from .entities import Entity, Relation
+from .directors import director_of
+from .entities import Entity, Link, Port, Property, Relation, kind
 from .notes import Notes
 
 
+@dataclass(frozen=True)
+class _Terminal:
+    """A Publisher or Subscriber, or a port that is one: where it is, from the model down, and what it is for."""
+
+    around: tuple[Entity, ...]
+    name: str  # of the actor, or "composite.port"
+    channel: str
+    is_global: bool
+    is_source: bool
+
+    @property
+    def path(self) -> str:
+        return ".".join([*(each.name for each in self.around[1:]), self.name])
+
+    @property
+    def region(self) -> Entity:
+        """The composite whose director it is under."""
+        return next((each for each in reversed(self.around) if director_of(each) is not None), self.around[0])
+
+    def hears(self, source: _Terminal) -> bool:
+        """Whether what is published there is for this subscriber."""
+        is_near = self.region is source.region or source.is_global or self.is_global
+        return source.channel == self.channel and is_near
+
+
 def join_channels(model: Entity, notes: Notes) -> None:
-    """Join the relations of publishers and subscribers of one composite and channel, and take these actors out."""
-    for composite in model.everything():
-        senders = dict(_of_kind(composite, "Publisher"))
-        for name, channel in list(_of_kind(composite, "Subscriber")):
-            sources = [each for each, of in senders.items() if of == channel]
-            if sources:
-                _join(composite, [*sources, name], channel)
-        for name in [*senders, *(name for name, _ in _of_kind(composite, "Subscriber"))]:
-            links = composite.links.get(f"{name}.input") or composite.links.get(f"{name}.output")
-            if name in senders or (links and links[0].relation and links[0].relation.startswith(_MARK)):
-                del composite.entities[name]
-                for port in ("input", "output"):
-                    composite.links.pop(f"{name}.{port}", None)
-            else:
-                notes.note(f"{name} hears nothing: no Publisher beside it has its channel")
+    """Join the relations of publishers and subscribers with one channel, and take these actors out."""
+    terminals = list(_terminals(model, ()))
+    sources = [each for each in terminals if each.is_source]
+    orders = count(1_000_000)  # behind all links of the file
+    for each in terminals:
+        heard = [] if each.is_source else [source for source in sources if each.hears(source)]
+        for source in heard:
+            shared = _shared(source.around, each.around)
+            _lead(source, shared, orders)
+            _lead(each, shared, orders)
+        if not heard and not each.is_source:
+            notes.error(f"{each.path} hears nothing: no Publisher within reach has its channel")
+    for each in terminals:
+        if "." not in each.name:
+            home = each.around[-1]
+            del home.entities[each.name]
+            for port in ("input", "output"):
+                home.links.pop(f"{each.name}.{port}", None)
 
 
-_MARK = "channel "
+def _terminals(composite: Entity, around: tuple[Entity, ...]) -> Iterator[_Terminal]:
+    around = (*around, composite)
+    for child in composite.entities.values():
+        places: list[tuple[str, Property]] = [(f"{child.name}.{port.name}", port) for port in child.ports.values()]
+        for name, said in [(child.name, child), *places]:
+            word = kind(said).removesuffix("Port") if said is not child else kind(said)
+            if word in ("Publisher", "Subscriber") and (said is child or kind(said) == f"{word}Port"):
+                channel = (said.text("channel") or "channel1").strip().strip('"')
+                is_global = (said.text("global") or "false").strip() == "true"
+                yield _Terminal(around, name, channel, is_global, word == "Publisher")
+        yield from _terminals(child, around)
 
 
-def _of_kind(composite: Entity, kind: str) -> Iterator[tuple[str, str]]:
-    for name, each in composite.entities.items():
-        if each.java == f"ptolemy.actor.lib.{kind}":
-            yield name, (each.text("channel") or "channel1").strip().strip('"')
+def _shared(one: tuple[Entity, ...], other: tuple[Entity, ...]) -> int:
+    """How many composites two places have in common."""
+    return sum(1 for a, b in zip(one, other, strict=False) if a is b)
 
 
-def _join(composite: Entity, names: list[str], channel: str) -> None:
-    """One relation for all of a channel, to which those of its senders and receivers are linked."""
-    relation = f"{_MARK}{channel}"
-    composite.relations.setdefault(relation, Relation(relation))
-    for name in names:
-        for port in ("input", "output"):
-            for link in composite.links.get(f"{name}.{port}", []):
-                if link.relation is not None and link.relation != relation:
-                    composite.joined.append((relation, link.relation, link.order))
-                    link.relation = relation
+def _lead(terminal: _Terminal, shared: int, orders: Iterator[int]) -> None:
+    """Lead a terminal to the relation of its channel in the innermost of the composites that it shares."""
+    relation = f"channel {terminal.channel}"
+    way = terminal.around[shared - 1 :]
+    for composite in way:
+        composite.relations.setdefault(relation, Relation(relation))
+    if "." in terminal.name:
+        _link(way[-1], terminal.name, relation, orders)
+    else:
+        for link in _links(terminal):
+            if link.relation is not None and link.relation != relation:
+                way[-1].joined.append((relation, link.relation, link.order))
+                link.relation = relation
+    for outer, inner in pairwise(way):
+        port = re.sub(r"\W+", "_", terminal.channel) + ("_out" if terminal.is_source else "_in")
+        direction = "output" if terminal.is_source else "input"
+        inner.ports.setdefault(port, Port(port, properties={direction: Property(direction, value="true")}))
+        _link(inner, port, relation, orders)
+        _link(outer, f"{inner.name}.{port}", relation, orders)
+
+
+def _link(composite: Entity, port: str, relation: str, orders: Iterator[int]) -> None:
+    """Link a port to a relation, once."""
+    links = composite.links.setdefault(port, [])
+    if all(link.relation != relation for link in links):
+        links.append(Link(port, relation, 0, next(orders)))
+
+
+def _links(terminal: _Terminal) -> list[Link]:
+    known = terminal.around[-1].links
+    return [link for port in ("input", "output") for link in known.get(f"{terminal.name}.{port}", [])]
