@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,7 +24,6 @@ from .core import (
     rounds,
     visible_lines,
 )
-from .matching import alike
 
 _DISPLAY = logging.getLogger("epicycle.display")
 
@@ -176,7 +176,7 @@ class Test(Actor):
         if index >= len(self.values):
             raise EpicycleError(f"token {index} is {token!r}, but only {len(self.values)} are expected")
         expected = self.values[index]
-        if not alike(token, expected, self.tolerance):
+        if not _alike(token, expected, self.tolerance):
             raise EpicycleError(f"token {index} is {token!r}, expected {expected!r}{self._within()}")
         if self.times is not None and abs(self.now - self.times[index]) > self.tolerance:
             raise EpicycleError(
@@ -192,6 +192,22 @@ class Test(Actor):
                 f"{self._seen} of {counted(len(self.values), 'expected token')} came, the next was to be "
                 f"{self.values[self._seen]!r}"
             )
+
+
+def _alike(token: Any, expected: Any, tolerance: float) -> bool:
+    """Whether a token is what is expected; lists, arrays and fields are compared item by item."""
+    if isinstance(token, (np.ndarray, np.generic)):
+        token = token.tolist()
+    if isinstance(expected, (list, tuple)):
+        is_list = isinstance(token, (list, tuple)) and len(token) == len(expected)
+        return is_list and all(_alike(one, other, tolerance) for one, other in zip(token, expected, strict=True))
+    if isinstance(expected, Mapping) and isinstance(token, Mapping):
+        return token.keys() == expected.keys() and all(_alike(token[k], expected[k], tolerance) for k in expected)
+    if isinstance(expected, bool) or isinstance(token, bool):
+        return token is expected
+    if isinstance(expected, (int, float)) and isinstance(token, (int, float)):
+        return token == expected or abs(token - expected) <= tolerance
+    return bool(token == expected)
 
 
 class Stop(Actor):
