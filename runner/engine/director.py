@@ -325,8 +325,8 @@ class Director:
             assert turn is not None
             turn.clear()
             self.fail(turn, error)
-        if self._next is None:
-            self.present = None
+        # Its next microstep comes next, also where nobody fired at this one: a process alone may have asked for that.
+        self.present = None if self._next is None else instant
 
     def _gather(self, turn: Turn) -> bool:
         """Let an actor that takes all that waits have the turns of its own that come next, too.

@@ -235,6 +235,8 @@ def plain(value: Any) -> object:
         raise ValueError("NaN cannot be written")
     if isinstance(value, str):
         return value.replace("${", "$${")
+    if callable(value):
+        raise ValueError("a function cannot be a value here")
     return value
 
 

@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from .entities import Entity, Property
+from .operators import java_text
 from .syntax import ExpressionError, Tree, parse
-from .values import CONSTANTS, evaluate, java_text
+from .values import CONSTANTS, evaluate
 
 TEXTS = ("StringParameter", "FileParameter", "StringAttribute", "PortParameterString", "TextAttribute", "DateAttribute",
          "ColorAttribute", "CommitActionsAttribute", "OutputActionsAttribute", "FileOrDirectoryParameter")  # fmt: skip
 _VARIABLES = ("Parameter", "Variable", "ParameterSet")
-_REFERENCE = re.compile(r"\$(?:(\$)|\{([A-Za-z_][\w.]*)\}|\(([A-Za-z_][\w.]*)\)|([A-Za-z_]\w*))")
+_REFERENCE = re.compile(r"\$(?:(\$)|\{([A-Za-z_][\w.]*)\}|\(((?:[^()]|\([^()]*\))+)\)|([A-Za-z_]\w*))")
 MAX_DEPTH = 50
 
 
@@ -117,9 +118,9 @@ class Scope:
         def value(match: re.Match[str]) -> str:
             if match[1]:
                 return "$"
-            name = match[2] or match[3] or match[4]
+            name = match[2] or match[4]
             try:
-                return java_text(self(name))
+                return java_text(self(name) if name else self.value(match[3]))
             except (KeyError, ExpressionError):
                 return match[0]
 

@@ -102,13 +102,21 @@ class Steps:
     last: Tree
 
 
-Tree: TypeAlias = Const | Name | Unary | Binary | Choice | Call | Method | Array | Record | Matrix | Steps
+@dataclass(frozen=True)
+class Lambda:
+    """``function(x, y: int) x + y``, whose types are not kept."""
+
+    names: tuple[str, ...]
+    body: Tree
+
+
+Tree: TypeAlias = Const | Name | Unary | Binary | Choice | Call | Method | Array | Record | Matrix | Steps | Lambda
 
 _TOKEN = re.compile(
     r"""\s*(?:(?P<comment>//[^\n]*|/\*.*?\*/)
-    |(?P<number>0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?P<suffix>(?:[lLuUbBfFdDiIjJsS]+(?!\w))?)
+    |(?P<number>0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?P<suffix>(?:[lLuUbBfFdDpPiIjJsS]+(?!\w))?)
     |(?P<text>"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')
-    |(?P<name>[A-Za-z_$][\w$]*)
+    |(?P<name>[A-Za-z_$](?:[\w$@]|::)*)
     |(?P<sign>>>>|\|\||&&|==|!=|<=|>=|<<|>>|\{\||\|\}|[-+*/%^!~<>?:;,.(){}\[\]=|&\#@]))""",
     re.VERBOSE | re.DOTALL,
 )
@@ -118,7 +126,7 @@ _LEVELS: dict[object, int] = {
     for level, signs in enumerate(("||", "&&", "|", "#", "&", "== !=", "< <= > >=", "<< >> >>>", "+ -", "* / %"))
     for sign in signs.split()
 }  # how tightly signs hold
-_CONSTANTS = {"true": True, "false": False}
+_CONSTANTS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
 
 
 def parse(text: str) -> Tree:
@@ -174,9 +182,9 @@ class _Parser:
         try:
             if text[:2].lower() == "0x":
                 return int(text, 16)
-            if "." in text or "e" in text.lower() or "f" in suffix or "d" in suffix:
+            if "." in text or "e" in text.lower() or suffix in ("f", "d", "p"):
                 return float(text)
-            return int(text)
+            return int(text, 8 if text[0] == "0" else 10)  # as in Java
         except ValueError:
             raise ExpressionError(f"{_short(text)} is not a number") from None
 
@@ -220,6 +228,10 @@ class _Parser:
         self._depth += 1
         if self._depth > MAX_DEPTH:
             self._fail(f"nested deeper than {MAX_DEPTH} levels")
+        if self._tokens[self._place] == ("name", "function") and self._peek(1) == "(":
+            made = self._lambda()
+            self._depth -= 1
+            return made
         test = self._level(0)
         if self._skip("?"):
             one = self._choice()
@@ -228,8 +240,23 @@ class _Parser:
         self._depth -= 1
         return test
 
+    def _lambda(self) -> Tree:
+        self._take()
+        self._expect("(")
+        names: list[str] = []
+        while not self._skip(")"):
+            if names:
+                self._expect(",")
+            kind, name = self._take()
+            if kind != "name":
+                self._fail("the name of an argument was expected")
+            names.append(str(name))
+            if self._skip(":"):
+                self._choice()
+        return Lambda(tuple(names), self._choice())
+
     def _level(self, least: int) -> Tree:
-        left = self._unary()
+        left = self._power()
         count = 0
         while (level := _LEVELS.get(sign := self._peek(), -1)) >= least:
             self._place += 1
@@ -239,6 +266,17 @@ class _Parser:
                 self._fail("it is too long")
         return left
 
+    def _power(self) -> Tree:
+        """A sign holds tighter than a power: -2 to the power of 2 is 4."""
+        found = self._unary()
+        count = 0
+        while self._skip("^"):
+            count += 1
+            if count > MAX_DEPTH:
+                self._fail("it is too long")
+            found = Binary("^", found, self._unary())
+        return found
+
     def _unary(self) -> Tree:
         signs = []
         while (sign := self._peek()) in ("-", "!", "~", "+"):
@@ -246,23 +284,11 @@ class _Parser:
             signs.append(str(sign))
             if len(signs) > MAX_DEPTH:
                 self._fail(f"nested deeper than {MAX_DEPTH} levels")
-        found = self._power()
+        found = self._element()
         for sign in reversed(signs):
             if sign != "+":
                 plain = sign == "-" and isinstance(found, Const) and type(found.value) in (int, float)
                 found = Const(-found.value) if plain else Unary(sign, found)  # type: ignore[union-attr, operator]
-        return found
-
-    def _power(self) -> Tree:
-        found = self._element()
-        count = 0
-        while self._skip("^"):
-            count += 1
-            if count > MAX_DEPTH:
-                self._fail("it is too long")
-            negative = self._skip("-")
-            exponent = self._element()
-            found = Binary("^", found, Unary("-", exponent) if negative else exponent)
         return found
 
     def _element(self) -> Tree:
@@ -297,8 +323,6 @@ class _Parser:
         if kind == "value":
             return Const(value)
         if kind == "name":
-            if value == "function" and self._peek() == "(":
-                raise ExpressionError(f"{_short(self._text)}: functions of one's own are not known here")
             return Const(_CONSTANTS[str(value)]) if value in _CONSTANTS else Name(str(value))
         if value == "(":
             found = self._choice()

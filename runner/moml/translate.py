@@ -3,9 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import TypeAlias
 
-from .syntax import Array, Binary, Call, Choice, Const, ExpressionError, Matrix, Method, Name, Record, Tree, Unary
-from .values import Scope, evaluate
+from .syntax import (
+    Array,
+    Binary,
+    Call,
+    Choice,
+    Const,
+    ExpressionError,
+    Lambda,
+    Matrix,
+    Method,
+    Name,
+    Record,
+    Tree,
+    Unary,
+)
+from .values import Function, Scope, evaluate
 
 # How tightly a piece of an expression holds together.
 _CHOICE, _OR, _AND, _NOT, _COMPARE, _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = range(10)
@@ -15,7 +30,9 @@ _SIGNS: Mapping[str, tuple[str, int]] = {
     ">": (">", _COMPARE), ">=": (">=", _COMPARE), "+": ("+", _SUM), "-": ("-", _SUM),
     "*": ("*", _PRODUCT), "/": ("/", _PRODUCT), "%": ("%", _PRODUCT), "^": ("**", _POWER),
 }  # fmt: skip
-_SAME = ("abs", "min", "max", "sqrt", "exp", "log", "sin", "cos", "tan", "atan2", "sum")
+_SAME = ("abs", "min", "max", "sqrt", "exp", "log", "sin", "cos", "tan", "atan2", "hypot", "sum")
+MAX_OPENED = 20  # functions within functions
+MAX_TEXT = 2_000  # characters of an expression of ours
 _PATTERNS: Mapping[str, str] = {  # arguments are in brackets or between commas
     "floor": "float(floor({0}))",
     "ceil": "float(ceil({0}))",
@@ -24,6 +41,34 @@ _PATTERNS: Mapping[str, str] = {  # arguments are in brackets or between commas
     "log10": "log({0}, 10)",
     "log2": "log({0}, 2)",
     "pow": "({0}) ** ({1})",
+    "asin": "atan2({0}, sqrt(1 - ({0}) ** 2))",
+    "acos": "atan2(sqrt(1 - ({0}) ** 2), {0})",
+    "atan": "atan2({0}, 1)",
+    "sinh": "((exp({0}) - exp(-({0}))) / 2)",
+    "cosh": "((exp({0}) + exp(-({0}))) / 2)",
+    "toRadians": "(({0}) / 180 * pi)",
+    "toDegrees": "(({0}) * 180 / pi)",
+    "within": "(abs({0} - ({1})) <= {2})",
+    "isCloseTo": "(abs({0} - ({1})) <= {2})",
+    "isInfinite": "(abs({0}) == inf)",
+    "equals": "(({0}) == ({1}))",
+    "isEqualTo": "(({0}) == ({1}))",
+    "isLessThan": "(({0}) < ({1}))",
+    "isGreaterThan": "(({0}) > ({1}))",
+    "add": "(({0}) + ({1}))",
+    "subtract": "(({0}) - ({1}))",
+    "multiply": "(({0}) * ({1}))",
+    "doubleValue": "float({0})",
+    "intValue": "int({0})",
+    "parseInt": "int({0})",
+    "parseDouble": "float({0})",
+    "substring": "({0})[{1}:{2}]",
+    "startsWith": "(({0})[:len({1})] == ({1}))",
+    "concat": "({0} + {1})",
+    "update": "(({0})[:{1}] + [{2}] + ({0})[{1} + 1:])",
+    "and": "(({0}) and ({1}))",
+    "or": "(({0}) or ({1}))",
+    "not": "(not ({0}))",
     "sgn": "(1 if {0} > 0 else -1 if {0} < 0 else 0)",
     "neighborhood": "(abs({0} - ({1})) <= {2})",
     "length": "len({0})",
@@ -43,6 +88,7 @@ _PATTERNS: Mapping[str, str] = {  # arguments are in brackets or between commas
 }
 _CASTS: Mapping[str, str] = {"int": "int", "long": "int", "double": "float", "string": "str", "boolean": "bool"}
 Said = tuple[str, int]
+_Made: TypeAlias = "tuple[tuple[str, ...], Tree, _Translation]"  # arguments, body, and what its names mean
 
 
 def translated(tree: Tree, names: Mapping[str, str], scope: Scope, whole: Collection[str] = ()) -> str:
@@ -62,8 +108,8 @@ def literal(value: object) -> str:
         return "[" + ", ".join(map(literal, value)) + "]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{name!r}: {literal(each)}" for name, each in value.items()) + "}"
-    if value is None:
-        raise ExpressionError("nothing cannot be a value here")
+    if value is None or isinstance(value, Function):
+        raise ExpressionError(f"{'nothing' if value is None else 'a function'} cannot be a value here")
     return repr(value)
 
 
@@ -90,15 +136,18 @@ def names_of(tree: Tree) -> set[str]:
             return set().union(*(names_of(each) for _, each in fields))
         case Matrix(rows):
             return set().union(*(names_of(each) for row in rows for each in row))
+        case Lambda(names, body):
+            return names_of(body) - {*names}
         case _:
             return names_of(tree.first) | names_of(tree.step) | names_of(tree.last)
 
 
 class _Translation:
-    def __init__(self, names: Mapping[str, str], scope: Scope, whole: Collection[str]) -> None:
+    def __init__(self, names: Mapping[str, str], scope: Scope, whole: Collection[str], depth: int = 0) -> None:
         self._names = names
         self._scope = scope
-        self._whole = whole
+        self._whole = set(whole)
+        self._depth = depth  # of functions that are opened up
 
     def said(self, tree: Tree) -> Said:
         """The text, and how tightly it holds together."""
@@ -124,6 +173,10 @@ class _Translation:
             case Method(of, name, arguments) if arguments is not None:
                 indices = "".join(f"[{self.said(each)[0]}]" for each in arguments)
                 return f"{self._held(of, _ATOM)}[{name!r}]{indices}", _ATOM
+            case Call(Name("map" | "filter" as name), (made, array)) if (found := self._made(made)) is not None:
+                return self._each(name, found, array)
+            case Call(function, arguments) if (found := self._made(function)) is not None:
+                return self._opened(found, [self._held(each, _ATOM) for each in arguments], arguments)
             case Call(Name(name), arguments) if name not in self._names and not self._is_known(name):
                 return self._function(name, arguments)
             case Call(function, arguments):
@@ -136,6 +189,49 @@ class _Translation:
                 lines = ("[" + ", ".join(self.said(each)[0] for each in row) + "]" for row in rows)
                 return "[" + ", ".join(lines) + "]", _ATOM
         raise ExpressionError("it has an operator that is not known here")
+
+    # -- functions that the model defines -------------------------------------------------------------------------
+
+    def _made(self, tree: Tree) -> _Made | None:
+        """A function, if it is one that the model defines."""
+        if isinstance(tree, Lambda):
+            return tree.names, tree.body, self
+        if not isinstance(tree, Name) or tree.name in self._names or not self._is_known(tree.name):
+            return None
+        found = self._scope(tree.name)
+        if not isinstance(found, Function):
+            return None
+        return found.names, found.body, _Translation({}, found.scope, (), self._depth)
+
+    def _opened(self, made: _Made, texts: list[str], given: tuple[Tree, ...] = ()) -> Said:
+        """The body of a function, with what it is given in the place of its arguments."""
+        names, body, around = made
+        if len(names) != len(texts):
+            raise ExpressionError(f"a function takes {len(names)} values, and is given {len(texts)}")
+        if self._depth > MAX_OPENED:
+            raise ExpressionError("functions that call themselves are not known here")
+        whole = {name for name, each in zip(names, given, strict=False) if self._is_whole(each)}
+        meant = {**around._names, **dict(zip(names, texts, strict=True))}
+        inner = _Translation(meant, around._scope, (around._whole - {*names}) | whole, self._depth + 1)
+        found = inner.said(body)
+        if len(found[0]) > MAX_TEXT:
+            raise ExpressionError("it is too long with the functions in it opened up")
+        return found
+
+    def _each(self, name: str, made: _Made, array: Tree) -> Said:
+        """A function of each element of an array."""
+        if len(made[0]) != 1:
+            raise ExpressionError(f"{name} with a function of {len(made[0])} values is not known here")
+        item = made[0][0]
+        while item in self._names.values():
+            item += "_"
+        text, holds = self._opened(made, [item])
+        held = text if holds > _CHOICE else f"({text})"
+        source = self._held(array, _OR)
+        found = f"{held} for {item} in {source}" if name == "map" else f"{item} for {item} in {source} if {held}"
+        return f"[{found}]", _ATOM
+
+    # -- operators ------------------------------------------------------------------------------------------------
 
     def _is_known(self, name: str) -> bool:
         try:
@@ -154,9 +250,27 @@ class _Translation:
             return f"{self._text(left)} + {self._text(right)}", _SUM
         if sign == "/" and self._is_whole(left) and self._is_whole(right):
             return f"int({self._held(left, level)} / {self._held(right, level + 1)})", _ATOM
+        if sign == "%":
+            return self._rest(left, right)
+        if sign in ("==", "!=") and right == Const(0) and isinstance(left, Binary) and left.sign == "%":
+            # Whether there is a rest does not hang on signs.
+            return f"{self._held(left.left, _PRODUCT)} % {self._held(left.right, _SIGN)} {word} 0", _COMPARE
         beside = 1 if level in (_COMPARE, _SUM, _PRODUCT, _POWER) else 0
         first = self._held(left, level + (1 if level in (_COMPARE, _POWER) else 0))
         return f"{first} {word} {self._held(right, level + beside)}", level
+
+    def _rest(self, left: Tree, right: Tree) -> Said:
+        """The rest has the sign of the first operand there, and that of the second here."""
+        first, second = self._held(left, _ATOM), self._held(right, _SIGN)
+        if not self._is_at_least(right, 1e-300):
+            second = f"abs({second})"
+        if self._is_at_least(left, 0):
+            return f"{first} % {second}", _PRODUCT
+        return f"({first} % {second} if {first} >= 0 else -(-{first} % {second}))", _ATOM
+
+    def _is_at_least(self, tree: Tree, least: float) -> bool:
+        value = None if names_of(tree) & self._names.keys() else evaluate(tree, self._scope)
+        return isinstance(value, (int, float)) and value >= least
 
     def _is_whole(self, tree: Tree) -> bool:
         """Whether this is known to be a whole number."""
@@ -167,6 +281,14 @@ class _Translation:
                 return self._is_whole(operand)
             case Binary("+" | "-" | "*" | "/" | "%", left, right):
                 return self._is_whole(left) and self._is_whole(right)
+            case Binary("^", left, Const(int())):
+                return self._is_whole(left)
+            case Choice(_, one, other):
+                return self._is_whole(one) and self._is_whole(other)
+            case Call(Name("min" | "max" | "abs"), arguments):
+                return all(map(self._is_whole, arguments))
+            case Call(Name("round" | "roundToInt"), _) | Method(_, "length", _):
+                return True
         if names_of(tree) & self._names.keys():
             return False
         return type(evaluate(tree, self._scope)) is int

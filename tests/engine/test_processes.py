@@ -300,3 +300,24 @@ def test_a_process_that_nobody_else_knows_goes_on_waiting_for_a_token(behave: Ca
         behaviour, FED.replace("}}", "}, probe: {type: Probe}}").replace("input]", "input, a.output -> probe.input]")
     )
     assert len(sends(results, "a")) == len(sends(results, "t")) > 3
+
+
+def test_time_goes_on_from_a_tag_at_which_a_process_alone_sends_by_a_delay_of_0(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Nobody fires at the tag at which SimPy resumes the process: its next microstep still comes before any later time.
+    def behaviour(actor: Script) -> Generator[Any, Any, None]:
+        yield actor.environment.timeout(500_000_000)
+        actor.output.send("x")
+
+    monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))
+    text = (
+        "actors: {a: {type: Script}, probe: {type: Probe}, t: {type: Ticker, limit: 2}, late: {type: Probe}}\n"
+        "connections: [{from: a.output, to: probe.input, delay: 0 s}, t.output -> late.input]\n"
+    )
+    simulation, results = simulate(text, until=5)
+    assert seen(simulation) == [(0.5, 2, ("x",))]
+    assert seen(simulation, "late") == [(0.0, 1, (0,)), (1.0, 1, (1,))]
+    tags = [record.tag for record in results.log.records]
+    assert tags == sorted(tags)
+    assert results.end == 1.0

@@ -8,9 +8,12 @@ from typing import Any
 import pytest
 
 from epicycle.actors.expression import evaluate as own_evaluate
+from runner.moml.entities import Property
+from runner.moml.operators import Rows, java_text
+from runner.moml.scope import Scope
 from runner.moml.syntax import ExpressionError, parse
 from runner.moml.translate import translated
-from runner.moml.values import Rows, evaluate
+from runner.moml.values import evaluate
 
 PARAMETERS: dict[str, Any] = {
     "n": 3,
@@ -20,6 +23,12 @@ PARAMETERS: dict[str, Any] = {
     "rec": {"a": 1, "b": [4, 5]},
     "yes": True,
 }
+for _name, _text in (
+    ("endless", "function(x) endless(x)"),
+    ("twice", "function(x) x * 2"),
+    ("factorial", "function(k) k < 2 ? 1 : k * factorial(k - 1)"),
+):
+    PARAMETERS[_name] = evaluate(parse(_text), lambda name: PARAMETERS[name])
 
 
 def value(text: str) -> Any:
@@ -34,7 +43,7 @@ def value(text: str) -> Any:
     [
         ("1 + 2 * 3", 7),
         ("2^3^2", 64),
-        ("-2^2", -4),
+        ("-2^2", 4),
         ("7 / 2", 3),
         ("-7 / 2", -3),
         ("7 / 2.0", 3.5),
@@ -100,6 +109,62 @@ def value(text: str) -> Any:
         ('"a\\n\\"b\\""', 'a\n"b"'),
         ("neighborhood(1.0, 1.1, 0.2)", True),
         ("contains(items, 2)", True),
+        # literals
+        ("010", 8),
+        ("1L", 1),
+        ("7s", 7),
+        ("2.5p", 2.5),
+        ("TRUE && !False", True),
+        ("1f", 1.0),
+        # a sign holds tighter than a power, and a rest has the sign of the first operand
+        ("2 - -2^2", -2),
+        ("-7 % -3", -1),
+        ("7 % -3", 1),
+        ("-1 >>> 28", 15),
+        # elements have one type
+        ('{1, "a", true}', ["1", "a", "true"]),
+        ("{{1}, {2.0}}", [[1.0], [2.0]]),
+        ("{{a = 1, b = 2}, {a = 2.0}}", [{"a": 1.0}, {"a": 2.0}]),
+        ("[1, 2.0]", Rows([[1.0, 2.0]])),
+        ('1 == "1"', True),
+        # matrices
+        ("[1, 2; 3, 4] * [1; 1]", Rows([[3], [7]])),
+        ("2 * [1, 2]", Rows([[2, 4]])),
+        ("[1, 2; 3, 4](1, 0)", 3),
+        ("identityMatrixInt(2)", Rows([[1, 0], [0, 1]])),
+        ('"" + [1, 2; 3, 4]', "[1, 2; 3, 4]"),
+        ("transpose([1, 2])", Rows([[1], [2]])),
+        # doubles in texts have up to 13 decimals, and an exponent from a million on
+        ('"" + (0.1 + 0.2)', "0.3"),
+        ('"" + 1234567.0', "1.234567E6"),
+        ('"" + 0.001', "1.0E-3"),
+        ('"" + 100.0', "100.0"),
+        # functions
+        ("(function(x:int, y) x + 2 * y)(1, 2)", 5),
+        ("twice(4)", 8),
+        ("map(twice, items)", [2, 4, 6]),
+        ("map(function(x, y) x * y, {1, 2}, {3, 4})", [3, 8]),
+        ("filter(function(x) x > 1, items)", [2, 3]),
+        ("fold(function(x, y) x + y, 0, items)", 6),
+        ("iterate(function(x) x + n, 3, 0)", [0, 3, 6]),
+        ('eval("n + 1")', 4),
+        ("factorial(5)", 120),
+        ("toRadians(180.0)", math.pi),
+        ("signum(-2)", -1.0),
+        ("hypot(3, 4)", 5.0),
+        ("log(0.0)", -math.inf),
+        ("find({true, false, true})", [0, 2]),
+        ("merge({a = 1}, {a = 2, b = 3})", {"a": 1, "b": 3}),
+        ("items.subarray(1)", [2, 3]),
+        ("items.extract({true, false, true})", [1, 3]),
+        ("items.reverse()", [3, 2, 1]),
+        ("name.toUpperCase()", "JOE"),
+        ('"a,b".split(",")', ["a", "b"]),
+        ("x.isCloseTo(0.6, 0.2)", True),
+        ("cast({double}, items)", [1.0, 2.0, 3.0]),
+        ('cast(boolean, "true")', True),
+        ("max(1, 2.0)", 2.0),
+        ("n(0)", 3),
     ],
 )
 def test_values(text: str, expected: Any) -> None:
@@ -117,7 +182,10 @@ def test_values(text: str, expected: Any) -> None:
         ("1 ` 2", "'1 ` 2' is not understood at '` 2'"),
         ("2i + 1", "2i: complex numbers are not known here"),
         ("{|a = 1|}", "'{|a = 1|}': unions are not known here"),
-        ("function(y:int) y + 1", "'function(y:int) y + 1': functions of one's own are not known here"),
+        ("map(function(x) map(function(y) y, repeat(2000, 1)), repeat(2000, 1))", "it takes too long"),
+        ("endless(1)", "it is nested too deeply"),
+        ("(function(x) x)(1, 2)", "it cannot be computed: a function takes 1 values, and is given 2"),
+        ("function(1) 2", "'function(1) 2' is not understood: the name of an argument was expected"),
         ("unheard", "'unheard' is not known"),
         ("random()", "the function 'random' is not known here"),
         ("items(7)", "there is no element 7"),
@@ -147,7 +215,7 @@ def test_what_has_no_value(text: str, message: str) -> None:
         ("t ? a : b", "a if t else b"),
         ("(t ? a : b) + 1", "(a if t else b) + 1"),
         ("a^2", "a ** 2"),
-        ("-a^2", "-a ** 2"),
+        ("-a^2", "(-a) ** 2"),
         ("(-a)^2", "(-a) ** 2"),
         ("items(0) + a", "1 + a"),
         ("array(a)", "array[a]"),
@@ -158,7 +226,16 @@ def test_what_has_no_value(text: str, message: str) -> None:
         ("max(a, n)", "max(a, 3)"),
         ("floor(a)", "float(floor(a))"),
         ('"t = " + a', "'t = ' + str(a)"),
-        ("a % 2", "a % 2"),
+        ("a % 2", "(a % 2 if a >= 0 else -(-a % 2))"),
+        ("a % 2 == 0", "a % 2 == 0"),
+        ("-a % 2", "((-a) % 2 if (-a) >= 0 else -(-(-a) % 2))"),
+        ("7 % b", "7 % abs(b)"),
+        ("twice(a + 1)", "(a + 1) * 2"),
+        ("(function(x) x + b)(a)", "a + b"),
+        ("map(function(x) x + a, array)", "[x + a for x in array]"),
+        ("filter(function(a) a > 7, array)", "[a_ for a_ in array if a_ > 7]"),
+        ("atan(a)", "atan2(a, 1)"),
+        ("array.equals({7, 8, 9})", "((array) == ([7, 8, 9]))"),
         ("a * -1", "a * -1"),
         ("Infinity * a", "inf * a"),
         ("cast(int, a)", "int(a)"),
@@ -177,3 +254,19 @@ def test_how_it_is_said(text: str, expected: str) -> None:
     ours = own_evaluate(found, given)
     theirs = evaluate(parse(text), lambda name: given[name] if name in given else PARAMETERS[name])
     assert (ours, type(ours)) == (theirs, type(theirs))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("$n and ${n}.5", "3 and 3.5"),
+        ("$(n + max(n, 7))!", "10!"),
+        ("$$5, $unheard, $(1 +)", "$5, $unheard, $(1 +)"),
+        ("$x: $items", "0.5: {1, 2, 3}"),
+    ],
+)
+def test_texts_with_names_in_them(text: str, expected: str) -> None:
+    said = {
+        name: Property(name, "ptolemy.data.expr.Parameter", java_text(PARAMETERS[name])) for name in ("n", "x", "items")
+    }
+    assert Scope(Property("m", properties=said)).filled(text) == expected

@@ -102,6 +102,7 @@ def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.Captu
     assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
 
 
+@pytest.mark.slow
 def test_a_cluster_of_its_own(tmp_path: Path) -> None:
     """Interrupted in the middle, and resumed."""
     write(tmp_path)
