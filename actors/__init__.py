@@ -51,20 +51,10 @@ from .passing import (
 from .queues import Queue, Server, SharedQueue
 from .replay import Replay, ReplayError
 from .sinks import Display, Histogram, Recorder, Stop, Test
-from .sources import (
-    Clock,
-    Const,
-    CurrentMicrostep,
-    CurrentTime,
-    PoissonClock,
-    Pulse,
-    Ramp,
-    Random,
-    Sequence,
-    SingleEvent,
-)
+from .sources import Clock, PoissonClock, Random, SingleEvent
 from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
+from .triggered import Const, CurrentMicrostep, CurrentTime, Pulse, Ramp, Sequence
 from .variables import SetVariable, Variable
 
 if TYPE_CHECKING:

@@ -148,7 +148,7 @@ class Poisson(Distribution):
 
     token_type: Any = int
 
-    mean = Parameter(float, 1.0, unit="1", above=0, doc="the mean")
+    mean = Parameter(float, 1.0, unit="1", above=0, max=1e18, doc="the mean")
 
     def draw(self, random: Stream) -> int:
         return random.poisson(self.mean)
@@ -159,7 +159,7 @@ class Binomial(Distribution):
 
     token_type: Any = int
 
-    trials = Parameter(int, 1, min=0, doc="how many trials")
+    trials = Parameter(int, 1, min=0, max=2**63 - 1, doc="how many trials")
     probability = Parameter(float, 0.5, unit="1", min=0, max=1, doc="of success in each")
 
     def draw(self, random: Stream) -> int:

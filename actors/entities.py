@@ -17,11 +17,10 @@ from .core import (
     ParameterError,
     Wake,
     brief,
-    did_you_mean,
     texts_parameter,
 )
 from .distributions import Distribution
-from .expression import FormulaParameter, number_of_token, of_token, operand
+from .expression import FormulaParameter, field_of, number_of_token, of_token, operand
 
 
 class SetFields(Actor):
@@ -106,14 +105,7 @@ class RecordDisassembler(Actor):
     def fire(self) -> None:
         for token in self.input.tokens:
             for name in self.fields:
-                known = token if isinstance(token, Mapping) else operand(token)
-                if not isinstance(known, Mapping) or name not in known:
-                    names = list(known) if isinstance(known, Mapping) else []
-                    raise EpicycleError(
-                        f"the token {brief(known)} has no field {name!r}"
-                        f"{did_you_mean(name, names) or ';'} it has {', '.join(names) or 'none'}"
-                    )
-                self.outputs[name].send(known[name])
+                self.outputs[name].send(field_of(token, name))
 
 
 def _check_names(fields: tuple[str, ...]) -> None:
@@ -211,11 +203,15 @@ class Unbatch(Actor):
 
     def fire(self) -> None:
         for token in self.input.tokens:
-            items = operand(token)
-            if not isinstance(items, list):
-                raise EpicycleError(f"{brief(items)} is not a list")
-            for item in token:
+            for item in _items(token):
                 self.output.send(item)
+
+
+def _items(token: Any) -> Any:
+    """A token that is a list, with its items as they are; raises ``EpicycleError`` if it is none."""
+    if isinstance(seen := operand(token), list):
+        return token
+    raise EpicycleError(f"{brief(seen)} is not a list")
 
 
 class Collect(Actor):
@@ -239,10 +235,7 @@ class Collect(Actor):
         while all(self._waiting):
             found = [queue.popleft() for queue in self._waiting]
             if self.joined:
-                for each in found:
-                    if not isinstance(operand(each), list):
-                        raise EpicycleError(f"{brief(each)} is not a list")
-                found = [item for each in found for item in operand(each)]
+                found = [item for each in found for item in _items(each)]
             self.output.send(found)
 
 
@@ -257,7 +250,7 @@ class Spread(Actor):
 
     def fire(self) -> None:
         for token in self.input.tokens:
-            for channel, item in zip(range(self.output.width), operand(token), strict=False):
+            for channel, item in zip(range(self.output.width), _items(token), strict=False):
                 self.output.send(item, channel)
 
 

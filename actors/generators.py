@@ -99,7 +99,7 @@ class JavaRandom(Generator):
     Source: Lehmer's linear congruential generator modulo 2^48, as the documentation of Java 8 gives it.
     """
 
-    seed = Parameter(int, doc="the seed, a whole number of 64 bits")
+    seed = Parameter(int, doc="the seed, a whole number of which the last 64 bits count")
 
     def numbers(self) -> Numbers:
         return _OfJava(self.seed & _OF_LONG)
@@ -306,7 +306,7 @@ class DRand(Generator):
     ``cern.jet.random``, after the papers that it names.
     """
 
-    seed = Parameter(int, doc="the seed, a whole number of 32 bits")
+    seed = Parameter(int, doc="the seed, a whole number of which the last 32 bits count")
 
     def numbers(self) -> Numbers:
         return _OfDRand(self.seed)

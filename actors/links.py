@@ -21,7 +21,7 @@ from .core import (
     to_nanoseconds,
     to_seconds,
 )
-from .expression import FormulaParameter, number_of_token, of_token
+from .expression import FormulaParameter, field_of, number_of_token, of_token
 from .resources import Waiter, Waiters
 
 
@@ -306,9 +306,11 @@ class ArqReceiver(Actor):
 
     def fire(self) -> None:
         for frame in self.input.tokens:
-            number = frame["number"]
+            number, data = field_of(frame, "number"), field_of(frame, "data")
+            if isinstance(number, bool) or not isinstance(number, int):
+                raise EpicycleError(f"the number of a frame is {number!r}, but they are counted 0, 1, 2, ...")
             if number == self._expected or (number > self._expected and self.repeat == "one"):
-                self._kept[number] = frame["data"]
+                self._kept[number] = data
             while self._expected in self._kept:
                 self.output.send(self._kept.pop(self._expected))
                 self._expected += 1

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from .core import ABSENT, Actor, InputPort, Latest, OutputPort, Parameter, present, rounds
-from .matching import matched
+from .matching import alike, matched
 
 GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
     "and": all,
@@ -94,10 +94,10 @@ class Equals(Actor):
     output = OutputPort(bool, doc="whether all are equal")
 
     tolerance = Parameter(
-        float, 0.0, min=0, doc="by how much numbers may differ from the first and still count as equal"
+        float, 0.0, min=0, doc="by how much numbers, also in lists and fields, may differ from the first"
     )
 
     def fire(self) -> None:
         for (tokens,) in rounds(self.input):
             first, *others = present(tokens)
-            self.output.send(all(_equal(first, other, self.tolerance) for other in others))
+            self.output.send(all(alike(other, first, self.tolerance) for other in others))

@@ -33,6 +33,7 @@ class Filter(ByChannel):
 class Inhibit(ByChannel):
     """Hands on what comes unless an ``inhibit`` token comes with it; the opposite of a ``Sampler``.
 
+    Of several tokens of a channel at one tag, each ``inhibit`` token stops one, the first ones first.
     Ptolemy: ``Inhibit``.
     """
 
@@ -80,7 +81,7 @@ class Changes(Actor):
 
     def fire(self) -> None:
         for token in self.input.tokens:
-            if self._last is None or abs(token - self._last) > self.by:
+            if self._last is None or not abs(token - self._last) <= self.by:  # nan differs from all
                 self._last = token
                 self.output.send(token)
 
@@ -213,7 +214,8 @@ class Commutator(Actor):
 class Sequencer(Actor):
     """Hands tokens on in the order of their numbers, which count up from ``first``; each waits until it is its turn.
 
-    The k-th token has the k-th number.  Ptolemy: ``Sequencer``, where the number is called ``sequenceNumber``.
+    The k-th token has the k-th number; one whose number has had its turn is lost.
+    Ptolemy: ``Sequencer``, where the number is called ``sequenceNumber``.
     """
 
     input = InputPort(keep=True, doc="the tokens")
@@ -242,7 +244,7 @@ class Default(Actor):
     """
 
     preferred = InputPort(doc="what goes before")
-    alternate = InputPort(doc="what is handed on at tags at which nothing comes at 'preferred'")
+    alternate = InputPort(doc="what is handed on where nothing comes with it at 'preferred'")
     output = OutputPort(ptolemy={"depends_on": ("preferred",)}, doc="one or the other")
 
     both = Parameter(bool, False, ptolemy=True, doc="whether what comes at 'alternate' follows, at the same tag")

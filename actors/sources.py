@@ -1,8 +1,4 @@
-"""Where tokens begin: Clock, PoissonClock and SingleEvent of their own accord, and what answers a trigger: Const, Ramp,
-Sequence, Pulse, Random, CurrentTime, CurrentMicrostep.
-
-Triggers that come together, one at each connection, are one trigger, but for CurrentTime.
-"""
+"""Where tokens begin: Clock, PoissonClock and SingleEvent of their own accord, and Random, for triggers."""
 
 from __future__ import annotations
 
@@ -12,7 +8,6 @@ from typing import Any, ClassVar
 from .core import (
     NEVER,
     Actor,
-    EpicycleError,
     InputPort,
     OutputPort,
     Parameter,
@@ -20,13 +15,13 @@ from .core import (
     PortParameter,
     Wake,
     array_parameter,
-    rounds,
     to_nanoseconds,
     to_seconds,
     token_type,
 )
 from .distributions import Distribution
 from .generators import Generator
+from .triggered import times as _times  # by the name that a native form knows Random with
 
 
 class _Ticking(Actor):
@@ -251,174 +246,6 @@ class SingleEvent(Actor):
         self.output.send(self.value)
 
 
-def _times(trigger: InputPort[Any]) -> int:
-    """How often to answer at this tag."""
-    return len(trigger.tokens) if trigger.width <= 1 else len(list(rounds(trigger)))
-
-
-class _Answering(Actor):
-    """What sources have in common that answer triggers, as often as they may."""
-
-    trigger = InputPort(multi=True, doc="when to send")
-
-    limit: Parameter[int | None] = Parameter(int, None, min=1, doc="how many answers there are; no end if left out")
-
-    def initialize(self) -> None:
-        self._answers = 0
-
-    def answers(self) -> int:
-        """How often to answer at this tag."""
-        wanted = _times(self.trigger) if self.trigger.width or self.trigger.required else 1
-        if self.limit is not None:
-            wanted = min(wanted, self.limit - self._answers)
-        self._answers += wanted
-        return wanted
-
-
-class Const(_Answering):
-    """Sends the same value for each trigger; once at the start if ``trigger`` is not connected.
-
-    The distribution that gives the same value always is ``Constant``.  Ptolemy: ``Const``.
-    """
-
-    is_source: ClassVar[bool] = True
-
-    trigger = InputPort(multi=True, required=False, doc="when to send; once at the start if not connected")
-    output = OutputPort(doc="the value")
-
-    value: Parameter[Any] = Parameter(object, 1, doc="what is sent")
-
-    def check(self) -> None:
-        self.output.type = token_type([self.value])
-
-    def initialize(self) -> None:
-        super().initialize()
-        if not self.trigger.width:
-            self.wake_in(0)
-
-    def fire(self) -> None:
-        for _ in range(self.answers()):
-            self.output.send(self.value)
-
-
-class Ramp(_Answering):
-    """Counts triggers: sends ``init`` for the first, and for each further one the last number plus ``step``.
-
-    The numbers are integers if ``init`` and ``step`` are; then a step that comes must be one, too.  Ptolemy: ``Ramp``.
-    """
-
-    output = OutputPort(float, doc="the number")
-
-    init: Parameter[float] = Parameter(int | float, 0, doc="the first number")
-    step: PortParameter[float] = PortParameter(int | float, 1, doc="what is added from one to the next")
-    late_step = Parameter(bool, False, ptolemy=True, doc="whether a step counts behind the next number, not before it")
-
-    def check(self) -> None:
-        self.output.type = int if isinstance(self.init, int) and isinstance(self.step, int) else float
-
-    def initialize(self) -> None:
-        super().initialize()
-        self._last: float | None = None
-        self._step: float = 0  # behind the last number
-
-    def fire(self) -> None:
-        for _ in range(self.answers()):
-            step = self._step if self.late_step else self.step
-            self._last, self._step = self.init if self._last is None else self._last + step, self.step
-            if self.output.type is int and not isinstance(self._last, int):
-                raise EpicycleError(
-                    f"init and step are whole numbers, and so is what is sent, but a step of {self.step!r} has come; "
-                    f"write 'init: {self.init:.1f}' for numbers that are not whole"
-                )
-            self.output.send(self._last)
-
-
-class Sequence(Actor):
-    """Sends the next of its values for each trigger, and nothing when they are used up.
-
-    If ``enable`` is connected, a value is sent only at a tag at which it is true; without ``trigger``, each true
-    token of ``enable`` is a trigger.  Ptolemy: ``Sequence``.
-    """
-
-    trigger = InputPort(multi=True, required=False, doc="when to send")
-    enable = InputPort(bool, required=False, doc="whether to send")
-    output = OutputPort(doc="the values in turn")
-
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is sent")
-    repeat = Parameter(bool, False, doc="whether to begin again after the last value")
-    hold = Parameter(bool, False, doc="whether the last value is sent again and again when all are used up")
-
-    def check(self) -> None:
-        if self.repeat and self.hold:
-            raise ParameterError("repeat and hold cannot both be true: after the last value comes the first, or itself")
-        self.output.type = token_type(self.values)
-
-    def initialize(self) -> None:
-        self._next = 0
-
-    def fire(self) -> None:
-        for _ in range(self._triggers()):
-            if self.repeat and self.values:
-                self._next %= len(self.values)
-            if self._next < len(self.values):
-                self.output.send(self.values[self._next])
-                self._next += 1
-                if self.hold:
-                    self._next = min(self._next, len(self.values) - 1)
-
-    def _triggers(self) -> int:
-        if not self.enable.width:
-            return _times(self.trigger)
-        if not self.trigger.width:
-            return sum(map(bool, self.enable.tokens))
-        return _times(self.trigger) if self.enable.present and self.enable.value else 0
-
-
-class Pulse(_Answering):
-    """Sends a value at certain triggers, counted from 0, and a zero like it at all others.
-
-    A zero is 0, 0.0, false, an empty text, or a list of zeros.  Ptolemy: ``Pulse``.
-    """
-
-    output = OutputPort(doc="a value, or zero")
-
-    values: Parameter[Any] = Parameter(object, [1, 0], shape=(None,), doc="what is sent")
-    indexes: Parameter[Any] = Parameter(object, [0, 1], shape=(None,), doc="at which triggers, ascending")
-    repeat = Parameter(bool, False, doc="whether to count from 0 again after the last value")
-
-    def check(self) -> None:
-        count = [each for each in self.indexes if isinstance(each, int) and not isinstance(each, bool) and each >= 0]
-        if len(count) != len(self.indexes) or count != sorted(set(count)):
-            raise ParameterError(f"indexes: {list(self.indexes)} is not an ascending list of whole numbers from 0 on")
-        if not self.values or len(self.values) != len(self.indexes):
-            raise ParameterError(f"there are {len(self.values)} values for {len(self.indexes)} indexes")
-        self.output.type = token_type(self.values)
-
-    def initialize(self) -> None:
-        super().initialize()
-        self._count = 0  # of triggers
-        self._place = 0  # of the next value
-
-    def fire(self) -> None:
-        for _ in range(self.answers()):
-            if self._place == len(self.values) and self.repeat:
-                self._count = self._place = 0
-                if self.indexes[0] > 0:  # as there: the trigger that begins anew is answered only by a value
-                    self._count = 1
-                    continue
-            if self._place < len(self.values) and self._count == self.indexes[self._place]:
-                self.output.send(self.values[self._place])
-                self._place += 1
-            else:
-                self.output.send(_zero(self.values[0]))
-            self._count += 1
-
-
-def _zero(value: Any) -> Any:
-    """What is nothing, of the kind of a value."""
-    return [_zero(each) for each in value] if isinstance(value, (list, tuple)) else type(value)()
-
-
 class Random(Actor):
     """Sends a token drawn from ``distribution`` for each trigger, independent of all others.
 
@@ -441,31 +268,3 @@ class Random(Actor):
         numbers: Any = self.random if self._numbers is None else self._numbers
         for _ in range(_times(self.trigger)):
             self.output.send(self.distribution.draw(numbers))
-
-
-class CurrentTime(Actor):
-    """Sends the present time for each trigger, those that come together included.
-
-    Ptolemy: ``CurrentTime``.
-    """
-
-    trigger = InputPort(multi=True, doc="when to send")
-    output = OutputPort(float, doc="the time in s")
-
-    def fire(self) -> None:
-        for _ in self.trigger.tokens:
-            self.output.send(self.now)
-
-
-class CurrentMicrostep(Actor):
-    """Sends the present microstep for each trigger.
-
-    Ptolemy: ``CurrentMicrostep``.
-    """
-
-    trigger = InputPort(multi=True, doc="when to send")
-    output = OutputPort(int, doc="the microstep, from 1")
-
-    def fire(self) -> None:
-        for _ in range(_times(self.trigger)):
-            self.output.send(self.tag.microstep)

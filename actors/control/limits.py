@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..core import Actor, InputPort, OutputPort, Parameter, ParameterError, to_seconds
+from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, brief, to_seconds
 from ..readings import finite_number
 
 
@@ -73,6 +73,8 @@ class Quantizer(Actor):
     def fire(self) -> None:
         for token in self.input.tokens:
             place = (finite_number(self.input, token) - self.offset) / self.step
+            if not math.isfinite(place) or math.isinf(self.step):
+                raise EpicycleError(f"{brief(token)} cannot be counted in steps of {self.step:g}")
             if self.rounding == "nearest":
                 number = round(place)
             else:

@@ -39,6 +39,16 @@ def of_token(formula: Formula, token: Any, /, **known: Any) -> Any:
     return formula(values)
 
 
+def field_of(token: Any, name: str) -> Any:
+    """A field of a token, as it is; raises ``EpicycleError`` if there is none of this name."""
+    known = token if isinstance(token, Mapping) else operand(token)
+    names = list(known) if isinstance(known, Mapping) else []
+    if name not in names:
+        near = did_you_mean(name, names) or ";"
+        raise EpicycleError(f"the token {brief(known)} has no field {name!r}{near} it has {', '.join(names) or 'none'}")
+    return known[name]
+
+
 def number_of_token(formula: Formula, what: str, token: Any, /, **known: Any) -> float:
     """The same, where it has to be a finite number; ``what`` says which one."""
     value = of_token(formula, token, **known)

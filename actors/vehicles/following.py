@@ -46,6 +46,8 @@ class WaypointFollower(Actor):
     def check(self) -> None:
         if not len(self.waypoints):
             raise ParameterError("waypoints: there is none to go to")
+        if self.closed and len(self.waypoints) == 1:
+            raise ParameterError("closed: a path of one waypoint cannot be closed; give two or more")
         rows = self.waypoints.tolist()
         for number, (one, other) in enumerate(zip(rows, rows[1:] + rows[: self.closed], strict=False)):
             if one == other:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 
-from ..core import Actor, InputPort, OutputPort, Parameter, PortParameter, array_parameter, to_seconds
+from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, PortParameter, array_parameter, to_seconds
 from ..core.elementary import cos, sin, tan
 from .pose import Pose
 
@@ -33,7 +33,10 @@ class _RollingVehicle(Actor):
 
     def _present_motion(self) -> tuple[float, float]:
         speed = within(self.speed, self.max_speed)
-        return speed, self._turn_rate(speed)
+        motion = speed, self._turn_rate(speed)
+        if not all(map(math.isfinite, motion)):
+            raise EpicycleError(f"a speed of {motion[0]:g} m/s and a turn rate of {motion[1]:g} rad/s lead nowhere")
+        return motion
 
     def fire(self) -> None:
         if any(port.present for port in self.inputs.values() if port is not self.trigger):

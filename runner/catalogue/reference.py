@@ -208,7 +208,7 @@ def shown(value: object) -> str:
 
 # What one looks for, in the order in which it is listed, and the modules of actors and aspects that are about it.
 TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
-    "sources": ("Where tokens begin", ("sources", "replay")),
+    "sources": ("Where tokens begin", ("sources", "triggered", "replay")),
     "computing": (
         "Arithmetic, logic, expressions, sums, statistics",
         ("accumulation", "arithmetic", "blocks", "functions", "logic", "statistics", "texts"),

@@ -76,3 +76,8 @@ def feed(
 def tokens(sent: dict[str, list[tuple[float, Any]]], port: str = "output") -> list[Any]:
     """What left one port, without the times."""
     return [token for _, token in sent[port]]
+
+
+def seconds(*values: Any) -> list[tuple[float, Any]]:
+    """One token a second, the first at 1 s."""
+    return [(float(time), value) for time, value in enumerate(values, 1)]

@@ -77,6 +77,10 @@ def test_a_sender_sends_anew_what_is_late() -> None:
          ("'length': the token {'lenght': 1} has no field 'length', did you mean 'lenght'? it has lenght, and token, "
           "time are known")),
         ("Link, rate: 1 bit/s, size: token", [("input", [[0, -1]])], "'token' gives -1 for -1, but a size is >= 0"),
+        ("ArqReceiver", [("input", [[0, {"number": 0}]])],
+         "the token {'number': 0} has no field 'data'; it has number"),
+        ("ArqReceiver", [("input", [[0, {"number": 0.5, "data": 1}]])],
+         "the number of a frame is 0.5, but they are counted 0, 1, 2, ..."),
         ("NetworkSwitch, port: token", [("input", [[0, 2]])],
          "'token' gives 2 for 2, but it.output has 2 channels, counted from 0"),
     ],

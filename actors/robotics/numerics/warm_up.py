@@ -33,10 +33,13 @@ def compile_kernels() -> None:
     notice = threading.Timer(_PATIENCE, _LOGGER.info, (message,))
     notice.daemon = True
     notice.start()
+    was_enabled = gc.isenabled()
+    gc.disable()  # Numba makes millions of objects, and to look through them takes a sixth of the time
     try:
-        with _without_collections():
-            _call_every_kernel()
+        _call_every_kernel()
     finally:
+        if was_enabled:
+            gc.enable()
         notice.cancel()
 
 
@@ -44,18 +47,6 @@ def _call_every_kernel() -> None:
     with _others_meanwhile():
         _call_solver()
     call_others()
-
-
-@contextmanager
-def _without_collections() -> Iterator[None]:
-    """Numba makes millions of objects, and to look through them takes a sixth of the time."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.actors import DeadZone, Hysteresis, Limiter, ParameterError, Quantizer
+from epicycle.actors import DeadZone, EpicycleError, Hysteresis, Limiter, ParameterError, Quantizer
 from epicycle.actors.testing import Harness
 
 signals = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=30)
@@ -79,3 +79,10 @@ def test_limits_that_are_none(kind: Any, parameters: dict[str, Any], message: st
     with pytest.raises(ParameterError) as caught:
         kind("it", **parameters)
     assert str(caught.value) == message
+
+
+def test_what_has_too_many_steps() -> None:
+    harness = Harness(Quantizer("it", step=1e-300))
+    with pytest.raises(EpicycleError) as caught:
+        harness.fire(0.0, input=1e300)
+    assert str(caught.value) == "1e+300 cannot be counted in steps of 1e-300"

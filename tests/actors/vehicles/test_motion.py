@@ -12,7 +12,7 @@ import scipy.integrate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.actors import Ackermann, BodyState, ParameterError, Pose, Unicycle, WaypointFollower
+from epicycle.actors import Ackermann, BodyState, EpicycleError, ParameterError, Pose, Unicycle, WaypointFollower
 from epicycle.actors.testing import Harness
 from epicycle.runner import Simulation
 from tests.actors.feeding import load
@@ -193,6 +193,7 @@ run: {stop: 12 s, record: [robot.pose]}
         ([], "waypoints: there is none to go to"),
         ([[1, 1], [1, 1], [2, 2]], "waypoints: 0 and 1 are the same, [1.0, 1.0]"),
         ([[1, 1], [2, 2], [1, 1]], "waypoints: 2 and 0 are the same, [1.0, 1.0]"),
+        ([[1, 1]], "closed: a path of one waypoint cannot be closed; give two or more"),
         ([[1]], "it: WaypointFollower.waypoints: [[1]] is not a list of n x 2 numbers in m"),
     ],
 )
@@ -200,3 +201,9 @@ def test_paths_that_are_none(waypoints: Any, message: str) -> None:
     with pytest.raises(ParameterError) as caught:
         WaypointFollower("it", waypoints=waypoints, closed=True)
     assert str(caught.value) == message
+
+
+def test_a_speed_without_end_leads_nowhere() -> None:
+    with pytest.raises(EpicycleError) as caught:
+        Harness(Unicycle("it", speed=math.inf))
+    assert str(caught.value) == "a speed of inf m/s and a turn rate of 0 rad/s lead nowhere"
