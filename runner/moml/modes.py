@@ -86,21 +86,27 @@ class _Machine:
     def written(self) -> dict[str, Any]:
         """What is said of modes and transitions."""
         modes: dict[str, Any] = {}
-        initial = self._named_state("initialStateName")
-        finals = (self.controller.text("finalStateNames") or "").split(",")
+        initial, finals = self._initial_state(), self._final_states()
+        lost = self._unreachable(initial, finals)
         for state in self._states():
+            if state.name in lost:
+                self.tell(f"{state.name} is left out: no transition leads there")
+                continue
             said: dict[str, Any] = {}
             refinements = [each.strip() for each in (state.text("refinementName") or "").split(",") if each.strip()]
             if len(refinements) > 1:
                 self.tell(f"{state.name} has {len(refinements)} refinements, and only {refinements[0]} is one here")
             if refinements and self.entity is not self.controller:
                 said |= self._refinement(refinements[0], self.states.of(state.name))
-            if self._flag(state, "isFinalState") or state.name in [each.strip() for each in finals]:
+            if state.name in finals:
                 said["final"] = True
-            if self._flag(state, "isInitialState"):
-                initial = state.name
             modes[self.states.of(state.name)] = Flow(said) if said else None
-        transitions = [each for each in map(self._transition, self.controller.relations.values()) if each is not None]
+        leaving = [each for each in self.controller.relations.values() if self._ends(each.name)[0] not in lost]
+        ending = [each for each in leaving if self._ends(each.name)[0] in finals]
+        for each in ending:
+            self.tell(f"the transition {each.name} is left out: nothing leaves a final state")
+        found_ones = [self._transition(each) for each in leaving if each not in ending]
+        transitions = [each for each in found_ones if each is not None]
         found: dict[str, Any] = {}
         if self.variables:
             found["variables"] = Flow({ours: plain(self._initial(name)) for name, ours in self.variables.items()})
@@ -130,9 +136,29 @@ class _Machine:
     def _states(self) -> list[Entity]:
         return list(self.controller.entities.values())
 
-    def _named_state(self, name: str) -> str | None:
-        said = (self.controller.text(name) or "").strip().strip('"')
-        return said if said in self.controller.entities else None
+    def _initial_state(self) -> str | None:
+        """The last that says so itself, or the one that the machine names, as in files of former versions."""
+        said = (self.controller.text("initialStateName") or "").strip().strip('"')
+        named = said if said in self.controller.entities else None
+        return next((each.name for each in reversed(self._states()) if self._flag(each, "isInitialState")), named)
+
+    def _final_states(self) -> frozenset[str]:
+        named = [each.strip() for each in (self.controller.text("finalStateNames") or "").strip('" ').split(",")]
+        return frozenset(each.name for each in self._states() if self._flag(each, "isFinalState") or each.name in named)
+
+    def _unreachable(self, initial: str | None, finals: frozenset[str]) -> frozenset[str]:
+        """The states that are never entered, which Ptolemy allows."""
+        names = [each.name for each in self._states()]
+        ways = [self._ends(each) for each in self.controller.relations]
+        waiting = [initial or name for name in names[:1]]
+        reached = set(waiting)
+        while waiting:
+            here = waiting.pop()
+            for source, target in ways if here not in finals else ():
+                if source == here and target is not None and target not in reached:
+                    reached.add(target)
+                    waiting.append(target)
+        return frozenset(names) - reached
 
     def _initial(self, name: str) -> object:
         try:
@@ -178,7 +204,7 @@ class _Machine:
                 f"{self.path}.{transition.name}: a refinement of a transition has no counterpart"
             )
         try:
-            said = {} if "else" in flags else self._guard(transition)
+            said = self._guard(transition)
             actions = [*self._said_actions(transition, "outputActions"), *self._said_actions(transition, "setActions")]
         except ExpressionError as error:
             self.conversion.notes.error(f"{self.path}.{transition.name}: {error}")

@@ -220,3 +220,25 @@ def test_a_default_that_an_expression_names(tmp_path: Path) -> None:
         stop=1,
     )
     assert [time for time, _, _ in recorded(tmp_path, text)] == [0.0, 0.25, 1.0]
+
+
+def test_states_that_are_never_entered_and_ways_out_of_final_ones(tmp_path: Path) -> None:
+    """Ptolemy allows both, for neither does anything."""
+    parts = [state("a", isInitialState="true"), state("b", isFinalState="true"), state("lost"), state("also")]
+    parts += [transition("t", "a", "b", "in == 2", "out = in"), transition("u", "b", "also", "true", "out = 0"),
+              transition("v", "lost", "a", "true", "out = 0")]  # fmt: skip
+    text = around(machine(*parts))
+    assert notes(tmp_path, text) == [
+        "M: lost is left out: no transition leads there",
+        "M: also is left out: no transition leads there",
+        "M: the transition u is left out: nothing leaves a final state",
+        "M: in is called in_",
+    ]
+    assert recorded(tmp_path, text) == [(1.0, 1, 2)]
+
+
+def test_a_default_transition_has_a_guard_too(tmp_path: Path) -> None:
+    """It goes if no other is enabled and its guard holds."""
+    parts = [state("a", isInitialState="true"), transition("t", "a", "a", "in == 1", "out = 10"),
+             transition("u", "a", "a", "in > 2", "out = 20", defaultTransition="true")]  # fmt: skip
+    assert [token for _, _, token in recorded(tmp_path, around(machine(*parts)))] == [10, 20, 20]
