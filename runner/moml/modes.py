@@ -77,6 +77,46 @@ class _Machine:
                     and self.scope.find(name) is not None
                 ):
                     self.variables[name] = self.ports.of(name)
+                elif (inner := self._inner_of(name)) is not None:
+                    ours = self.ports.of(inner[1])
+                    taken = {each: said for each, said in self.variables.items() if each != name}
+                    if ours not in {**self.inputs, **self.outputs, **taken}.values():
+                        self.variables[name] = ours  # else two refinements, or a port, would have it by one name
+        self._hand()
+
+    def _inner_of(self, name: str) -> tuple[Entity, str] | None:
+        """The refinement, and the parameter of it, that an action sets; None if it does not."""
+        refinement, _, inner = name.partition(".")
+        child = self.entity.entities.get(refinement) if self.entity is not self.controller else None
+        if child is None or inner not in child.properties or controller_of(child) is not None:
+            return None
+        return child, inner
+
+    def _hand(self) -> None:
+        """Tell the refinements the variables by which something in them goes."""
+        for name in self.variables:
+            inner = self._inner_of(name)
+            if inner is not None:
+                self.conversion.variables.hand(*inner)
+                continue
+            for child in self._refinements():
+                if controller_of(child) is None and self._readers(child, name):
+                    self.conversion.variables.hand(child, name)
+
+    def _refinements(self) -> list[Entity]:
+        if self.entity is self.controller:
+            return []
+        return [each for each in self.entity.entities.values() if each is not self.controller]
+
+    def _readers(self, child: Entity, name: str) -> list[tuple[Entity, Property]]:
+        """What in a refinement is computed of a variable."""
+        pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
+        return [
+            (each, said)
+            for each in child.everything()
+            for said in each.properties.values()
+            if is_variable(said) and pattern.search(said.value or "")
+        ]
 
     def tell(self, text: str) -> None:
         self.conversion.notes.note(f"{self.path}: {text}")
@@ -126,12 +166,10 @@ class _Machine:
     def _tell_readers(self) -> None:
         """What in refinements is computed of variables, and would change with them."""
         for name in self.variables:
-            pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
-            for child in self.entity.entities.values() if self.entity is not self.controller else ():
-                for each in child.everything() if child is not self.controller else ():
-                    for said in each.properties.values():
-                        if is_variable(said) and pattern.search(said.value or ""):
-                            self.tell(f"{each.name}.{said.name} goes by what {name} is at the start")
+            for child in self._refinements():
+                if controller_of(child) is not None:
+                    for each, said in self._readers(child, name):
+                        self.tell(f"{each.name}.{said.name} goes by what {name} is at the start")
 
     def _states(self) -> list[Entity]:
         return list(self.controller.entities.values())
@@ -161,8 +199,9 @@ class _Machine:
         return frozenset(names) - reached
 
     def _initial(self, name: str) -> object:
+        inner = self._inner_of(name)
         try:
-            value = self.scope(name)
+            value = self.scope(name) if inner is None else self.conversion.scope_of(inner[0])(inner[1])
         except (ExpressionError, KeyError) as error:
             self.conversion.notes.error(f"{self.path}.{name}: {error}")
             return 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from .counterpart import Counterpart
 from .entities import Entity
@@ -13,6 +13,9 @@ from .notes import Notes
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope
 from .writing import Flow
+
+if TYPE_CHECKING:
+    from .variables import Variables
 
 
 @dataclass
@@ -61,6 +64,7 @@ class Converting(Protocol):
     idle: set[int]
     triggers: dict[tuple[int, str], str]
     wiring: Wiring
+    variables: Variables
 
     def face(self, entity: Entity, port: str) -> PortFace | None: ...
     def scope_of(self, entity: Entity) -> Scope: ...

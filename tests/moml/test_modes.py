@@ -190,7 +190,7 @@ __all__ = ["DIRECTOR"]
 
 
 def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
-    """A composite whose director is that of a modal model; what goes by a variable is told."""
+    """A composite whose director is that of a modal model; what goes by a variable changes with it."""
     controller = state("one", "one", isInitialState="true") + transition(
         "t", "one", "one", "in == 2", "out = k", "k = k + 1"
     )
@@ -208,8 +208,20 @@ def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
         entity("Ctrl", "ptolemy.domains.fsm.kernel.FSMActor", PORTS, controller),
     )
     text = around(made)
-    assert "M: Scale.factor goes by what k is at the start" in notes(tmp_path, text)
-    assert sorted(token for _, _, token in recorded(tmp_path, text)) == [1, 10, 20, 30, 40]
+    assert sorted(token for _, _, token in recorded(tmp_path, text)) == [1, 10, 20, 60, 80]
+
+
+def test_an_action_sets_a_parameter_of_a_refinement(tmp_path: Path) -> None:
+    """What the refinement that is entered goes by is the new value."""
+    inner = composite("two", prop("gain", 10), PORTS, entity("Scale", "Scale", factor="gain + 1"),
+                      entity("Const", "Const", value="gain"), entity("Recorder", "Recorder"),
+                      wires("in Scale.input Const.trigger", "Scale.output out", "Const.output Recorder.input"),
+                      director=True)  # fmt: skip
+    controller = state("one", isInitialState="true") + state("two", "two")
+    controller += transition("t1", "one", "two", "in == 2", set_="two.gain = in * 50")
+    controller += transition("t2", "two", "one", "in == 3")
+    text = around(modal(controller, inner), "{2, 7, 3, 2, 8}", stop=4)
+    assert [token for _, _, token in recorded(tmp_path, text)] == [707, 303, 808]
 
 
 def test_a_default_that_an_expression_names(tmp_path: Path) -> None:
