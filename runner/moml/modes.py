@@ -97,11 +97,11 @@ class _Machine:
         for name in self.variables:
             inner = self._inner_of(name)
             if inner is not None:
-                self.conversion.variables.hand(*inner)
+                self.conversion.hand(*inner)
                 continue
             for child in self._refinements():
                 if controller_of(child) is None and self._readers(child, name):
-                    self.conversion.variables.hand(child, name)
+                    self.conversion.hand(child, name)
 
     def _refinements(self) -> list[Entity]:
         if self.entity is self.controller:

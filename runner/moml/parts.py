@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from .counterpart import Counterpart
 from .entities import Entity
@@ -13,9 +13,6 @@ from .notes import Notes
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope
 from .writing import Flow
-
-if TYPE_CHECKING:
-    from .variables import Variables
 
 
 @dataclass
@@ -64,13 +61,13 @@ class Converting(Protocol):
     idle: set[int]
     triggers: dict[tuple[int, str], str]
     wiring: Wiring
-    variables: Variables
 
     def face(self, entity: Entity, port: str) -> PortFace | None: ...
     def scope_of(self, entity: Entity) -> Scope: ...
     def container_of(self, entity: Entity) -> Entity | None: ...
     def path_of(self, composite: Entity, child: Entity) -> str: ...
     def is_linked(self, entity: Entity, port: str) -> bool: ...
+    def hand(self, refinement: Entity, name: str) -> None: ...
     def nets_of(self, composite: Entity) -> list[Net]: ...
     def nets_at(self, composite: Entity, actor: str, port: str) -> list[Net]: ...
     def end(self, level: Level, end: End) -> tuple[str, bool] | None: ...
