@@ -256,6 +256,10 @@ class Conversion:
         around = self.container_of(entity)
         return around is not None and bool(around.links.get(f"{entity.name}.{port}"))
 
+    def hand(self, refinement: Entity, name: str) -> None:
+        """Let a refinement go by a variable of its machine."""
+        self.variables.hand(refinement, name)
+
     def nets_of(self, composite: Entity) -> list[Net]:
         """What is joined in a composite."""
         if id(composite) not in self._nets:

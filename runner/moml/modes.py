@@ -77,6 +77,46 @@ class _Machine:
                     and self.scope.find(name) is not None
                 ):
                     self.variables[name] = self.ports.of(name)
+                elif (inner := self._inner_of(name)) is not None:
+                    ours = self.ports.of(inner[1])
+                    taken = {each: said for each, said in self.variables.items() if each != name}
+                    if ours not in {**self.inputs, **self.outputs, **taken}.values():
+                        self.variables[name] = ours  # else two refinements, or a port, would have it by one name
+        self._hand()
+
+    def _inner_of(self, name: str) -> tuple[Entity, str] | None:
+        """The refinement, and the parameter of it, that an action sets; None if it does not."""
+        refinement, _, inner = name.partition(".")
+        child = self.entity.entities.get(refinement) if self.entity is not self.controller else None
+        if child is None or inner not in child.properties or controller_of(child) is not None:
+            return None
+        return child, inner
+
+    def _hand(self) -> None:
+        """Tell the refinements the variables by which something in them goes."""
+        for name in self.variables:
+            inner = self._inner_of(name)
+            if inner is not None:
+                self.conversion.hand(*inner)
+                continue
+            for child in self._refinements():
+                if controller_of(child) is None and self._readers(child, name):
+                    self.conversion.hand(child, name)
+
+    def _refinements(self) -> list[Entity]:
+        if self.entity is self.controller:
+            return []
+        return [each for each in self.entity.entities.values() if each is not self.controller]
+
+    def _readers(self, child: Entity, name: str) -> list[tuple[Entity, Property]]:
+        """What in a refinement is computed of a variable."""
+        pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
+        return [
+            (each, said)
+            for each in child.everything()
+            for said in each.properties.values()
+            if is_variable(said) and pattern.search(said.value or "")
+        ]
 
     def tell(self, text: str) -> None:
         self.conversion.notes.note(f"{self.path}: {text}")
@@ -86,21 +126,27 @@ class _Machine:
     def written(self) -> dict[str, Any]:
         """What is said of modes and transitions."""
         modes: dict[str, Any] = {}
-        initial = self._named_state("initialStateName")
-        finals = (self.controller.text("finalStateNames") or "").split(",")
+        initial, finals = self._initial_state(), self._final_states()
+        lost = self._unreachable(initial, finals)
         for state in self._states():
+            if state.name in lost:
+                self.tell(f"{state.name} is left out: no transition leads there")
+                continue
             said: dict[str, Any] = {}
             refinements = [each.strip() for each in (state.text("refinementName") or "").split(",") if each.strip()]
             if len(refinements) > 1:
                 self.tell(f"{state.name} has {len(refinements)} refinements, and only {refinements[0]} is one here")
             if refinements and self.entity is not self.controller:
                 said |= self._refinement(refinements[0], self.states.of(state.name))
-            if self._flag(state, "isFinalState") or state.name in [each.strip() for each in finals]:
+            if state.name in finals:
                 said["final"] = True
-            if self._flag(state, "isInitialState"):
-                initial = state.name
             modes[self.states.of(state.name)] = Flow(said) if said else None
-        transitions = [each for each in map(self._transition, self.controller.relations.values()) if each is not None]
+        leaving = [each for each in self.controller.relations.values() if self._ends(each.name)[0] not in lost]
+        ending = [each for each in leaving if self._ends(each.name)[0] in finals]
+        for each in ending:
+            self.tell(f"the transition {each.name} is left out: nothing leaves a final state")
+        found_ones = [self._transition(each) for each in leaving if each not in ending]
+        transitions = [each for each in found_ones if each is not None]
         found: dict[str, Any] = {}
         if self.variables:
             found["variables"] = Flow({ours: plain(self._initial(name)) for name, ours in self.variables.items()})
@@ -120,23 +166,42 @@ class _Machine:
     def _tell_readers(self) -> None:
         """What in refinements is computed of variables, and would change with them."""
         for name in self.variables:
-            pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
-            for child in self.entity.entities.values() if self.entity is not self.controller else ():
-                for each in child.everything() if child is not self.controller else ():
-                    for said in each.properties.values():
-                        if is_variable(said) and pattern.search(said.value or ""):
-                            self.tell(f"{each.name}.{said.name} goes by what {name} is at the start")
+            for child in self._refinements():
+                if controller_of(child) is not None:
+                    for each, said in self._readers(child, name):
+                        self.tell(f"{each.name}.{said.name} goes by what {name} is at the start")
 
     def _states(self) -> list[Entity]:
         return list(self.controller.entities.values())
 
-    def _named_state(self, name: str) -> str | None:
-        said = (self.controller.text(name) or "").strip().strip('"')
-        return said if said in self.controller.entities else None
+    def _initial_state(self) -> str | None:
+        """The last that says so itself, or the one that the machine names, as in files of former versions."""
+        said = (self.controller.text("initialStateName") or "").strip().strip('"')
+        named = said if said in self.controller.entities else None
+        return next((each.name for each in reversed(self._states()) if self._flag(each, "isInitialState")), named)
+
+    def _final_states(self) -> frozenset[str]:
+        named = [each.strip() for each in (self.controller.text("finalStateNames") or "").strip('" ').split(",")]
+        return frozenset(each.name for each in self._states() if self._flag(each, "isFinalState") or each.name in named)
+
+    def _unreachable(self, initial: str | None, finals: frozenset[str]) -> frozenset[str]:
+        """The states that are never entered, which Ptolemy allows."""
+        names = [each.name for each in self._states()]
+        ways = [self._ends(each) for each in self.controller.relations]
+        waiting = [initial or name for name in names[:1]]
+        reached = set(waiting)
+        while waiting:
+            here = waiting.pop()
+            for source, target in ways if here not in finals else ():
+                if source == here and target is not None and target not in reached:
+                    reached.add(target)
+                    waiting.append(target)
+        return frozenset(names) - reached
 
     def _initial(self, name: str) -> object:
+        inner = self._inner_of(name)
         try:
-            value = self.scope(name)
+            value = self.scope(name) if inner is None else self.conversion.scope_of(inner[0])(inner[1])
         except (ExpressionError, KeyError) as error:
             self.conversion.notes.error(f"{self.path}.{name}: {error}")
             return 0
@@ -178,7 +243,7 @@ class _Machine:
                 f"{self.path}.{transition.name}: a refinement of a transition has no counterpart"
             )
         try:
-            said = {} if "else" in flags else self._guard(transition)
+            said = self._guard(transition)
             actions = [*self._said_actions(transition, "outputActions"), *self._said_actions(transition, "setActions")]
         except ExpressionError as error:
             self.conversion.notes.error(f"{self.path}.{transition.name}: {error}")

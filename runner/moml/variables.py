@@ -61,6 +61,10 @@ class Variables:
         """The ports of composites by which values come."""
         return {key for key, each in self._found.items() if each.is_port}
 
+    def hand(self, refinement: Entity, name: str) -> None:
+        """Let a refinement go by a variable of its machine, which comes by an input of that name at each entry."""
+        self._found[id(refinement), name] = Changing(refinement, name, delayed=False, is_port=True)
+
     def of(self, owner: Entity) -> list[Changing]:
         """Those that a composite declares."""
         return [each for each in self._found.values() if each.owner is owner]

@@ -190,7 +190,7 @@ __all__ = ["DIRECTOR"]
 
 
 def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
-    """A composite whose director is that of a modal model; what goes by a variable is told."""
+    """A composite whose director is that of a modal model; what goes by a variable changes with it."""
     controller = state("one", "one", isInitialState="true") + transition(
         "t", "one", "one", "in == 2", "out = k", "k = k + 1"
     )
@@ -208,8 +208,20 @@ def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
         entity("Ctrl", "ptolemy.domains.fsm.kernel.FSMActor", PORTS, controller),
     )
     text = around(made)
-    assert "M: Scale.factor goes by what k is at the start" in notes(tmp_path, text)
-    assert sorted(token for _, _, token in recorded(tmp_path, text)) == [1, 10, 20, 30, 40]
+    assert sorted(token for _, _, token in recorded(tmp_path, text)) == [1, 10, 20, 60, 80]
+
+
+def test_an_action_sets_a_parameter_of_a_refinement(tmp_path: Path) -> None:
+    """What the refinement that is entered goes by is the new value."""
+    inner = composite("two", prop("gain", 10), PORTS, entity("Scale", "Scale", factor="gain + 1"),
+                      entity("Const", "Const", value="gain"), entity("Recorder", "Recorder"),
+                      wires("in Scale.input Const.trigger", "Scale.output out", "Const.output Recorder.input"),
+                      director=True)  # fmt: skip
+    controller = state("one", isInitialState="true") + state("two", "two")
+    controller += transition("t1", "one", "two", "in == 2", set_="two.gain = in * 50")
+    controller += transition("t2", "two", "one", "in == 3")
+    text = around(modal(controller, inner), "{2, 7, 3, 2, 8}", stop=4)
+    assert [token for _, _, token in recorded(tmp_path, text)] == [707, 303, 808]
 
 
 def test_a_default_that_an_expression_names(tmp_path: Path) -> None:
@@ -220,3 +232,25 @@ def test_a_default_that_an_expression_names(tmp_path: Path) -> None:
         stop=1,
     )
     assert [time for time, _, _ in recorded(tmp_path, text)] == [0.0, 0.25, 1.0]
+
+
+def test_states_that_are_never_entered_and_ways_out_of_final_ones(tmp_path: Path) -> None:
+    """Ptolemy allows both, for neither does anything."""
+    parts = [state("a", isInitialState="true"), state("b", isFinalState="true"), state("lost"), state("also")]
+    parts += [transition("t", "a", "b", "in == 2", "out = in"), transition("u", "b", "also", "true", "out = 0"),
+              transition("v", "lost", "a", "true", "out = 0")]  # fmt: skip
+    text = around(machine(*parts))
+    assert notes(tmp_path, text) == [
+        "M: lost is left out: no transition leads there",
+        "M: also is left out: no transition leads there",
+        "M: the transition u is left out: nothing leaves a final state",
+        "M: in is called in_",
+    ]
+    assert recorded(tmp_path, text) == [(1.0, 1, 2)]
+
+
+def test_a_default_transition_has_a_guard_too(tmp_path: Path) -> None:
+    """It goes if no other is enabled and its guard holds."""
+    parts = [state("a", isInitialState="true"), transition("t", "a", "a", "in == 1", "out = 10"),
+             transition("u", "a", "a", "in > 2", "out = 20", defaultTransition="true")]  # fmt: skip
+    assert [token for _, _, token in recorded(tmp_path, around(machine(*parts)))] == [10, 20, 20]
