@@ -128,15 +128,16 @@ class Histogram(Actor):
 class Test(Actor):
     """Compares what comes with what is expected, in order, and ends the run with an error where they differ.
 
-    Numbers may differ by ``tolerance``, also within lists and fields; everything else must be equal.  Values that are
-    missing at the end of the run are an error, too, and so is a token too many, unless more may ``follow``.  With
-    ``together``, each value is a list of what comes together, a token on each channel.
-    Ptolemy: ``Test``, ``NonStrictTest``.
+    Numbers may differ by ``tolerance``, also within lists and fields; everything else must be equal, but for ``null``,
+    which stands for anything.  Values that are missing at the end of the run are an error, too, and so is a token too
+    many, unless more may ``follow``.  With ``together``, each value is a list of what comes together, a token on each
+    channel.  Ptolemy: ``Test``, ``NonStrictTest``.
     """
 
     __test__: ClassVar[bool] = False  # for pytest, which would take it for a class of tests
 
     input = InputPort(multi=True, doc="what is compared")
+    output = OutputPort(bool, doc="with each token, if somebody listens, whether all values have come by now")
 
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is expected, in order")
     times: Parameter[Any] = array_parameter(
@@ -146,6 +147,9 @@ class Test(Actor):
     complete = Parameter(bool, True, doc="whether all values must have come when the run ends")
     together = Parameter(bool, False, doc="whether a value is a list, of a token on each channel")
     follow = Parameter(bool, False, ptolemy=True, doc="whether other tokens may come after those that are expected")
+    lenient = Parameter(
+        bool, False, ptolemy=True, doc="whether a number is as good as its text, and NaN as good as any number"
+    )
 
     def check(self) -> None:
         if self.times is not None and len(self.times) != len(self.values):
@@ -169,6 +173,11 @@ class Test(Actor):
             self._compare(tokens)
 
     def _compare(self, token: Any) -> None:
+        self._judge(token)
+        if self.output.width:
+            self.output.send(self._seen >= len(self.values))
+
+    def _judge(self, token: Any) -> None:
         index = self._seen
         if index >= len(self.values) and self.follow:
             return
@@ -176,7 +185,7 @@ class Test(Actor):
         if index >= len(self.values):
             raise EpicycleError(f"token {index} is {token!r}, but only {len(self.values)} are expected")
         expected = self.values[index]
-        if not _alike(token, expected, self.tolerance):
+        if not _alike(token, expected, self.tolerance, self.lenient):
             raise EpicycleError(f"token {index} is {token!r}, expected {expected!r}{self._within()}")
         if self.times is not None and abs(self.now - self.times[index]) > self.tolerance:
             raise EpicycleError(
@@ -194,20 +203,47 @@ class Test(Actor):
             )
 
 
-def _alike(token: Any, expected: Any, tolerance: float) -> bool:
+def _alike(token: Any, expected: Any, tolerance: float, lenient: bool) -> bool:
     """Whether a token is what is expected; lists, arrays and fields are compared item by item."""
+    if expected is None:
+        return True
     if isinstance(token, (np.ndarray, np.generic)):
         token = token.tolist()
     if isinstance(expected, (list, tuple)):
         is_list = isinstance(token, (list, tuple)) and len(token) == len(expected)
-        return is_list and all(_alike(one, other, tolerance) for one, other in zip(token, expected, strict=True))
+        return is_list and all(
+            _alike(one, other, tolerance, lenient) for one, other in zip(token, expected, strict=True)
+        )
     if isinstance(expected, Mapping) and isinstance(token, Mapping):
-        return token.keys() == expected.keys() and all(_alike(token[k], expected[k], tolerance) for k in expected)
+        return token.keys() == expected.keys() and all(
+            _alike(token[name], expected[name], tolerance, lenient) for name in expected
+        )
+    if lenient and isinstance(expected, str) is not isinstance(token, str):
+        return _is_text_of(expected, token) if isinstance(expected, str) else _is_text_of(token, expected)
     if isinstance(expected, bool) or isinstance(token, bool):
         return token is expected
     if isinstance(expected, (int, float)) and isinstance(token, (int, float)):
-        return token == expected or abs(token - expected) <= tolerance
+        if token == expected:
+            return True
+        try:
+            if math.isnan(token) or math.isnan(expected):
+                return lenient
+            return token - tolerance <= expected <= token + tolerance
+        except OverflowError:  # whole numbers may be longer than any other
+            return False
     return bool(token == expected)
+
+
+def _is_text_of(text: str, value: Any) -> bool:
+    """Whether a text is a truth value or a number as Java writes it."""
+    if isinstance(value, bool):
+        return text == ("true" if value else "false")
+    if isinstance(value, int):
+        return text == str(value)
+    try:
+        return isinstance(value, float) and not text.lstrip("-").isdigit() and float(text) == value
+    except ValueError:
+        return False
 
 
 class Stop(Actor):

@@ -424,6 +424,7 @@ _VIEWS = frozenset(
         "TokenWriter",
         "TextWriter",
         "XMLWriter",
+        "TypeTest",  # of types, which are resolved otherwise here
     }
 )
 _ALSO = {

@@ -36,6 +36,8 @@ CONSTANTS: Mapping[str, object] = {
     "Infinity": math.inf,
     "PositiveInfinity": math.inf,
     "NegativeInfinity": -math.inf,
+    "NaN": math.nan,
+    "nil": None,
     "MaxDouble": 1.7976931348623157e308,
     "MinDouble": 5e-324,
     "MaxInt": 2**31 - 1,

@@ -27,6 +27,7 @@ from tests.moml.moml_parts import (
     prop,
     recorded,
     run,
+    sent,
     wires,
     written,
 )
@@ -268,6 +269,61 @@ def test_a_test_in_training_checks_nothing(tmp_path: Path) -> None:
     )
     assert notes(tmp_path, text) == ["Test is in training mode: it checks nothing"]
     assert "  Test: {type: Recorder}\n" in written(tmp_path, text)
+
+
+def test_the_last_that_says_whether_it_trains_says_it_for_all_of_its_class(tmp_path: Path) -> None:
+    text = model(
+        entity("a", "DiscreteClock"),
+        entity("One", "Test", correctValues="{7}", trainingMode="true"),
+        entity("Two", "Test", correctValues="{1}", trainingMode="false", requireAllCorrectValues="false"),
+        entity("Three", "NonStrictTest", correctValues="{1, 1}"),
+        wires("a.output One.input Two.input Three.input"),
+        stop=1,
+    )
+    assert notes(tmp_path, text) == []
+    assert "  One: {type: Test, values: [7], complete: false}\n" in written(tmp_path, text)
+    assert "  Three: {type: Test, values: [1, 1]}\n" in written(tmp_path, text)
+
+
+def test_what_a_test_expects_where_anything_may_come(tmp_path: Path) -> None:
+    """NaN is close to every number, and nil stands for any token."""
+    text = model(
+        entity("a", "DiscreteClock", values="{1, 2, 3}"),
+        entity("Test", "NonStrictTest", correctValues="{NaN, nil, 3}"),
+        wires("a.output Test.input"),
+        stop=2,
+    )
+    assert "  Test: {type: Test, values: [null, null, 3]}\n" in written(tmp_path, text)
+    run(tmp_path, text)
+
+
+def test_a_test_of_one_channel_expects_arrays_in_arrays(tmp_path: Path) -> None:
+    """And the arrays around them stand for the channel, however many there are in each."""
+    actors = entity("a", "DiscreteClock", values="{{1, 2}, {3}}")
+    for expected, values in (
+        ("{{{1, 2}}, {{3}}}", "[[1, 2], [3]]"),
+        ("{{{1, 2}}, {{3}, {4}}}", "[[1, 2], [[3], [4]]]"),
+    ):
+        text = model(actors, entity("Test", "Test", correctValues=expected), wires("a.output Test.input"), stop=1)
+        assert f"  Test: {{type: Test, values: {values}}}\n" in written(tmp_path, text)
+
+
+def test_a_test_sends_whether_it_is_done(tmp_path: Path) -> None:
+    text = model(
+        entity("a", "DiscreteClock", values="{1, 2, 3}"),
+        entity("Test", "Test", correctValues="{1, 2}"),
+        entity("Stop", "Stop"),
+        wires("a.output Test.input", "Test.output Stop.input"),
+        stop=9,
+    )
+    assert notes(tmp_path, text) == []
+    assert "  - Test.output -> Stop.input\n" in written(tmp_path, text)
+    assert [time for time, *_ in sent(tmp_path, text)] == [0.0, 1.0]
+
+
+def test_a_test_of_types_is_left_out(tmp_path: Path) -> None:
+    text = model(entity("a", "DiscreteClock"), entity("T", "TypeTest", portTypes="{a={}}"), wires("a.output T.input"))
+    assert "T:" not in written(tmp_path, text)
 
 
 def test_an_expression_has_the_ports_that_somebody_added(tmp_path: Path) -> None:
