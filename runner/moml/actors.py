@@ -212,6 +212,8 @@ def in_parameters(
 
 def written(value: Any, kind: str) -> object:
     """A value as it is written for a parameter of that kind."""
+    if _has_nil(value):
+        raise ValueError("nil cannot be written")
     if kind == "time":
         return seconds(value)
     if kind == "times":
@@ -225,6 +227,12 @@ def written(value: Any, kind: str) -> object:
     return plain(value)
 
 
+def _has_nil(value: object) -> bool:
+    if isinstance(value, (list, dict)):
+        return any(map(_has_nil, value.values() if isinstance(value, dict) else value))
+    return value is None
+
+
 def plain(value: Any) -> object:
     """A value of Ptolemy's as YAML has it."""
     if isinstance(value, list):
@@ -233,6 +241,8 @@ def plain(value: Any) -> object:
         return {name: plain(each) for name, each in value.items()}
     if isinstance(value, float) and math.isnan(value):
         raise ValueError("NaN cannot be written")
+    if callable(value):
+        raise ValueError("a function cannot be written")
     if isinstance(value, str):
         return value.replace("${", "$${")
     if callable(value):

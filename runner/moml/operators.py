@@ -55,6 +55,10 @@ def java_text(value: Any) -> str:
         return "{" + ", ".join(_quoted(each) for each in value) + "}"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{name} = {_quoted(each)}" for name, each in sorted(value.items())) + "}"
+    if value is None:
+        return "nil"
+    if not isinstance(value, (str, int)):
+        raise TypeError("it has no text")
     return str(value)
 
 

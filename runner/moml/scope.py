@@ -121,7 +121,7 @@ class Scope:
             name = match[2] or match[4]
             try:
                 return java_text(self(name) if name else self.value(match[3]))
-            except (KeyError, ExpressionError):
+            except (KeyError, ExpressionError, TypeError):
                 return match[0]
 
         return _REFERENCE.sub(value, text)

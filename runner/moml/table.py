@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from . import checks
 from . import special as how
 from .counterpart import Counterpart, counterpart, view
 from .variables import set_variable
@@ -362,7 +363,7 @@ _SINKS: Mapping[str, Counterpart] = {
     "Test": counterpart(
         "Test",
         "input* | output",
-        special=how.strict_test,
+        special=checks.strict_test,
         tolerance="number",
         requireAllCorrectValues="flag:complete",
         requireOrderedValues="none",
@@ -370,7 +371,7 @@ _SINKS: Mapping[str, Counterpart] = {
     "NonStrictTest": counterpart(
         "Test",
         "input | output",
-        special=how.non_strict_test,
+        special=checks.non_strict_test,
         tolerance="number",
         requireAllCorrectValues="flag:complete",
         requireOrderedValues="none",

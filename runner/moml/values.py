@@ -48,7 +48,6 @@ CONSTANTS: Mapping[str, object] = {
     "MinShort": -(2**15),
     "MaxFloat": 3.4028234663852886e38,
     "MinFloat": 1.401298464324817e-45,
-    "NaN": math.nan,
     "MaxUnsignedByte": 255,
     "MinUnsignedByte": 0,
     # types, by a value of theirs

@@ -436,6 +436,46 @@ def test_ports_that_publish_and_subscribe(tmp_path: Path) -> None:
     assert recorded(tmp_path, model(sends, receives, stop=1), "Receives.Recorder") == [(0.0, 1, 1), (1.0, 1, 1)]
 
 
+def test_functions_of_the_model_are_written_out(tmp_path: Path) -> None:
+    text = model(
+        entity("c", "DiscreteClock", values="{1, 2}"),
+        entity("a", "Const", value="f(2)"),
+        entity("E", "Expression", port("x", "input"), expression="f(x) * 2"),
+        entity("R", "Recorder"),
+        wires("c.output a.trigger E.x", "a.output R.input", "E.output R.input"),
+        f="function(x:int) x + n",
+        n=3,
+        stop=1,
+    )
+    found = written(tmp_path, text)
+    assert "  a: {type: Const, value: 5}\n" in found
+    assert '  E: {type: Expression, expression: "(x + 3) * 2"}\n' in found
+    assert "parameters:" not in found
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ("nil", "nil cannot be written"),
+        ("{1, nil}", "nil cannot be written"),
+        ("NaN", "NaN cannot be written"),
+        ("f", "a function cannot be written"),
+        ("'q' + f", "it cannot be computed: it has no text"),
+    ],
+)
+def test_values_that_cannot_be_written(tmp_path: Path, said: str, why: str) -> None:
+    text = model(
+        entity("c", "DiscreteClock"),
+        entity("a", "Const", value=said),
+        entity("R", "Recorder"),
+        wires("c.output a.trigger", "a.output R.input"),
+        f="function(x:int) x",
+    )
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, text)
+    assert str(caught.value) == f"m.xml cannot be imported:\n   - a.value = {said!r}: {why}"
+
+
 # -- the command ------------------------------------------------------------------------------------------------------
 
 
