@@ -303,7 +303,8 @@ def outcome(model: dict[str, Any], way: str) -> list[str]:
     try:
         path = Path(tempfile.gettempdir()) / f"network-{os.getpid()}.yaml"
         path.write_text(json.dumps({"model": "network", **model}), encoding="utf-8")
-        made = load_model(path, types=TYPES)
+        # Few tokens at one tag: loops that duplicate them end soon, in an error that is compared, too.
+        made = load_model(path, types=TYPES, max_actors=200)
         path.unlink()
     except ModelError as error:
         return [error.problems[0].message]
