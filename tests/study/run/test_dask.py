@@ -293,6 +293,7 @@ def test_the_code_that_has_to_be_the_same_is_all_that_runs(tmp_path: Path, monke
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_workers_that_are_missing_or_have_no_epicycle(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

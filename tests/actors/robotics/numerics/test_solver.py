@@ -26,7 +26,7 @@ definitions = importlib.import_module("epicycle.actors.robotics.numerics.definit
 horizon = importlib.import_module("epicycle.actors.robotics.numerics.horizon")
 
 RUNS = ((0, 30.0, 0.0, 1), (2, 30.0, 0.0, 2), (3, 10.0, 0.25, 3), (4, 5.0, 0.5, 4))
-PROBLEMS = 140
+PROBLEMS = 110
 FEASIBLE = 1e-6
 
 
