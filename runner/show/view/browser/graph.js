@@ -159,9 +159,9 @@ class Graph extends View {
     const isOpen = box.composite && !isShut;
     if (box.composite) this.sign(x + width - 11, y + 4, isShut);
     if (scale * 9 < LEGIBLE) {
-      if (isShut && scale * width > 30) {
-        const size = Math.min(12 / scale, height / 2, width / 6);
-        this.text(box.name, x + width / 2, y + height / 2 + size / 3, { align: "center", bold: true, size, width: width - 4 });
+      if (!isOpen && scale * width > 24) {
+        const size = Math.min(12 / scale, height / 2, (1.5 * width) / box.name.length);
+        this.text(box.name, x + width / 2, y + height / 2 + size / 3, { align: "center", bold: true, size, width: width - 2 });
       }
       return;
     }
