@@ -57,6 +57,22 @@ class Lanes extends Timeline {
     this.cursor();
   }
 
+  // A click near an act selects it.
+  pick(x, y) {
+    const { state } = this, { run } = state, aspect = Math.floor((y + this.scroll - RULER) / ACTS);
+    let best = NOTHING, least = 8;
+    if (aspect >= 0 && aspect < run.aspects.length && y > RULER) {
+      const around = this.at(x - least), first = search(run.acts.length, (i) => state.place(run, run.record_tag[run.acts[i]]) >= around);
+      for (let i = first; i < run.acts.length; i++) {
+        const record = run.acts[i], away = this.x(state.place(run, run.record_tag[record])) - x;
+        if (away > least) break;
+        if (run.record_aspect[record] === aspect && Math.abs(away) < least) [best, least] = [record, Math.abs(away)];
+      }
+    }
+    if (best >= 0) state.goTo({ run: state.active, firing: NOTHING, record: best });
+    else super.pick(x);
+  }
+
   acts(number, name, y) {
     const { run } = this.state, { acts } = run, [first, last] = this.tagsInSight(run);
     this.text(name, 4, y + 12, { size: 10.5, colour: theme.soft, width: this.margin - 8 });
