@@ -1,4 +1,4 @@
-"""show a run in a browser"""
+"""show a run in a browser, or in other viewers"""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from .options import CHANGES, DONE, SEED, command, load, option, seconds
 from .run import progress, run
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..show.view import Recording
 
 
@@ -31,13 +33,15 @@ if TYPE_CHECKING:
     option(
         "-o", "--out", metavar="FILE", type=Path, help="the page (default: results/MODEL/view.html, which is opened)"
     ),
+    option("--mcap", metavar="FILE", type=Path, help="write the run for Foxglove or Lichtblick; no page without -o"),
+    option("--rerun", metavar="FILE", type=Path, help="write the run for rerun; no page without -o"),
     imports=("build", "engine", "show"),
 )
 def view(options: argparse.Namespace) -> int:
     """Run a model and write a page that shows the run: it needs no network, and any browser opens it.
 
     For a folder of results the run is made again, as its manifest says.  Two runs are shown side by side, with the
-    first difference between them.
+    first difference between them.  --mcap and --rerun write the run for other viewers.
     """
     from epicycle.actors import EpicycleError
 
@@ -46,9 +50,9 @@ def view(options: argparse.Namespace) -> int:
 
     if len(options.model) > 2:
         raise EpicycleError(f"a page shows one run or two, not {len(options.model)}: {', '.join(options.model)}")
-    path = options.out
-    if path is not None and not path.parent.is_dir():
-        raise EpicycleError(f"--out {path} cannot be written: there is no folder {path.parent}")
+    if options.out is not None:
+        _check_folder("--out", options.out)
+    exports = _exports(options)
     names = [Path(each).name.removesuffix(".yaml") for each in options.model]
     recordings: list[Recording] = []
     error: EpicycleError | None = None
@@ -67,16 +71,49 @@ def view(options: argparse.Namespace) -> int:
             complain(
                 f"{each} was made by another version of the model or of Epicycle: the run is not the same any more"
             )
-    if path is None:
-        path = Path("results") / recordings[0].model.name / "view.html"
-        path.parent.mkdir(parents=True, exist_ok=True)
-    write_page(recordings, path, names=names if len(names) > 1 else [])
-    tell(f"wrote {path}")
+    for path, write in exports:
+        write(recordings[0], path)
+        tell(f"wrote {path}")
+    page = options.out
+    if page is None and not exports:
+        page = Path("results") / recordings[0].model.name / "view.html"
+        page.parent.mkdir(parents=True, exist_ok=True)
+    if page is not None:
+        write_page(recordings, page, names=names if len(names) > 1 else [])
+        tell(f"wrote {page}")
     if error is not None:
         raise error
-    if options.out is None:
-        webbrowser.open(path.resolve().as_uri())
+    if page is not None and options.out is None:
+        webbrowser.open(page.resolve().as_uri())
     return DONE
+
+
+def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recording, Path], None]]]:
+    """The files for other viewers, and what writes them; what stands against that is said before a run."""
+    from epicycle.actors import EpicycleError
+
+    from ..show.view import require_mcap, require_rerun, write_mcap, write_rerun
+
+    found: list[tuple[Path, Callable[[Recording, Path], None]]] = []
+    for flag, path, require, write in (
+        ("--mcap", options.mcap, require_mcap, write_mcap),
+        ("--rerun", options.rerun, require_rerun, write_rerun),
+    ):
+        if path is None:
+            continue
+        if len(options.model) > 1:
+            raise EpicycleError(f"{flag} writes one run, not two: {', '.join(options.model)}")
+        _check_folder(flag, path)
+        require()
+        found.append((path, write))
+    return found
+
+
+def _check_folder(flag: str, path: Path) -> None:
+    from epicycle.actors import EpicycleError
+
+    if not path.parent.is_dir():
+        raise EpicycleError(f"{flag} {path} cannot be written: there is no folder {path.parent}")
 
 
 def _recording(options: argparse.Namespace) -> Recording:
