@@ -49,6 +49,8 @@ def view(options: argparse.Namespace) -> int:
     path = options.out
     if path is not None and not path.parent.is_dir():
         raise EpicycleError(f"--out {path} cannot be written: there is no folder {path.parent}")
+    if path is not None and path.is_dir():
+        raise EpicycleError(f"--out {path} cannot be written: it is a folder")
     names = [Path(each).name.removesuffix(".yaml") for each in options.model]
     recordings: list[Recording] = []
     error: EpicycleError | None = None
@@ -65,7 +67,7 @@ def view(options: argparse.Namespace) -> int:
             continue
         if digest and results.digest != digest:
             complain(
-                f"{each} was made by another version of the model or of Epicycle: the run is not the same any more"
+                f"{each} was made by another version of the model or of Epicycle: the run is no longer the same"
             )
     if path is None:
         path = Path("results") / recordings[0].model.name / "view.html"
