@@ -51,7 +51,7 @@ def view(options: argparse.Namespace) -> int:
     if len(options.model) > 2:
         raise EpicycleError(f"a page shows one run or two, not {len(options.model)}: {', '.join(options.model)}")
     if options.out is not None:
-        _check_folder("--out", options.out)
+        _check_path("--out", options.out)
     exports = _exports(options)
     names = [Path(each).name.removesuffix(".yaml") for each in options.model]
     recordings: list[Recording] = []
@@ -60,7 +60,7 @@ def view(options: argparse.Namespace) -> int:
         one = copy(options)
         one.model = each
         digest = _as_before(one) if Path(each).is_dir() else ""
-        recordings.append(_recording(one))
+        recordings.append(_recording(one, is_compared=len(options.model) > 1))
         try:
             with progress(recordings[-1].model, seconds("--until", one.until)) as report:
                 results = recordings[-1].run(until=seconds("--until", one.until), progress=report)
@@ -68,9 +68,7 @@ def view(options: argparse.Namespace) -> int:
             error = failure
             continue
         if digest and results.digest != digest:
-            complain(
-                f"{each} was made by another version of the model or of Epicycle: the run is not the same any more"
-            )
+            complain(f"{each} was made by another version of the model or of Epicycle: the run is no longer the same")
     for path, write in exports:
         write(recordings[0], path)
         tell(f"wrote {path}")
@@ -103,20 +101,22 @@ def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recordin
             continue
         if len(options.model) > 1:
             raise EpicycleError(f"{flag} writes one run, not two: {', '.join(options.model)}")
-        _check_folder(flag, path)
+        _check_path(flag, path)
         require()
         found.append((path, write))
     return found
 
 
-def _check_folder(flag: str, path: Path) -> None:
+def _check_path(flag: str, path: Path) -> None:
     from epicycle.actors import EpicycleError
 
     if not path.parent.is_dir():
         raise EpicycleError(f"{flag} {path} cannot be written: there is no folder {path.parent}")
+    if path.is_dir():
+        raise EpicycleError(f"{flag} {path} cannot be written: it is a folder")
 
 
-def _recording(options: argparse.Namespace) -> Recording:
+def _recording(options: argparse.Namespace, *, is_compared: bool) -> Recording:
     from ..build import figures_of
     from ..show.view import Recording
     from ..text import Problems
@@ -127,7 +127,7 @@ def _recording(options: argparse.Namespace) -> Recording:
     problems.raise_if_any()
     if options.until is None and model.endless:
         complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
-    return Recording(model, figures, seed=options.seed)
+    return Recording(model, figures, seed=options.seed, is_compared=is_compared)
 
 
 def _as_before(options: argparse.Namespace) -> str:
