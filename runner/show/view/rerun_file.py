@@ -116,6 +116,8 @@ class _Writer:
 
     def _signal(self, signal: Signal) -> None:
         """Each number in the tokens over time, and each state, as far as there are such."""
+        import pyarrow
+
         numbers: dict[str, tuple[list[Tag], list[float]]] = {}
         states: dict[str, tuple[list[Tag], list[str | None]]] = {}
         for tag, token in signal:
@@ -136,7 +138,8 @@ class _Writer:
             self._send([*path, *parts(place)], tags, self._rerun.Scalars.columns(scalars=values))
         for place, (tags, found) in states.items():
             if any(each is not None for each in found):
-                texts = [None if each is None else encodable(each) for each in found]
+                # An Arrow array: rerun would write None in a list as the text "None".
+                texts = pyarrow.array([each and encodable(each) for each in found], pyarrow.string())
                 self._send([*path, *parts(place)], tags, self._rerun.StateChange.columns(state=texts))
 
     def _space(self, thing: Thing) -> None:
