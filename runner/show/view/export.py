@@ -138,6 +138,15 @@ def things(recording: Recording) -> list[Thing]:
     return list(found.values())
 
 
+def extent(placed: list[Thing]) -> tuple[Point, Point]:
+    """The corners of the space in which points are."""
+    points = [point for thing in placed for scene in thing.scenes for point in scene.points] or [(0.0, 0.0)]
+    return (min(x for x, _ in points), min(y for _, y in points)), (
+        max(x for x, _ in points),
+        max(y for _, y in points),
+    )
+
+
 def _things(mark: Mark, end: int) -> Iterator[Thing]:
     colour = LIMIT if mark.colour is None else PALETTE[mark.colour % len(PALETTE)]
     red, green, blue = bytes.fromhex(colour[1:])

@@ -20,7 +20,7 @@ from epicycle.actors import Tag
 
 from ...results import Signal, plain
 from ...shown import finite
-from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, firings, parts, results_of, things
+from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, results_of, things
 from .recording import Recording
 from .writing import ViewError, replace_file
 
@@ -69,8 +69,9 @@ def mcap(recording: Recording) -> bytes:
         _acts(acts(recording), channels),
         _firings(firings(recording), channels),
     ]
+    encoder = json.JSONEncoder(separators=(",", ":"))
     for time, channel, message in merge(*streams, key=itemgetter(0)):
-        data = json.dumps(message, separators=(",", ":")).encode()
+        data = encoder.encode(message).encode()
         writer.add_message(channel, log_time=time, publish_time=time, data=data)
     writer.finish()  # type: ignore[no-untyped-call]
     return file.getvalue()
@@ -222,11 +223,10 @@ def _fitted(value: Any, schema: Schema) -> Any:
 # -- space ------------------------------------------------------------------------------------------------------------
 
 
-def _size(placed: Iterable[Thing]) -> float:
+def _size(placed: list[Thing]) -> float:
     """The diameter of a point (m), which is a share of the space in which points are."""
-    points = [point for thing in placed for scene in thing.scenes for point in scene.points]
-    widths = [max(along) - min(along) for along in zip(*points, strict=True)]
-    return SHARE * (max(widths, default=0.0) or 1.0)
+    (left, low), (right, high) = extent(placed)
+    return SHARE * (max(right - left, high - low) or 1.0)
 
 
 def _space(thing: Thing, size: float, channels: Channels) -> Iterator[Message]:

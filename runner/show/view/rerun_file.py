@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,12 @@ from epicycle.aspects import STAMP
 
 from ...results import Signal, cell, leaves
 from ..figures import selected
-from .export import Act, Thing, about, acts, encodable, firings, parts, results_of, things
+from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, results_of, things
 from .recording import Recording
 from .writing import ViewError, replace_file
 
 PIXELS = 5.0  # radius of a point
+AWAY = 1.4  # times the width of the space: from there the eye sees all of it
 THICKNESS = 1.0  # radius of a line, in pixels
 PLACES = 128  # in the tokens of a signal, of which each is an entity; further ones are left out
 LAST = 2**62  # microstep, after all others of an instant
@@ -95,15 +96,22 @@ class _Writer:
             for name, figure in figures
             if getattr(figure, "style", "") and (shown := selected(figure.signal_patterns(), results))
         ]
+        recorded = [self._below(name) for name in results.signals if name in self._recording.model.recorded]
         words = [
-            views.StateTimelineView(name="states", origin="/signals"),
+            views.StateTimelineView(name="states", origin="/signals", contents=recorded),
             views.TextLogView(name="aspects", origin="/aspects"),
             views.TextDocumentView(name="run", origin="/about"),
         ]
-        tabs = views.Tabs(*(lines or [views.TimeSeriesView(name="signals", origin="/signals")]))
+        tabs = views.Tabs(*(lines or [views.TimeSeriesView(name="signals", origin="/signals", contents=recorded)]))
         beside = views.Vertical(tabs, views.Tabs(*words))
-        space = [views.Spatial3DView(name="space", origin="/space")] if self._things else []
+        space = [self._space_from_above(views)] if self._things else []
         return views.Blueprint(views.Horizontal(*space, beside), collapse_panels=True)
+
+    def _space_from_above(self, views: Any) -> Any:
+        (left, low), (right, high) = extent(self._things)
+        x, y, away = (left + right) / 2.0, (low + high) / 2.0, AWAY * (max(right - left, high - low) or 1.0)
+        eye = views.EyeControls3D(position=(x, y, away), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
+        return views.Spatial3DView(name="space", origin="/space", eye_controls=eye)
 
     def _below(self, signal: str) -> str:
         path: str = self._rerun.new_entity_path(["signals", *parts(signal)])
@@ -144,33 +152,54 @@ class _Writer:
 
     def _space(self, thing: Thing) -> None:
         rerun, path = self._rerun, ["space", thing.kind, *parts(thing.name)]
-        entity = rerun.new_entity_path(path)
         thin, paint = rerun.Radius.ui_points(THICKNESS), [thing.colour]
+        look: dict[str, Any] = {"line_radii": thin, "colors": paint, "fill_mode": "transparentfillmajorwireframe"}
         named = {"labels": [thing.label], "show_labels": True} if thing.label else {}
-        self._stream.log(
-            entity,
-            rerun.Points3D.from_fields(radii=rerun.Radius.ui_points(PIXELS), colors=paint, **named),
-            rerun.Ellipsoids3D.from_fields(line_radii=thin, colors=paint, fill_mode="majorwireframe"),
-            rerun.LineStrips3D.from_fields(radii=thin, colors=paint),
-            static=True,
-        )
-        points = [(x, y, 0.0) for scene in thing.scenes for x, y in scene.points]
-        discs = [disc for scene in thing.scenes for disc in scene.discs]
-        strips = [[(x, y, 0.0) for x, y in way] for scene in thing.scenes for way in scene.paths]
-        halves = [disc.angle / 2.0 for disc in discs]
+        # Each kind of shape: how it looks, and for each scene those that it has, as columns.
+        shapes: list[tuple[Any, list[list[Any]], Callable[[Any], Any]]] = [
+            (
+                rerun.Points3D.from_fields(radii=rerun.Radius.ui_points(PIXELS), colors=paint, **named),
+                [[(x, y, 0.0) for x, y in scene.points] for scene in thing.scenes],
+                lambda points: rerun.Points3D.columns(positions=points),
+            ),
+            (
+                rerun.Cylinders3D.from_fields(**look),
+                [[disc for disc in scene.discs if disc.along == disc.across] for scene in thing.scenes],
+                self._circles,
+            ),
+            (
+                rerun.Ellipsoids3D.from_fields(**look),
+                [[disc for disc in scene.discs if disc.along != disc.across] for scene in thing.scenes],
+                self._ellipses,
+            ),
+            (
+                rerun.LineStrips3D.from_fields(radii=thin, colors=paint),
+                [[[(x, y, 0.0) for x, y in way] for way in scene.paths] for scene in thing.scenes],
+                lambda strips: rerun.LineStrips3D.columns(strips=strips),
+            ),
+        ]
         columns: list[Any] = []
-        if points:
-            columns += rerun.Points3D.columns(positions=points).partition([len(each.points) for each in thing.scenes])
-        if discs:
-            columns += rerun.Ellipsoids3D.columns(
-                centers=[(disc.x, disc.y, 0.0) for disc in discs],
-                half_sizes=[(disc.along, disc.across, 0.0) for disc in discs],
-                quaternions=[(0.0, 0.0, math.sin(half), math.cos(half)) for half in halves],
-            ).partition([len(each.discs) for each in thing.scenes])
-        if strips:
-            columns += rerun.LineStrips3D.columns(strips=strips).partition([len(each.paths) for each in thing.scenes])
+        for style, rows, made in shapes:
+            if any(rows):
+                self._stream.log(rerun.new_entity_path(path), style, static=True)
+                columns += made([*chain.from_iterable(rows)]).partition([len(row) for row in rows])
         if columns:
             self._send(path, [Tag(scene.time, LAST) for scene in thing.scenes], columns)
+
+    def _circles(self, discs: list[Disc]) -> Any:
+        return self._rerun.Cylinders3D.columns(
+            centers=[(disc.x, disc.y, 0.0) for disc in discs],
+            radii=[disc.along for disc in discs],
+            lengths=[0.0] * len(discs),
+        )
+
+    def _ellipses(self, discs: list[Disc]) -> Any:
+        turns = [disc.angle / 2.0 for disc in discs]
+        return self._rerun.Ellipsoids3D.columns(
+            centers=[(disc.x, disc.y, 0.0) for disc in discs],
+            half_sizes=[(disc.along, disc.across, 0.0) for disc in discs],
+            quaternions=[(0.0, 0.0, math.sin(turn), math.cos(turn)) for turn in turns],
+        )
 
     def _act(self) -> None:
         told: dict[str, list[Act]] = {}

@@ -426,8 +426,9 @@ def test_rerun_has_what_figures_place_in_space(wifi: Recording, tmp_path: Path) 
     disc = file.entities["/space/ellipse/main/estimate"]
     sizes = np.array(disc["Ellipsoids3D:half_sizes"])[:, 0, :2]
     assert sizes == pytest.approx(ellipses(results["main.estimate"])[:, 2:4], rel=1e-6)
-    plan = file.entities["/space/tube/main/plan"]["Ellipsoids3D:half_sizes"]
-    assert {len(each) for each in plan} == {12}
+    plan = file.entities["/space/tube/main/plan"]["Cylinders3D:radii"]
+    assert np.array(plan) == pytest.approx(np.array([[0.2 + 0.4 * step for step in range(12)]] * 50))
+    assert file.entities["/space/body/obstacle/state"]["Cylinders3D:radii"] == [[2.0]] * 50
     assert len(file.entities["/space/goal/goal"]["Points3D:positions"]) == 1
 
 
