@@ -71,7 +71,7 @@ lint: $(DEV)
 	$(BIN)/mypy
 
 reference: $(DEV)
-	$(BIN)/python tests/test_reference.py .
+	$(BIN)/python -m tests.test_reference .
 
 wheel: $(DEV)
 	rm -rf build dist
@@ -94,6 +94,7 @@ $(BIN)/python:
 $(LINKED): | $(BIN)/python
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') && \
 	mkdir -p "$$site/epicycle-stubs" && \
+	ln -sfn "$(CURDIR)/api/__init__.py" "$$site/epicycle-stubs/__init__.pyi" && \
 	for folder in actors aspects runner; do ln -sfn "$(CURDIR)/$$folder" "$$site/epicycle-stubs/$$folder"; done
 	@touch $@
 

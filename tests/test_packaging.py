@@ -1,4 +1,4 @@
-"""The four folders at the root install as one namespace, completely, once, and import one way."""
+"""The folders at the root install as one package, completely, once, and import one way."""
 
 import ast
 import json
@@ -22,8 +22,8 @@ import setuptools
 from epicycle.actors import CORE_MODULES
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("actors", "aspects", "models", "runner")
-CODE_FOLDERS = ("actors", "aspects", "runner")
+FOLDERS = ("actors", "aspects", "models", "runner", "api")  # the last is `epicycle` itself
+CODE_FOLDERS = ("actors", "aspects", "runner", "api")
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 PACKAGES = CONFIG["tool"]["setuptools"]["packages"]
 TYPINGS = ROOT / "tests" / "typings"
@@ -36,17 +36,22 @@ def shipped_files() -> list[Path]:
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
         if (
-            path.suffix in {".py", ".yaml", ".css", ".mplstyle", ".pxd", ".pyx"}
+            path.suffix in {".py", ".pyi", ".yaml", ".css", ".mplstyle", ".pxd", ".pyx"}
             or path.name in {"py.typed", "schema.json"}
         )
         and "__pycache__" not in path.parts
     )
 
 
+def place_of(file: Path) -> Path:
+    """Return where in the package epicycle a file of ours is."""
+    return file.relative_to("api") if file.parts[0] == "api" else file
+
+
 def module_name(file: Path) -> str:
     """Return the dotted name under which a file of ours is imported."""
-    parts = file.parts[:-1] if file.name == "__init__.py" else file.with_suffix("").parts
-    return ".".join(("epicycle", *parts))
+    parts = place_of(file).with_suffix("").parts
+    return ".".join(("epicycle", *(parts[:-1] if file.name == "__init__.py" else parts)))
 
 
 def imported_names(text: str, file: Path) -> Iterator[tuple[int, str]]:
@@ -77,15 +82,12 @@ def forbidden_imports(text: str, file: Path) -> list[str]:
 
 MODELS = sorted(file.as_posix() for file in shipped_files() if file.suffix == ".yaml")
 
-# importlib.resources.files("epicycle.models") fails in an editable install: setuptools adds a placeholder to
-# the path of a namespace package, which is no folder. So read the path, and leave out what is none.
 WHERE = """
     import importlib, json, sysconfig
     from pathlib import Path
     folders = []
     for name in ("actors", "aspects", "models", "runner"):
-        path = importlib.import_module(f"epicycle.{name}").__path__
-        folders += [Path(entry) for entry in path if Path(entry).is_dir()]
+        folders += map(Path, importlib.import_module(f"epicycle.{name}").__path__)
     home = folders[2]
     models = sorted(f"models/{file.relative_to(home).as_posix()}" for file in home.rglob("*.yaml"))
     site = sysconfig.get_path("purelib")
@@ -94,7 +96,7 @@ WHERE = """
 
 
 def test_packages_equal_the_tree() -> None:
-    on_disk = {".".join(("epicycle", *file.parent.parts)) for file in shipped_files()}
+    on_disk = {".".join(("epicycle", *place_of(file).parent.parts)) for file in shipped_files()}
     assert sorted(PACKAGES) == sorted(on_disk)
 
 
@@ -106,7 +108,10 @@ def test_every_folder_with_code_has_an_init() -> None:
 
 def test_models_hold_yaml_and_its_schema_only() -> None:
     models = [file for file in shipped_files() if file.parts[0] == "models"]
-    assert [file.as_posix() for file in models if file.suffix != ".yaml"] == ["models/schema.json"]
+    assert [file.as_posix() for file in models if file.suffix != ".yaml"] == [
+        "models/__init__.py",
+        "models/schema.json",
+    ]
 
 
 @pytest.mark.parametrize("folder", CODE_FOLDERS)
@@ -123,9 +128,9 @@ def test_folder_is_typed_and_says_what_it_offers(folder: str) -> None:
 
 
 def test_mypy_redirects_equal_the_tree() -> None:
-    code = {file.parent for file in shipped_files() if file.name == "__init__.py"}
+    code = {file.parent for file in shipped_files() if file.name == "__init__.py"} - {Path("api")}
     expected = {
-        "epicycle/__init__.pyi": "",
+        "epicycle/__init__.pyi": "from api import *\n",
         "epicycle/aspects/testing.pyi": "from aspects.testing import *\n",  # a module that the runner imports
     }
     for folder in code:
@@ -182,7 +187,7 @@ def test_nothing_is_imported_twice() -> None:
     """Look in a fresh interpreter started at the root, where a bare `import actors` would work too."""
     script = """
         import importlib, json, pkgutil, sys
-        for folder in ("epicycle.actors", "epicycle.aspects", "epicycle.runner"):
+        for folder in ("epicycle.actors", "epicycle.aspects", "epicycle.models", "epicycle.runner"):
             package = importlib.import_module(folder)
             for module in pkgutil.walk_packages(package.__path__, folder + "."):
                 if not module.name.endswith("__main__"):
@@ -392,7 +397,7 @@ def test_wheel_holds_every_file_and_no_other(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         found = [name for name in archive.namelist() if ".dist-info/" not in name]
     core = {name for name in found if name.endswith((".so", ".pyd", "/compiled.json"))}
-    assert sorted(set(found) - core) == sorted(f"epicycle/{file.as_posix()}" for file in shipped_files())
+    assert sorted(set(found) - core) == sorted(f"epicycle/{place_of(file).as_posix()}" for file in shipped_files())
     # All of the compiled core or, where there is no compiler, nothing of it.
     modules = {name.partition(".")[0].replace("/", ".") for name in core if not name.endswith(".json")}
     assert modules in ({*CORE_MODULES}, set())
@@ -403,7 +408,7 @@ def test_wheel_holds_every_file_and_no_other(wheel: Path) -> None:
 def test_wheel_finds_its_own_modules_and_models(installed: Path, busy_folder: Path) -> None:
     found = json.loads(run_in(busy_folder, installed / "python", "-c", textwrap.dedent(WHERE)))
     home = Path(found["site"]) / "epicycle"
-    assert [Path(folder) for folder in found["folders"]] == [home / folder for folder in FOLDERS]
+    assert [Path(folder) for folder in found["folders"]] == [home / folder for folder in FOLDERS if folder != "api"]
     assert found["models"] == MODELS
 
 

@@ -1,7 +1,17 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
 from .figure import Figure, figure_types
-from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
+from .measure import (
+    MSER5,
+    TAKES,
+    TIME,
+    TOKENS,
+    Measure,
+    MetricOptions,
+    TakeName,
+    conversion_problem,
+    take_problem,
+)
 from .packaged import (
     find,
     is_path,
@@ -38,9 +48,11 @@ __all__ = [
     "CatalogueError",
     "Figure",
     "Measure",
+    "MetricOptions",
     "ParameterReference",
     "PortReference",
     "PortTypeError",
+    "TakeName",
     "TypeReference",
     "Types",
     "as_written",

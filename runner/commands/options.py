@@ -77,18 +77,6 @@ def number(text: str) -> float:
         return math.nan
 
 
-def seconds(flag: str, text: str | None) -> float | None:
-    """A model time that an option gives, in seconds or with a unit."""
-    from epicycle.actors import EpicycleError, convert
-
-    if text is None:
-        return None
-    time = convert(text, "s")
-    if not 0.0 <= time < 1e9:
-        raise EpicycleError(f"{flag} {text}: expected a time from 0 s to 1e9 s")
-    return time
-
-
 # -- options ----------------------------------------------------------------------------------------------------------
 
 COUNT = whole(1, 10**9, "1e9")

@@ -45,6 +45,7 @@ class Results(Tabled):
     wall_time: float  # s
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
     outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
+    figures: dict[str, Any] = field(default_factory=dict)  # that the model declares, as it declares them
 
     @property
     def intervals(self) -> dict[str, Interval]:
