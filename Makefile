@@ -67,7 +67,7 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python -m tests.arithmetic
-	$(BIN)/lint-imports --no-logo --no-cache
+	$(BIN)/python -m tests.layers
 	$(BIN)/mypy
 
 reference: $(DEV)

@@ -34,7 +34,8 @@ def bar(name: str, *, after: float = 0.0, terminal: Console | None = None) -> It
         def show(done: float, total: float | None, words: str) -> None:
             nonlocal shown
             if shown is None and time.monotonic() - begun >= after:
-                shown = stack.enter_context(_in_notebook(name) if in_notebook() else _on_terminal(name, terminal))
+                drawn = _in_notebook(name) if in_notebook() else _on_terminal(name, words, terminal)
+                shown = stack.enter_context(drawn)
             if shown is not None:
                 shown(done, total, words)
 
@@ -48,12 +49,12 @@ def in_notebook() -> bool:
 
 
 @contextmanager
-def _on_terminal(name: str, terminal: Console) -> Iterator[Show]:
+def _on_terminal(name: str, words: str, terminal: Console) -> Iterator[Show]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     about, said = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[words]}"))
     with Progress(about, said, BarColumn(), TimeElapsedColumn(), console=terminal, transient=True) as drawn:
-        task = drawn.add_task(name, total=None, words="")
+        task = drawn.add_task(name, total=None, words=words)
         yield lambda done, total, words: drawn.update(task, total=total, completed=done, words=words)
 
 

@@ -26,7 +26,7 @@ from ..graph import (
     is_within,
     postings,
 )
-from ..language import Values
+from ..language import ParameterText, Values
 from ..shown import short
 from ..tables import Table, Tabled
 from ..text import NAME, NAMES_HAVE, Position, Problem, Problems, Text, call_site, within
@@ -81,7 +81,7 @@ class Model(Scope, Tabled):
             rules = director_of(name, {"ties": ties, "like": like}, call_site(), problems)
         self.draft.graph.rules[""] = Rules().inside(rules.get("ties"), rules.get("like"))
         self.parameters: dict[str, object] = dict(parameters or {})
-        self.declared: dict[str, tuple[str, str]] = {}  # unit and doc of the parameters
+        self.declared: dict[str, ParameterText] = {}  # what its file says of the parameters
         self.aspects: list[WovenAspect] = []
         self.stop_time: int | None = None  # ns
         self.stop_ports: list[str] = []

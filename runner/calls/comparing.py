@@ -107,7 +107,8 @@ class Comparison(Tabled):
     def _tables(self) -> list[Table]:
         rows = []
         for each in self.differences():
-            told = (each.name, each.variant, with_interval(each.metric), self.units[each.name])
+            unit = "" if self.units[each.name] == "1" else self.units[each.name]
+            told = (each.name, each.variant, with_interval(each.metric), unit)
             gap = "" if each.difference is None else with_interval(each.difference)
             rows.append((*told, gap, "" if math.isnan(each.p) else f"{each.p:.2g}", str(each.metric.count)))
         first = next(iter(self.runs))

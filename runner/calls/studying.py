@@ -41,9 +41,9 @@ def study(
     >>> results = epicycle.study({"study": "load", "model": "mm1", "vary": {"load": [0.5, 0.7]}, "replications": 20})
     >>> results.means("mean_wait")
     """
-    if isinstance(set, Mapping):
-        set = [f"{path}={json.dumps(plain(node_of(value, call_site())))}" for path, value in set.items()]
-    plan = Plan.made(_read(study, set, map(Path, types), replications, seed))
+    pairs = set.items() if isinstance(set, Mapping) else ()
+    changes = [f"{path}={json.dumps(plain(node_of(value, call_site())))}" for path, value in pairs] or set
+    plan = Plan.made(_read(study, changes, map(Path, types), replications, seed))
     check_figures(plan)
     folder = Path("results") / plan.study.name if out is None else Path(out)
     with progress(plan.study.name) if show_progress else nullcontext() as tell:

@@ -1,9 +1,10 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import describe, imports, run, studies, trace
+from . import compare, completion, describe, imports, new, run, show, studies, trace
 
 COMMANDS = (
     run.run,
+    compare.compare,
     studies.study,
     studies.resume,
     studies.status,
@@ -11,12 +12,15 @@ COMMANDS = (
     studies.report,
     trace.trace,
     describe.validate,
+    show.show,
     describe.graph,
     describe.models,
     describe.actors,
     describe.aspects,
     describe.schema,
     imports.import_,
+    new.new,
+    completion.completion,
 )
 
 __all__ = ["COMMANDS"]

@@ -87,6 +87,12 @@ TYPES = several(
     metavar="FILE",
     help="a Python file with actors and aspects of your own, whose code is run; may be repeated",
 )
+DISTURB = several(
+    "--disturb",
+    metavar="NAME or FILE",
+    help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
+    "--aspect and --without count after it",
+)
 CHANGES = (  # to a model
     several(
         "--set",
@@ -98,12 +104,7 @@ CHANGES = (  # to a model
         metavar="FILE",
         help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
     ),
-    several(
-        "--disturb",
-        metavar="NAME or FILE",
-        help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
-        "--aspect and --without count after it",
-    ),
+    DISTURB,
     several(
         "--aspect",
         metavar="NAME=TYPE,KEY=VALUE,...",
