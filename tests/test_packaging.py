@@ -20,6 +20,7 @@ import pytest
 import setuptools
 
 from epicycle.actors import CORE_MODULES
+from epicycle.runner.catalogue import TAKES
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("actors", "aspects", "models", "runner", "api")  # the last is `epicycle` itself
@@ -265,8 +266,9 @@ def busy_folder(tmp_path: Path) -> Path:
 
 
 PROGRAM = """
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter, PoissonClock
-from epicycle.aspects import JoinPoint, MeasurementAspect
+import epicycle
+from epicycle.actors import Actor, Clock, Exponential, InputPort, OutputPort, Parameter, PoissonClock, Random
+from epicycle.aspects import JoinPoint, MeasurementAspect, PacketLoss
 from epicycle.runner import Model, Results, Simulation
 
 
@@ -285,32 +287,64 @@ class Twice(MeasurementAspect):
         point.forward(2 * token)
 
 
-model = Model("gain", stop="1 min")
+model = Model("gain", stop="1 min", ties="posted")
 clock = model.add(PoissonClock("clock", mean_interval="1 s"))
-gain = model.add(Gain("gain"))
-model.connect(clock.output, gain.input)
+numbers = model.add(Random("numbers", distribution=Exponential(mean=2)))
+gain = model.add(Gain("gain", factor=2.0))
+model.connect(clock.output, numbers.trigger)
+model.connect(numbers.output, gain.input)
 model.weave("twice", Twice(), at=gain.output)
+model.weave("loss", PacketLoss(probability=0.1, from_="3 s"), at=gain.input)
+model.metric("greatest", of=gain.output, take="max", after=1.0)
 results: Results = Simulation(model).run()
+again: Results = epicycle.run("mm1", seed=3, set={"load": 0.9}, until="1 h")
+epicycle.plot(again, "wait").save("wait.svg")
+print(epicycle.compare("mm1", {"a": {}, "b": {"set": {"load": 0.5}}}).differences()[0].p)
+print(epicycle.study("waiting_time", replications=3).means("mean_wait"))
+"""
+REVEALED = """
 reveal_type(gain.factor)
 reveal_type(gain.input.value)
 gain.output.send("text")
+Clock("clock", perriod="1 s")
+PacketLoss(probabilty=0.1)
+Random("numbers", distribution=Exponential(mean=2, seed=1))
+model.metric("greatest", of=gain.output, take="maximum")
+model.metric("greatest", of=gain.output, take="max", afer=1.0)
+Model("gain", ties="postd")
+epicycle.run("mm1", sed=3)
 """
 
 
-def types_of_a_program(folder: Path, python: object) -> str:
+def types_of_a_program(folder: Path, python: object, program: str) -> str:
     """What mypy says of a user's program, written in a folder of its own."""
-    (folder / "program.py").write_text(PROGRAM, "utf-8")
+    (folder / "program.py").write_text(program, "utf-8")
     words = [sys.executable, "-m", "mypy", "--strict", "--python-executable", str(python), "program.py"]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     assert done.stderr == ""
     return done.stdout
 
 
-EXPECTED_TYPES = """\
-program.py:28: note: Revealed type is "float"
-program.py:29: note: Revealed type is "float"
-program.py:30: error: Argument 1 to "send" of "OutputPort" has incompatible type "str"; expected "float"  [arg-type]
-Found 1 error in 1 file (checked 1 source file)
+SUCCESS = "Success: no issues found in 1 source file\n"
+EXPECTED_TYPES = f"""\
+program.py:38: note: Revealed type is "float"
+program.py:39: note: Revealed type is "float"
+program.py:40: error: Argument 1 to "send" of "OutputPort" has incompatible type "str"; expected "float"  [arg-type]
+program.py:41: error: Unexpected keyword argument "perriod" for "Clock"; did you mean "period"?  [call-arg]
+program.py:41: note: "Clock" defined in "epicycle.actors.constructors"
+program.py:42: error: Unexpected keyword argument "probabilty" for "PacketLoss"; did you mean "probability"?  [call-arg]
+program.py:42: note: "PacketLoss" defined in "epicycle.aspects.constructors"
+program.py:43: error: Unexpected keyword argument "seed" for "Exponential"  [call-arg]
+program.py:43: note: "Exponential" defined in "epicycle.actors.constructors"
+program.py:44: error: Argument "take" to "metric" of "Model" has incompatible type "Literal['maximum']"; \
+expected "Literal[{", ".join(map(repr, TAKES))}]"  [arg-type]
+program.py:45: error: Unexpected keyword argument "afer" for "metric" of "Model"; did you mean "after"?  [call-arg]
+program.py:45: note: "metric" defined in "epicycle.runner.build.model"
+program.py:46: error: Argument "ties" to "Model" has incompatible type "Literal['postd']"; \
+expected "Literal['declared', 'posted'] | None"  [arg-type]
+program.py:47: error: Unexpected keyword argument "sed" for "run"; did you mean "seed"?  [call-arg]
+program.py:47: note: "run" defined in "epicycle.runner.calls.running"
+Found 8 errors in 1 file (checked 1 source file)
 """
 
 
@@ -318,7 +352,8 @@ Found 1 error in 1 file (checked 1 source file)
 def test_mypy_finds_the_types_of_what_make_installs(tmp_path: Path) -> None:
     if not Path(sys.prefix, "linked").exists():
         pytest.skip("this environment was not made by make")
-    assert types_of_a_program(tmp_path, sys.executable) == EXPECTED_TYPES
+    assert types_of_a_program(tmp_path, sys.executable, PROGRAM) == SUCCESS
+    assert types_of_a_program(tmp_path, sys.executable, PROGRAM + REVEALED) == EXPECTED_TYPES
 
 
 @pytest.mark.slow
@@ -327,7 +362,8 @@ def test_mypy_finds_the_types_of_the_wheel(wheel: Path, tmp_path: Path) -> None:
     at = {"base": str(tmp_path / "environment"), "platbase": str(tmp_path / "environment")}
     python = Path(sysconfig.get_path("scripts", "venv", at)) / "python"
     pip("--python", python, "install", "--no-deps", "--no-index", wheel)
-    assert types_of_a_program(tmp_path, python) == EXPECTED_TYPES
+    assert types_of_a_program(tmp_path, python, PROGRAM) == SUCCESS
+    assert types_of_a_program(tmp_path, python, PROGRAM + REVEALED) == EXPECTED_TYPES
 
 
 def pip(*arguments: object) -> None:

@@ -84,11 +84,12 @@ class Comparison(Tabled):
         return found
 
     def rows(self) -> list[dict[str, Any]]:
-        """The metrics of every run: a row for each variant and seed."""
+        """The metrics of every run: a row for each seed and variant."""
         return [
             {"variant": variant, "seed": seed, **{name: results.metrics.get(name) for name in self.units}}
+            for seed in self.seeds
             for variant, runs in self.runs.items()
-            for seed, results in runs.items()
+            if (results := runs.get(seed)) is not None
         ]
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -100,7 +101,7 @@ class Comparison(Tabled):
         return f"<Comparison of {self._caption()}>"
 
     def _caption(self) -> str:
-        failed = f", {counted(len(self.failures), 'run')} failed" if self.failures else ""
+        failed = f"; {counted(len(self.failures), 'run')} failed" if self.failures else ""
         seeds = f"seed {self.seeds[0]}" if len(self.seeds) == 1 else f"seeds {self.seeds[0]} to {self.seeds[-1]}"
         return f"{self.model}: {', '.join(self.runs)}; {seeds}{failed}"
 

@@ -45,8 +45,8 @@ def loaded(model: Model | str | Path, changes: Changes) -> Model:
         return load_model(model, **changes)
     if changes:
         raise EpicycleError(
-            f"{model.name} is made already and takes no {', '.join(changes)}\n"
-            f"   help: give its name or file, or load({model.name!r}, ...) with these"
+            f"the model {model.name} is made already and takes no {', '.join(changes)}\n"
+            "   help: give the name or file of a model with these, or load it with them"
         )
     return model
 

@@ -28,15 +28,11 @@ def show(options: argparse.Namespace) -> int:
         model = load(options)
     found = {
         "parameters": list(_parameters(model)),
-        "metrics": [
-            {"metric": each.name, "takes": f"{each.measure.take} of {', '.join(each.ports)}", "unit": "" if each.unit == "1" else each.unit,
-             "what it is": each.measure.doc}
-            for each in model.metrics
-        ],
+        "metrics": list(_metrics(model)),
         "figures": [{"figure": name, "type": kind} for name, (kind, *_) in model.figures.items()],
         "aspects": [{"aspect": each.name, "type": each.kind, "at": ", ".join(each.places)} for each in model.aspects],
-        "disturbances": [{"disturbance": name, "what it is": doc} for name, doc in _disturbances(options, model)],
-    }  # fmt: skip
+        "disturbances": [{"disturbance": name, "what it is": doc} for name, doc in _disturbances(options)],
+    }
     about: dict[str, Any] = {"model": model.name, "doc": model.doc, "extent": model.extent, "stop": model.stop}
     about |= {"records": model.recorded, "reads": list(noted.files)}
     if options.json:
@@ -70,7 +66,13 @@ def _parameters(model: Model) -> Iterator[dict[str, str]]:
         yield {"parameter": name, "type": kind, "unit": unit, "value": told, "what it is": said.doc}
 
 
-def _disturbances(options: argparse.Namespace, model: Model) -> Iterator[tuple[str, str]]:
+def _metrics(model: Model) -> Iterator[dict[str, str]]:
+    for each in model.metrics:
+        takes, unit = f"{each.measure.take} of {', '.join(each.ports)}", "" if each.unit == "1" else each.unit
+        yield {"metric": each.name, "takes": takes, "unit": unit, "what it is": each.measure.doc}
+
+
+def _disturbances(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
     """The packaged disturbances with which the model can be loaded."""
     from epicycle.actors import EpicycleError
 
