@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from string import Template
 
 from ..printing import tell
 from .options import DONE, command, option
@@ -204,6 +203,7 @@ def new(options: argparse.Namespace) -> int:
     """Write NAME.yaml, a model to begin with, which runs at once; or with --package a package of actors and aspects
     that models know by its entry points."""
     from keyword import iskeyword
+    from string import Template
 
     from epicycle.actors import EpicycleError
 
