@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
     from .picturing import Picture, Pictures, draw, plot, save
-    from .running import Changes, Done, load, perform, run, seconds
+    from .running import Changes, Done, load, perform, run, seconds, watched
     from .studying import study
 
 __all__ = [
@@ -30,12 +30,13 @@ __all__ = [
     "save",
     "seconds",
     "study",
+    "watched",
 ]
 
 _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
-    "running": ("Changes", "Done", "load", "perform", "run", "seconds"),
+    "running": ("Changes", "Done", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),
 }
 

@@ -127,7 +127,7 @@ def perform(
         complain(replaced)
     if until is None and model.endless:
         complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
-    with log or nullcontext(), _watched(model, until, after) if progress else nullcontext() as report:
+    with log or nullcontext(), watched(model, until, after) if progress else nullcontext() as report:
         try:
             results = simulation.run(until=until, progress=report, pace=pace)
         except (ActorError, LoopError, KeyboardInterrupt) as error:
@@ -172,7 +172,7 @@ def outlook(elapsed: float, now: float, end: float) -> str:
 
 
 @contextmanager
-def _watched(model: Model, until: float | None, after: float) -> Iterator[Callable[[float], None]]:
+def watched(model: Model, until: float | None, after: float = 0.0) -> Iterator[Callable[[float], None]]:
     """What a run tells how far it is: a bar, and notices of what takes long."""
     end = until if until is not None else model.stop
     latest = -math.inf

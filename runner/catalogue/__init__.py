@@ -1,6 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
-from .figure import Figure, figure_types
+from .figure import Figure, Mark, Shape, figure_types
 from .measure import (
     MSER5,
     TAKES,
@@ -47,11 +47,13 @@ __all__ = [
     "Catalogue",
     "CatalogueError",
     "Figure",
+    "Mark",
     "Measure",
     "MetricOptions",
     "ParameterReference",
     "PortReference",
     "PortTypeError",
+    "Shape",
     "TakeName",
     "TypeReference",
     "Types",

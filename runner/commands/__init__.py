@@ -1,9 +1,10 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import compare, completion, describe, imports, new, run, show, studies, trace
+from . import compare, completion, describe, imports, new, run, show, studies, trace, view
 
 COMMANDS = (
     run.run,
+    view.view,
     compare.compare,
     studies.study,
     studies.resume,
