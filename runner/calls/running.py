@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypedDict, Unpack
+from typing import TypedDict, Unpack, cast
 
 from epicycle.actors import EpicycleError, convert
 
@@ -18,7 +19,7 @@ from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
 from ..language import Setting
 from ..printing import complain, console, notices
 from ..results import LogFile, Results
-from ..text import Problems
+from ..text import Problems, call_site, node_of, plain
 
 PATIENCE = 5.0  # s after which a run can be judged
 LONG = 600.0  # s that are worth a word
@@ -81,12 +82,30 @@ def run(
         keep_log=keep_log or log is not None,
         log=None if log is None else LogFile(Path(log)),
         folder=None if out is None else Path(out),
-        given=("epicycle.run", str(model) if isinstance(model, (str, Path)) else made.name),
+        given=("epicycle.run", made.name) if isinstance(model, Model) else as_command(model, seed, until, changes),
         progress=progress,
     )
     for error in done.failed:
         raise error
     return done.results
+
+
+FLAGS = {"overrides": "--overrides", "disturb": "--disturb", "aspects": "--aspect", "without_aspects": "--without"}
+
+
+def as_command(model: str | Path, seed: int | None, until: float | str | None, changes: Changes) -> list[str]:
+    """The command that makes the same run; classes that a program defines it cannot name."""
+    words: list[object] = ["epicycle", "run", model]
+    for key, value in changes.items():
+        if key == "set" and isinstance(value, Mapping):
+            for path, each in value.items():
+                words += ["--set", f"{path}={json.dumps(plain(node_of(each, call_site())))}"]
+        elif key in FLAGS or key == "set":
+            each_of = [value] if isinstance(value, (str, Path)) else cast(Iterable[object], value)
+            words += [word for each in each_of for word in (FLAGS.get(key, "--set"), each)]
+    words += [] if seed is None else ["--seed", seed]
+    words += [] if until is None else ["--until", until]
+    return list(map(str, words))
 
 
 @dataclass

@@ -84,6 +84,28 @@ def test_a_run_writes_what_it_is_asked_for() -> None:
     assert Path("a/signals.parquet").read_bytes() == Path("b/signals.parquet").read_bytes()
 
 
+def test_a_folder_says_by_which_command_the_run_is_made_again(capsys: pytest.CaptureFixture[str]) -> None:
+    changes = {"load": 0.9, "mean_service": "500 ms"}
+    aspect = "loss=PacketLoss,probability=0.1,at=server.input"
+    results = epicycle.run("mm1", seed=3, until="5 min", set=changes, aspects=[aspect], disturb=(), out="a")
+    command = json.loads(Path("a/manifest.json").read_text())["command"]
+    words = [
+        "--set",
+        "load=0.9",
+        "--set",
+        'mean_service="500 ms"',
+        "--aspect",
+        aspect,
+        "--seed",
+        "3",
+        "--until",
+        "5 min",
+    ]
+    assert command == ["epicycle", "run", "mm1", *words]
+    assert main([*command[1:], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["digest"] == results.digest
+
+
 def test_a_model_that_is_made_takes_no_changes() -> None:
     with pytest.raises(EpicycleError) as caught:
         epicycle.run(epicycle.load("mm1"), set={"load": 0.9}, disturb="wifi_burst")
