@@ -91,7 +91,7 @@ $(BIN)/python:
 
 # mypy cannot follow an editable install to the folders at the root.  It looks into a package of stubs, which Python does
 # not: links there let it check the programs of users against the source.
-$(LINKED): | $(BIN)/python
+$(LINKED): pyproject.toml | $(BIN)/python
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') && \
 	mkdir -p "$$site/epicycle-stubs" && \
 	ln -sfn "$(CURDIR)/api/__init__.py" "$$site/epicycle-stubs/__init__.pyi" && \

@@ -115,7 +115,7 @@ class Comparison(Tabled):
         first = next(iter(self.runs))
         failed = [(variant, str(seed), str(error)) for (variant, seed), error in self.failures.items()]
         return [
-            Table(("metric", "variant", "mean", "unit", f"more than {first}", "p (Holm)", "runs"), rows),
+            Table(("metric", "variant", "mean", "unit", f"difference to {first}", "p (Holm)", "runs"), rows),
             Table(("failed", "seed", "error"), failed),
         ]
 

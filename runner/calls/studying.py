@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Literal
 
 import yaml
 
@@ -29,7 +30,7 @@ def study(
     jobs: int | None = None,
     run_timeout: float | None = None,
     retry: bool = False,
-    executor: str = "local",
+    executor: Literal["local", "dask"] = "local",
     scheduler: str | None = None,
     show_progress: bool = True,
 ) -> StudyResults:

@@ -164,7 +164,7 @@ def test_variants_run_with_the_same_seeds() -> None:
     both = [each for each in found.differences() if each.name == "mean_wait"]
     assert [(each.variant, each.difference) for each in both] == [("a", None), ("b", test.estimate)]
     assert test.p <= both[1].p <= 5 * test.p  # five metrics
-    assert "<th>more than a</th>" in found._repr_html_()
+    assert "<th>difference to a</th>" in found._repr_html_()
     epicycle.save(found, "runs.csv")
     rows = list(csv.DictReader(Path("runs.csv").read_text().splitlines()))
     assert [row["variant"] + row["seed"] for row in rows] == ["a1", "b1", "a2", "b2", "a3", "b3", "a4", "b4"]

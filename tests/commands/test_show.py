@@ -83,9 +83,9 @@ def test_variants_are_compared(capsys: pytest.CaptureFixture[str]) -> None:
         == """\
 m: none, period=1 s; seeds 5 to 6
 
-metric  variant     mean  unit  more than none  p (Holm)  runs
-ticks   none        9                                     2
-ticks   period=1 s  5           -4              0.5       2
+metric  variant     mean  unit  difference to none  p (Holm)  runs
+ticks   none        9                                         2
+ticks   period=1 s  5           -4                  0.5       2
 """
     )
     found = json.loads(printed(capsys, *words, "--json"))
