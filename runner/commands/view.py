@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, tell
-from .options import CHANGES, DONE, SEED, command, load, option, seconds
-from .run import progress, run
+from .options import CHANGES, DONE, SEED, command, load, option
+from .run import run
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     ),
     option("--mcap", metavar="FILE", type=Path, help="write the run for Foxglove or Lichtblick; no page without -o"),
     option("--rerun", metavar="FILE", type=Path, help="write the run for rerun; no page without -o"),
-    imports=("build", "engine", "show"),
+    imports=("calls.running", "show"),
 )
 def view(options: argparse.Namespace) -> int:
     """Run a model and write a page that shows the run: it needs no network, and any browser opens it.
@@ -45,6 +45,7 @@ def view(options: argparse.Namespace) -> int:
     """
     from epicycle.actors import EpicycleError
 
+    from ..calls import seconds, watched
     from ..engine import ActorError, LoopError
     from ..show.view import write_page
 
@@ -62,7 +63,7 @@ def view(options: argparse.Namespace) -> int:
         digest = _as_before(one) if Path(each).is_dir() else ""
         recordings.append(_recording(one, is_compared=len(options.model) > 1))
         try:
-            with progress(recordings[-1].model, seconds("--until", one.until)) as report:
+            with watched(recordings[-1].model, seconds("--until", one.until)) as report:
                 results = recordings[-1].run(until=seconds("--until", one.until), progress=report)
         except (ActorError, LoopError) as failure:  # what led to it is just what one wants to see
             error = failure
