@@ -13,8 +13,9 @@ from epicycle.runner import Model, Results, Simulation
 from epicycle.runner.cli import main
 from epicycle.runner.show import Figure, FigureError, draw, draw_figures
 from epicycle.runner.show.graph import outline, write_graph
-from epicycle.runner.show.pen import Sheet, style
+from epicycle.runner.show.pen import style
 from epicycle.runner.show.report.data import shown
+from epicycle.runner.show.sheet import Sheet
 
 TEXTS = ["$\\left $\\frac{a}{", "$x^" + "{" * 40, "a $b$ \x1b[31m\u202e & #1_2"]
 

@@ -13,7 +13,7 @@ from ...build import Complaint, Model
 from ...language import Dimension, Factor
 from ...results import Results
 from ...study import Plan
-from ..pen import MAX_LINES, MAX_PANELS, Sheet
+from ..sheet import MAX_LINES, MAX_PANELS, Sheet
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 
 # The parameters of figures that name parts of the study, as far as a figure has them.

@@ -14,7 +14,7 @@ from epicycle.actors import Parameter, counted, texts_parameter
 from ...build import Complaint
 from ...language import Factor
 from ...study import Plan, mean
-from ..pen import DASHES, LIMIT, MARKERS, PALETTE
+from ..sheet import DASHES, LIMIT, MARKERS, PALETTE
 from .data import Condition, Data, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure
 

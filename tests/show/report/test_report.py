@@ -15,12 +15,13 @@ import pytest
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
 from epicycle.runner.language import StudyMetric, read_study
-from epicycle.runner.show.pen import Sheet, style
+from epicycle.runner.show.pen import style
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.show.report.figure import Layout, roles
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Distributions, Means
+from epicycle.runner.show.sheet import Sheet
 from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
 from epicycle.runner.study.plan.columns import si_unit
 from epicycle.runner.study.run.manifest import manifest_text
