@@ -82,6 +82,7 @@ class Sheet:
             rows, self.columns, squeeze=False, sharex=same_x, sharey=same_y, height_ratios=heights or None
         )
         self.axes: list[Any] = list(grid.flat)[:count]
+        self.are_alike = True  # the axes of all panels, or of all in a row
         self._tips: list[tuple[Any, float, float, str]] = []
         for axes in list(grid.flat)[count:]:
             axes.remove()
@@ -90,21 +91,41 @@ class Sheet:
             if letter or title:
                 axes.set_title(fill(f"{letter}{title}", _LONGEST.get(self.columns, 22)), loc="left")
 
-    def call_axes(self, x: str, y: str) -> None:
-        """Say what the axes are: below the panels that have nothing below them, and where rows begin."""
-        for axes in self.axes[max(0, len(self.axes) - self.columns) :]:
-            axes.set_xlabel(x)
+    def call(self, axes: Any, x: str, y: str) -> None:
+        """Say what the axes of a panel are, where it is not said beside or below: panels that are alike say it once."""
+        index = self.axes.index(axes)
+        has_below, has_before = index < len(self.axes) - self.columns, index % self.columns > 0
+        axes.set_xlabel("" if self.are_alike and has_below else x)
+        axes.set_ylabel("" if self.are_alike and has_before else fill(y, _LONG))
+        if not has_below:
             axes.tick_params(labelbottom=True)
-        for axes in self.axes[:: self.columns]:
-            axes.set_ylabel(fill(y, _LONG))
+
+    def call_axes(self, x: str, y: str) -> None:
+        """Say what the axes of all panels are."""
+        for axes in self.axes:
+            self.call(axes, x, y)
 
     def legend(self, handles: Sequence[Any], labels: Sequence[str], title: str = "") -> None:
         """Above the panels, where it hides nothing."""
         if not handles:
             return
         long = max(map(len, labels)) > 22
-        columns = min(len(handles), 2 if long else (5 if self.columns > 1 else 4) if len(handles) <= FEW else 8)
+        columns = min(len(handles), 2 if long else 5 if self.columns > 1 else 4)
         self.canvas.legend(handles, labels, title=title or None, loc="outside upper center", ncols=columns)
+
+    def band(self, names: Sequence[str], shades: Sequence[str], title: str) -> None:
+        """A band of colours beside all panels in place of a legend."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import BoundaryNorm, ListedColormap
+
+        edges = [index - 0.5 for index in range(len(names) + 1)]
+        scale = ScalarMappable(BoundaryNorm(edges, len(names)), ListedColormap(list(shades)))
+        every = math.ceil(len(names) / _NAMED)
+        bar = self.canvas.colorbar(scale, ax=self.axes, ticks=range(0, len(names), every), pad=0.02, fraction=0.05)
+        bar.ax.set_yticklabels([abridged(name, _MAX_NAME) for name in names[::every]])
+        bar.ax.tick_params(labelsize=7, length=2)
+        bar.outline.set_visible(False)
+        bar.ax.set_title(fill(title, 18), loc="left", fontsize=8)
 
     def tip(self, axes: Any, places: Iterable[tuple[float, float]], texts: Iterable[str]) -> None:
         """Texts that a pointer finds at places of a panel, in its own coordinates."""
@@ -117,6 +138,7 @@ class Sheet:
         for text in self.canvas.findobj(Text):  # whatever a model is called: a sheet grows with the texts on it
             text.set_text(shortened(text.get_text(), MAX_TEXT))
         self.canvas.draw_without_rendering()
+        self.canvas.set_layout_engine("none")  # all files have the same one, by which tips are placed
         box = self.canvas.get_tightbbox().padded(_PAD)
         tips = list(self._placed(box))
         for path in paths:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,6 @@ from .samples import Floats, positions, selected
 from .sheet import FEW, LIMIT, Sheet, band_beside, colours, legend_beside
 
 TIMES = 8  # that are written at a path
-_TIPS = 150  # of one path
 _APART = 34.0  # pixels between times
 
 
@@ -62,7 +62,8 @@ class Trajectories(Figure):
             band_beside(axes, [name.rpartition(".")[0] or name for name in robots], shades)
             axes.legend(loc="best", fontsize=7)
         for name in robots[:1]:
-            self._times(axes, results.signals[name], shades[0])
+            signal = results.signals[name]
+            write_times(axes, positions(signal), signal.times, every(signal.times, self.interval), shades[0])
         sheet.save([path])
 
     def _path(self, sheet: Sheet, signal: Signal, shade: str, *, is_first: bool, named: bool) -> None:
@@ -73,34 +74,10 @@ class Trajectories(Figure):
         label = (signal.name.rpartition(".")[0] or signal.name) if named else None
         width, order = (2.4, 5) if is_first else (1.3, 4)
         axes.plot(*points.T, color=shade, linewidth=width, label=label, zorder=order)
-        axes.plot(*points[self._every(signal)].T, ".", color=shade, markersize=4 + width, zorder=order)
+        axes.plot(*points[every(signal.times, self.interval)].T, ".", color=shade, markersize=4 + width, zorder=order)
         axes.plot(*points[0], "o", markersize=8, markerfacecolor="white", markeredgecolor=shade, zorder=order)
         arrows(axes, points, shade, size=8.0 + 3.0 * width, zorder=order + 0.5)
         tip_path(sheet, axes, signal.name, signal.times, points)
-
-    def _times(self, axes: Any, signal: Signal, shade: str) -> None:
-        """Write times at some dots of a path, to the left of its direction, where there is room between them."""
-        points, marks = positions(signal), self._every(signal)
-        transform, taken = axes.transData.transform, list[Floats]()
-        for index in marks[:: math.ceil(len(marks) / TIMES) or 1]:
-            place = transform(points[index])
-            ahead = transform(points[min(index + 1, len(points) - 1)]) - transform(points[max(index - 1, 0)])
-            length = math.hypot(*ahead)
-            if any(math.dist(place, other) < _APART for other in taken):
-                continue
-            taken.append(place)
-            across, up = (-ahead[1] / length, ahead[0] / length) if length else (0.0, 1.0)
-            axes.annotate(
-                f"{signal.times[index]:.3g} s",
-                points[index],
-                (9.0 * across, 9.0 * up),
-                textcoords="offset points",
-                ha="center" if abs(across) < 0.5 else "left" if across > 0 else "right",
-                va="center" if abs(up) < 0.5 else "bottom" if up > 0 else "top",
-                fontsize=7.5,
-                color=shade,
-                zorder=7,
-            )
 
     def _obstacle(self, sheet: Sheet, signal: Signal) -> None:
         from matplotlib.patches import Circle
@@ -110,7 +87,7 @@ class Trajectories(Figure):
         axes.plot(*points.T, "--", color="0.25", linewidth=1.2, label="obstacle" if len(points) else None, zorder=3)
         arrows(axes, points, "0.25", zorder=3.5)
         tip_path(sheet, axes, signal.name, signal.times, points)
-        marks = self._every(signal)
+        marks = every(signal.times, self.interval)
         for number, index in enumerate(marks, start=1):
             label = f"{self.safe_distance:g} m around it" if number == len(marks) else None
             look = {"color": "0.3", "alpha": 0.05 + 0.13 * number / len(marks), "linewidth": 0}
@@ -120,7 +97,7 @@ class Trajectories(Figure):
         from matplotlib.patches import Ellipse
 
         label: str | None = "estimate, 2 std. dev."
-        for index in self._every(signal):
+        for index in every(signal.times, self.interval):
             estimate = signal.tokens[index]
             spread, axis = np.linalg.eigh(np.asarray(estimate.covariance)[:2, :2])
             sizes = 4.0 * np.sqrt(np.maximum(spread[::-1], 0.0))  # two deviations to each side
@@ -129,10 +106,19 @@ class Trajectories(Figure):
             axes.add_patch(Ellipse(estimate.mean[:2], *sizes, angle=angle, label=label, **look))
             label = None
 
-    def _every(self, signal: Signal) -> list[int]:
-        """Indices of the tokens that come at multiples of the interval."""
-        steps = np.floor(np.asarray(signal.times) / self.interval + 1e-9)
-        return [int(index) for index in np.unique(steps, return_index=True)[1]]
+
+def every(times: Floats, interval: float) -> list[int]:
+    """Indices of the tokens that come at multiples of an interval, or first after these."""
+    steps = np.floor(np.asarray(times) / interval + 1e-9)
+    return [int(index) for index in np.unique(steps, return_index=True)[1]]
+
+
+def round_step(about: float) -> float:
+    """A time of one, two or five tenths, seconds, tens of seconds and so on, not less than another one."""
+    if not about > 0.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(about))
+    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= about * (1 - 1e-9))
 
 
 def arrows(axes: Any, points: Floats, shade: str, *, size: float = 11.0, zorder: float = 4.5) -> None:
@@ -147,8 +133,32 @@ def arrows(axes: Any, points: Floats, shade: str, *, size: float = 11.0, zorder:
             axes.annotate("", points[tip], points[tail], arrowprops=look, zorder=zorder)
 
 
-def tip_path(sheet: Sheet, axes: Any, name: str, times: Floats, points: Floats) -> None:
-    """Say when a path is where."""
-    every = math.ceil(len(points) / _TIPS) or 1
+def tip_path(sheet: Sheet, axes: Any, name: str, times: Floats, points: Floats, most: int = 150) -> None:
+    """Say when a path is where, at so many places at most."""
+    each = math.ceil(len(points) / most) or 1
     texts = [f"{name}\n{time:.4g} s at ({x:.4g}, {y:.4g}) m" for time, (x, y) in zip(times, points, strict=True)]
-    sheet.tip(axes, points[::every], texts[::every])
+    sheet.tip(axes, points[::each], texts[::each])
+
+
+def write_times(axes: Any, points: Floats, times: Floats, marks: Sequence[int], shade: str) -> None:
+    """Write times at some dots of a path, to the left of its direction, where there is room between them."""
+    transform, taken = axes.transData.transform, list[Floats]()
+    for index in marks[:: math.ceil(len(marks) / TIMES) or 1]:
+        place = transform(points[index])
+        ahead = transform(points[min(index + 1, len(points) - 1)]) - transform(points[max(index - 1, 0)])
+        length = math.hypot(*ahead)
+        if any(math.dist(place, other) < _APART for other in taken):
+            continue
+        taken.append(place)
+        across, up = (-ahead[1] / length, ahead[0] / length) if length else (0.0, 1.0)
+        axes.annotate(
+            f"{times[index]:.3g} s",
+            points[index],
+            (8.0 * across, 8.0 * up),
+            textcoords="offset points",
+            ha="center" if abs(across) < 0.5 else "left" if across > 0 else "right",
+            va="center" if abs(up) < 0.5 else "bottom" if up > 0 else "top",
+            fontsize=7,
+            color=shade,
+            zorder=7,
+        )
