@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
-from epicycle.actors import EpicycleError, abridged, shortened, visible
+from epicycle.actors import EpicycleError, abridged, shortened, visible_lines
 
 from .pen import new_canvas, save
 
@@ -159,7 +159,7 @@ class Sheet:
 def _add_tips(path: Path, tips: Iterable[Tip]) -> None:
     """Add tips to an SVG file, as shapes that are not seen and have a title."""
     shapes = (
-        f'<circle cx="{tip.x:.1f}" cy="{tip.y:.1f}" r="4"><title>{escape(visible(tip.text))}</title></circle>\n'
+        f'<circle cx="{tip.x:.1f}" cy="{tip.y:.1f}" r="4"><title>{escape(visible_lines(tip.text))}</title></circle>\n'
         for tip in tips
     )
     text, end = path.read_text(encoding="utf-8"), "</svg>"
