@@ -73,6 +73,7 @@ class Pill:
     aspect: str
     x: float
     y: float  # of its middle
+    at: str = ""  # the port or box where an aspect stands
     delay: int | None = None  # ns
 
     @property
@@ -249,13 +250,13 @@ class _Scope:
                     ports.append(PlacedPort(port, side, edge, at, port.path in joined))
                     start = edge - HEAD - _pills_width(port) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
                     for aspect in port.aspects:
-                        drawing.pills.append(Pill(aspect, aspect, start, at))
+                        drawing.pills.append(Pill(aspect, aspect, start, at, port.path))
                         start += pill_width(aspect) + PILL_GAP
                     drawing.words.append(_port_name(ports[-1], child.is_open))
             drawing.words += self._names(child, left, upper, cell.width)
             hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
             for name in reversed(child.aspects):
-                drawing.pills.append(Pill(name, name, left + (cell.width - pill_width(name)) / 2, hidden))
+                drawing.pills.append(Pill(name, name, left + (cell.width - pill_width(name)) / 2, hidden, child.path))
                 hidden -= PILL_HEIGHT + PILL_GAP
             drawing.boxes.append(PlacedBox(child, left, upper, cell.width, cell.height, level, tuple(ports)))
             if child in self.inner:
@@ -267,7 +268,7 @@ class _Scope:
                 begin, end = self.spans[cell.layer]
                 start = begin if cell.layer > net.source.cell.layer else end - cell.width
                 at = top + cell.y + cell.height / 2
-                drawing.pills.append(Pill(label(link), "", x + start + 4.0, at, link.delay))
+                drawing.pills.append(Pill(label(link), "", x + start + 4.0, at, delay=link.delay))
 
     def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
         """The name and type of a box: in one line above the inside of a composite, else one below the other."""
