@@ -107,15 +107,19 @@ def envelope(times: Floats, values: Floats, begin: float, end: float, *, holds: 
 
 
 def spans_of(times: Sequence[float], states: Sequence[str | None], end: float) -> Iterator[Span]:
-    """How long each state stands; the same one again goes on."""
-    since, known = 0.0, None
-    for time, state in zip(times, states, strict=True):
-        if state != known:
-            if known is not None and time > since:
-                yield since, time, known
-            since, known = time, state
-    if known is not None:
-        yield since, end, known
+    """How long each state stands; the same one again goes on, and what takes no time is left out."""
+    last: Span | None = None
+    for since, until, state in zip(times, [*times[1:], end][: len(times)], states, strict=True):
+        if until <= since:
+            continue
+        if last is not None and last[2] == state:
+            last = last[0], until, state
+            continue
+        if last is not None:
+            yield last
+        last = None if state is None else (since, until, state)
+    if last is not None:
+        yield last
 
 
 def longest_spans(spans: Sequence[Span], begin: float, end: float) -> list[Span]:
