@@ -43,7 +43,7 @@ def colours(count: int) -> list[str]:
     from matplotlib.colors import to_hex
 
     scale = matplotlib.colormaps["viridis"]
-    return [to_hex(scale(0.94 * index / (count - 1))) for index in range(count)]
+    return [to_hex(scale(0.06 + 0.86 * index / (count - 1))) for index in range(count)]
 
 
 class Tip(NamedTuple):
@@ -240,10 +240,17 @@ def in_common(names: Sequence[str]) -> tuple[str, list[str]]:
 
 def set_log(axes: Any, *, x: bool, y: bool) -> None:
     """Make axes logarithmic; raises ``EpicycleError`` if nothing on one of them is positive."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     for which, wanted in (("x", x), ("y", y)):
-        if wanted:
-            low, high = getattr(axes.dataLim, f"interval{which}")
-            if high <= 0.0 or not math.isfinite(low):
-                side = "horizontal" if which == "x" else "vertical"
-                raise EpicycleError(f"no value on the {side} axis is positive, so that it cannot be logarithmic")
-            getattr(axes, f"set_{which}scale")("log", nonpositive="mask")
+        if not wanted:
+            continue
+        low, high = getattr(axes.dataLim, f"minpos{which}"), getattr(axes.dataLim, f"interval{which}")[1]
+        if not high > 0.0 or not math.isfinite(low):
+            side = "horizontal" if which == "x" else "vertical"
+            raise EpicycleError(f"no value on the {side} axis is positive, so that it cannot be logarithmic")
+        getattr(axes, f"set_{which}scale")("log", nonpositive="clip")
+        axis = getattr(axes, f"{which}axis")
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)))
+        axis.set_major_formatter(lambda value, _: f"{value:g}")  # the usual one writes formulas
+        axis.set_minor_formatter(NullFormatter())

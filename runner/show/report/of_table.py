@@ -20,6 +20,7 @@ from .figure import Layout, Panel, RunKey, StudyFigure
 
 BOXES, CURVES = "boxes", "curves"
 _TIPS = 60  # of a curve
+_LETTERS = 84  # in a line below a sheet
 
 
 class TableFigure(StudyFigure):
@@ -66,7 +67,7 @@ class Means(TableFigure):
             for number, (level, conditions) in enumerate(panel.lines.items()):
                 points = self._points(axis, conditions, str(level) if self.together else metric)
                 self._line(sheet, axes, axis, arranged, panel, number, points)
-            axis.dress(axes, is_log=self.log_x)
+            axis.dress(axes, sheet.columns, is_log=self.log_x)
             set_log(axes, x=self.log_x, y=self.log_y)
             what = f"mean ({names.unit(metric)})" if names.unit(metric) else "mean"
             sheet.call(axes, axis.name, what if self.together else mean_of(names.axis(metric)))
@@ -203,7 +204,8 @@ class Distributions(TableFigure):
                 )
             arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
         axes.set_xlim(-0.6, len(levels) - 0.4)
-        _texts_along(axes, range(len(levels)), [names.level("", level) if over else "" for level in levels])
+        texts = [names.level("", level) if over else "" for level in levels]
+        _texts_along(axes, range(len(levels)), texts, sheet.columns)
         sheet.call(axes, names.axis(over) if over else "", names.axis(metric))
         axes.grid(axis="x", visible=False)
         if self.limit is not None:
@@ -287,21 +289,23 @@ class _Axis:
     def place(self, condition: Condition) -> float:
         return self._of(condition.values[self._factor]) if self._factor else 0.0
 
-    def dress(self, axes: Any, *, is_log: bool) -> None:
+    def dress(self, axes: Any, columns: int, *, is_log: bool) -> None:
         """Ticks where levels are: numbers only if they are few, and not strewn like the points of a hypercube."""
         if is_log and not self.is_numeric:
             raise EpicycleError("the levels along the axis are not numbers, so that it cannot be logarithmic")
         if is_log:
             return
         if not self.is_numeric or (self.is_connected and len(self._places) <= 12):
-            _texts_along(axes, self._places, self._texts)
+            _texts_along(axes, self._places, self._texts, columns)
         if not self.is_numeric:
             axes.set_xlim(-0.5, len(self._places) - 0.5)
 
 
-def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str]) -> None:
-    """Write texts at their places, of many only some, and aslant where they are long."""
-    every = -(-len(texts) // 16)
+def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str], columns: int) -> None:
+    """Write texts at their places: numbers with room between them, and words aslant where they are long."""
+    longest, room = max(map(len, texts), default=0), _LETTERS // columns
+    is_short = longest <= 6
+    every = math.ceil(len(texts) * (longest + 2) / room) if is_short else math.ceil(len(texts) / 16)
     places, texts = places[::every], texts[::every]
-    turned = max(map(len, texts), default=0) * len(texts) > 60
+    turned = not is_short and longest * len(texts) > room
     axes.set_xticks(places, texts, rotation=30 if turned else 0, ha="right" if turned else "center")
