@@ -5,12 +5,14 @@ from .figures import Histogram, TimeSeries
 from .outcome import check_folder, draw_figures, summary_object, summary_table, write_folder
 from .pen import FigureError, draw
 from .reference import aspects_at, described, detail, markdown, overview, parts_described, weaving
+from .sheet import Sheet
 from .trajectories import Trajectories
 
 __all__ = [
     "Figure",
     "FigureError",
     "Histogram",
+    "Sheet",
     "TimeSeries",
     "Trajectories",
     "aspects_at",
