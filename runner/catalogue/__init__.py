@@ -1,6 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
-from .figure import Figure, own_figures
+from .figure import Figure, Mark, Shape, own_figures
 from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
 from .packaged import (
     find,
@@ -47,10 +47,12 @@ __all__ = [
     "Catalogue",
     "CatalogueError",
     "Figure",
+    "Mark",
     "Measure",
     "ParameterReference",
     "PortReference",
     "PortTypeError",
+    "Shape",
     "TypeReference",
     "Types",
     "as_written",

@@ -16,7 +16,7 @@ from epicycle.actors import EpicycleError, Parameter, abridged, texts_parameter
 from ..catalogue import Figure
 from ..results import Results
 from ..shown import short
-from .samples import Floats, Numbers, Span, States, envelope, leaves_of, longest_spans, spans_of
+from .samples import Floats, Numbers, Span, States, envelope, longest_spans, read, spans_of
 from .sheet import (
     FEW,
     MAX_PANELS,
@@ -59,7 +59,7 @@ class TimeSeries(Figure):
         return self.signals
 
     def draw(self, results: Results, path: Path) -> None:
-        lines, strips = leaves_of(self.signals, results)
+        lines, strips = read(self.signals, results)
         groups = [[name] for name in [*lines][:MAX_PANELS]] if self.separate and lines else [[*lines]]
         if strips and not lines:
             groups = []
@@ -166,7 +166,7 @@ class Histogram(Figure):
         return self.signals
 
     def draw(self, results: Results, path: Path) -> None:
-        numbers, states = leaves_of(self.signals, results)
+        numbers, states = read(self.signals, results)
         sheet = Sheet([title_of(results)], heights=[3.0])
         if numbers or not states:
             self._bins(sheet, {name: np.array(values) for name, (_, values) in numbers.items()})

@@ -9,10 +9,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import EpicycleError
 from epicycle.aspects import STAMP
 
-from ..results import Results, Signal, cell, leaves
+from ..results import Results, cell, leaves
 from ..text import select
 
 COLUMNS = 700  # of pixels, about, that a panel is wide
@@ -29,15 +28,7 @@ def selected(patterns: tuple[str, ...], results: Results) -> list[str]:
     return list(dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals)))
 
 
-def positions(signal: Signal) -> NDArray[np.float64]:
-    """The positions in a signal of body states, shape (n, 2); raises ``EpicycleError`` for other signals."""
-    try:
-        return np.array([token.position for token in signal.tokens], dtype=float).reshape(-1, 2)
-    except AttributeError:
-        raise EpicycleError(f"the tokens of {signal.name} have no 'position'") from None
-
-
-def leaves_of(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
+def read(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
     """All numbers and all states in tokens, by signal and place in them, but for what says of when a token is.
 
     A state is None where there is something else; what never is one is left out.

@@ -87,7 +87,7 @@ def tied(drawing: Drawing) -> list[list[Pill]]:
                 pill
                 for pill in drawing.pills
                 if pill.aspect == short_name(woven.name)
-                and any(place == pill.at or place.startswith(f"{pill.at}.") for place in places)
+                and any(place == pill.place or place.startswith(f"{pill.place}.") for place in places)
             )
     return [group for group in groups.values() if len(group) > 1]
 

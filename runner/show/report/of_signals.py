@@ -29,8 +29,9 @@ from ...results import Results
 from ...study import Plan, half_width
 from ...text import Problems
 from ..pen import FORMATS, draw
-from ..samples import positions, selected
+from ..samples import selected
 from ..sheet import colours, set_log
+from ..space import positions
 from ..trajectories import arrows, every, round_step, tip_path, write_times
 from .data import Condition, Data, Names
 from .figure import RunKey, SignalFigure

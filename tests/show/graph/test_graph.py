@@ -139,7 +139,7 @@ aspects:
 def test_places_that_share_a_medium_are_joined(tmp_path: Path) -> None:
     (tmp_path / "bus.yaml").write_text(BUS, encoding="utf-8")
     drawing = draw(outline(load_model(tmp_path / "bus.yaml"), expand=True))
-    groups = [[(pill.aspect, pill.at) for pill in group] for group in tied(drawing)]
+    groups = [[(pill.aspect, pill.place) for pill in group] for group in tied(drawing)]
     assert groups == [
         [("can", f"node[{n}].input") for n in range(3)],
         [("low", "other[0].input"), ("high", "other[1].input"), ("high", "other[2].input")],
