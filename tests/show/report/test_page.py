@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from epicycle.runner.cli import main
-from tests.show.browser import CHROMIUM, Browser, browser
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 
 HOSTILE = "</title></svg><script>document.title='no'</script><img src=x onerror=a()>'\"&"
 LEVEL = "<img src=x onerror=alert(1)>"
@@ -61,91 +59,106 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out" / "report.html"
 
 
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with browser(tmp_path_factory.mktemp("profile")) as made:
-        yield made
+Open = Callable[..., Any]
 
 
-@pytest.mark.parametrize("dark", [False, True])
+@pytest.fixture
+def opened(page: Path, browser: Any) -> Iterator[Open]:
+    """Opens the page; in the end it must have said nothing and asked for nothing but itself."""
+    tabs: list[tuple[Any, list[str], list[str]]] = []
+
+    def open_page(width: int = 1280, scheme: str = "light") -> Any:
+        viewport = {"width": width, "height": 900}
+        tab = browser.new_context(viewport=viewport, color_scheme=scheme, offline=True).new_page()
+        said: list[str] = []
+        asked: list[str] = []
+        tab.on("console", lambda message: said.append(message.text))
+        tab.on("pageerror", lambda error: said.append(str(error)))
+        tab.on("dialog", lambda dialog: said.append(dialog.message))
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.goto(page.as_uri())
+        tabs.append((tab, said, asked))
+        return tab
+
+    yield open_page
+    for tab, said, asked in tabs:
+        tab.context.close()
+        assert said == []
+        assert [url for url in asked if not url.startswith("data:")] == [page.as_uri()]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1280, 3840])
-def test_a_page_loads_by_itself_at_any_width(width: int, dark: bool, page: Path, chromium: Browser) -> None:
-    chromium.open(page, width, 900, dark=dark)
-    assert chromium.complaints() == []
-    assert chromium.run("document.title") == "wheels: report"
-    assert chromium.run("document.querySelectorAll('script').length") == 1
-    assert chromium.run("document.documentElement.scrollWidth") <= width  # what is wider is scrolled by itself
-    images = "[...document.images].map(image => [image.complete, image.naturalWidth > 0])"
-    assert chromium.run(images) == [[True, True]] * 4
-    assert HOSTILE in chromium.run("document.body.textContent")
-    background = chromium.run("getComputedStyle(document.body).backgroundColor")
-    assert background == ("rgb(25, 26, 28)" if dark else "rgb(255, 255, 255)")
-    order = chromium.run("[...document.querySelectorAll('h2')].map(heading => heading.textContent)")
-    assert order == ["Claims", "Guideline", "Figures", "Means", "Study", "Runs", "Provenance"]
+def test_a_page_loads_by_itself_at_any_width(width: int, scheme: str, opened: Open) -> None:
+    tab = opened(width, scheme)
+    assert tab.title() == "wheels: report"
+    assert tab.locator("script").count() == 1
+    assert tab.evaluate("document.documentElement.scrollWidth") <= width  # what is wider is scrolled by itself
+    assert tab.evaluate("[...document.images].map(image => image.naturalWidth > 0)") == [True] * 4
+    assert HOSTILE in tab.evaluate("document.body.textContent")
+    background = tab.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert background == ("rgb(25, 26, 28)" if scheme == "dark" else "rgb(255, 255, 255)")
+    order = ["Claims", "Guideline", "Figures", "Means", "Study", "Runs", "Provenance"]
+    assert tab.locator("h2").all_inner_texts() == order
 
 
-def test_the_policy_lets_nothing_else_run(page: Path, chromium: Browser) -> None:
-    chromium.open(page)
-    chromium.run("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"document.title=1\">')")
-    chromium.run("document.body.append(Object.assign(document.createElement('script'), {text: 'document.title=2'}))")
-    chromium.run("fetch('https://example.org/').catch(() => 0)")
-    assert chromium.run("document.title") == "wheels: report"
-    told = [each["params"]["entry"]["text"] for each in chromium.events if each.get("method") == "Log.entryAdded"]
-    assert sum("Content Security Policy" in text for text in told) >= 3
+def test_the_policy_lets_nothing_else_run(page: Path, browser: Any) -> None:
+    tab = browser.new_page()
+    said: list[str] = []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.goto(page.as_uri())
+    tab.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"document.title=1\">')")
+    tab.evaluate("document.body.append(Object.assign(document.createElement('script'), {text: 'document.title=2'}))")
+    tab.evaluate("fetch('https://example.org/').catch(() => 0)")
+    assert tab.title() == "wheels: report"
+    tab.close()
+    assert sum("Content Security Policy" in text for text in said) >= 3
 
 
-WHERE = """(() => {
-  const frame = document.querySelectorAll('figure')[FIGURE].querySelector('.frame');
+WHERE = """figure => {
+  const frame = document.querySelectorAll('figure')[figure].querySelector('.frame');
   const dot = frame.querySelector('circle');
   dot.scrollIntoView({block: 'center', inline: 'center'});
-  const box = frame.getBoundingClientRect();
-  const view = frame.querySelector('svg').viewBox.baseVal;
+  const box = frame.getBoundingClientRect(), view = frame.querySelector('svg').viewBox.baseVal;
   return [box.left + dot.getAttribute('cx') * box.width / view.width,
           box.top + dot.getAttribute('cy') * box.height / view.height];
-})()"""
-SETTLED = "new Promise(done => setTimeout(done, 200))"
-TIP = "(() => { const tip = document.querySelector('.tip'); return tip && !tip.hidden ? tip.textContent : null })()"
+}"""
 
 
 @pytest.mark.parametrize("figure", range(4))
 @pytest.mark.parametrize("width", [390, 1280])
-def test_a_tip_comes_up_where_the_pointer_is(figure: int, width: int, page: Path, chromium: Browser) -> None:
-    chromium.open(page, width, 900)
-    where = chromium.run(WHERE.replace("FIGURE", str(figure)))
-    chromium.run(SETTLED)  # until it is scrolled
-    chromium.move(*where)
-    starts = ("Mean", "wheel.state, replication 0", "0 s: 2", "wheel.state\n0 s at (0, 2) m")
-    said = chromium.run(TIP)
-    assert said.lower().startswith(starts[figure].lower())
+def test_a_tip_comes_up_where_the_pointer_is(figure: int, width: int, opened: Open) -> None:
+    tab = opened(width)
+    where = tab.evaluate(WHERE, figure)
+    tab.wait_for_timeout(200)  # until it is scrolled
+    tab.mouse.move(*where)
+    tip = tab.locator(".tip")
+    starts = ("mean", "wheel.state, replication 0", "0 s: 2", "wheel.state\n0 s at (0, 2) m")
+    said = tip.inner_text()
+    assert said.startswith(starts[figure])
     assert (HOSTILE in said, LEVEL in said) == ((True, True), (False, True), (False, True), (False, False))[figure]
-    left, right, top = chromium.run(
-        "(box => [box.left, box.right, box.top])(document.querySelector('.tip').getBoundingClientRect())"
-    )
-    assert left >= 0
-    assert right <= width
-    assert top >= 0
-    chromium.move(1, 1)
-    assert chromium.run(TIP) is None
-    assert chromium.complaints() == []
+    box = tip.bounding_box()
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= width
+    assert box["y"] >= 0
+    tab.mouse.move(1, 1)
+    assert not tip.is_visible()
 
 
-def test_a_picture_is_enlarged_and_closed_again(page: Path, chromium: Browser) -> None:
-    chromium.open(page)
-    small = chromium.run("document.querySelector('figure img').getBoundingClientRect().width")
-    chromium.run("document.querySelector('figure .enlarge').click()")
-    is_open = "document.querySelector('dialog').open"
-    assert chromium.run(is_open)
-    assert chromium.run("document.querySelector('dialog img').getBoundingClientRect().width") > 1.1 * small
-    chromium.press("ArrowRight")
-    assert chromium.run(TIP).lower().startswith("mean")
-    assert chromium.run("document.querySelector('dialog .tip') !== null")  # above the dialog, not below it
-    chromium.run("document.querySelector('dialog .close').click()")
-    assert not chromium.run(is_open)
-    chromium.run(SETTLED)
-    assert chromium.run(TIP) is None
-    chromium.run("document.querySelector('figure .frame').focus()")
-    chromium.press("Enter")
-    assert chromium.run(is_open)
-    chromium.press("Escape")
-    assert not chromium.run(is_open)
-    assert chromium.complaints() == []
+def test_a_picture_is_enlarged_and_closed_again(opened: Open) -> None:
+    tab = opened()
+    stage, tip = tab.locator("dialog"), tab.locator(".tip")
+    small = tab.locator("figure img").first.bounding_box()["width"]
+    tab.locator("figure .enlarge").first.click()
+    assert stage.is_visible()
+    assert stage.locator("img").bounding_box()["width"] > 1.1 * small
+    tab.keyboard.press("ArrowRight")
+    assert stage.locator(".tip").inner_text().startswith("mean")  # above the dialog, not below it
+    stage.locator(".close").click()
+    stage.wait_for(state="hidden")
+    tip.wait_for(state="hidden")
+    tab.locator("figure .frame").first.focus()
+    tab.keyboard.press("Enter")
+    assert stage.is_visible()
+    tab.keyboard.press("Escape")
+    stage.wait_for(state="hidden")
