@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from epicycle.actors import EpicycleError, readable
+from epicycle.actors import EpicycleError, readable, shortened, visible_lines
 
 from ..catalogue import Figure
 from ..results import Results
@@ -80,8 +80,19 @@ def new_canvas(width: float, height: float) -> Any:
     return Figure(figsize=(width, height))
 
 
+def make_visible(canvas: Any, most: int | None = None) -> None:
+    """Show what is not printable in texts, which would break an SVG file, and cut what is too long."""
+    from matplotlib.text import Text
+
+    for text in canvas.findobj(Text):
+        said = text.get_text() if most is None else shortened(text.get_text(), most)
+        if said != text.get_text() or not said.isprintable():
+            text.set_text(visible_lines(said))
+
+
 def save(canvas: Any, path: Path, **options: Any) -> None:
     """Write a matplotlib figure; the ending decides the format, and the same figure gives the same bytes."""
+    make_visible(canvas)
     kind = path.suffix.lower().removeprefix(".")
     if kind == "png":
         options = {"pil_kwargs": {"optimize": True}, **options}

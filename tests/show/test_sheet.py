@@ -43,10 +43,10 @@ def test_tips_are_where_their_marks_are(tmp_path: Path) -> None:
 def test_tips_are_text_whatever_they_say(tmp_path: Path) -> None:
     with style():
         sheet = Sheet([""])
+        sheet.call_axes(HOSTILE, HOSTILE)  # which matplotlib writes as comments, too
         sheet.tip(sheet.axes[0], [(0.5, 0.5)], [f"{HOSTILE}\nsecond line"])
         sheet.save([tmp_path / "f.svg"])
     written = (tmp_path / "f.svg").read_bytes()
-    assert b"<script" not in written
     tags = {element.tag.rpartition("}")[2] for element in ElementTree.fromstring(written).iter()}
     assert "script" not in tags
     found = tips_of(written)
