@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
@@ -12,13 +13,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from epicycle.actors import EpicycleError, readable, shortened, visible_lines
+from epicycle.actors import EpicycleError, readable, visible
 
 from ..catalogue import Figure
 from ..results import Results
 from ..text import Position, describe, raised_at, told_raised
 
 FORMATS = ("png", "svg")
+_UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # which no XML file may hold
 # What matplotlib would write into a file of its own accord: names, versions, times.
 _METADATA = {
     "svg": ("Creator", "Date", "Format", "Type"),
@@ -80,23 +82,15 @@ def new_canvas(width: float, height: float) -> Any:
     return Figure(figsize=(width, height))
 
 
-def make_visible(canvas: Any, most: int | None = None) -> None:
-    """Show what is not printable in texts, which would break an SVG file, and cut what is too long."""
-    from matplotlib.text import Text
-
-    for text in canvas.findobj(Text):
-        said = text.get_text() if most is None else shortened(text.get_text(), most)
-        if said != text.get_text() or not said.isprintable():
-            text.set_text(visible_lines(said))
-
-
 def save(canvas: Any, path: Path, **options: Any) -> None:
     """Write a matplotlib figure; the ending decides the format, and the same figure gives the same bytes."""
-    make_visible(canvas)
     kind = path.suffix.lower().removeprefix(".")
     if kind == "png":
         options = {"pil_kwargs": {"optimize": True}, **options}
     canvas.savefig(path, format=kind, metadata=dict.fromkeys(_METADATA.get(kind, ())), **options)
+    if kind == "svg" and _UNWRITABLE.search(text := path.read_text(encoding="utf-8")):
+        # Texts are in comments, too, as they are.
+        path.write_text(_UNWRITABLE.sub(lambda found: visible(found[0]), text), encoding="utf-8")
 
 
 class FigureError(EpicycleError):

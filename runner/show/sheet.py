@@ -11,9 +11,9 @@ from typing import Any, Literal, NamedTuple
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
-from epicycle.actors import EpicycleError, abridged, visible_lines
+from epicycle.actors import EpicycleError, abridged, shortened, visible_lines
 
-from .pen import make_visible, new_canvas, save
+from .pen import new_canvas, save
 
 # Okabe and Ito, Color Universal Design, 2008; with markers and dashes, so that lines differ in print, too.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#7f7f7f")
@@ -133,7 +133,10 @@ class Sheet:
 
     def save(self, paths: Sequence[Path]) -> None:
         """Write the files, whose endings decide the format; tips are in those that are SVG."""
-        make_visible(self.canvas, MAX_TEXT)  # whatever a model is called: a sheet grows with the texts on it
+        from matplotlib.text import Text
+
+        for text in self.canvas.findobj(Text):  # whatever a model is called: a sheet grows with the texts on it
+            text.set_text(shortened(text.get_text(), MAX_TEXT))
         self.canvas.draw_without_rendering()
         self.canvas.set_layout_engine("none")  # all files have the same one, by which tips are placed
         box = self.canvas.get_tightbbox().padded(_PAD)
