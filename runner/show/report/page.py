@@ -317,7 +317,7 @@ def claims(names: Names, judgements: Sequence[Judgement]) -> Iterable[Html]:
             *map(shown, each.where.values()),
             tag("b", each.name),
             _verdict(each),
-            [each.claim.doc, " ", tag("small", each.claim.statement)],
+            [each.claim.doc, " ", tag("small", each.claim.stated(names.words))],
             *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
             str(each.agreeing),
             _weakest(names, each),

@@ -161,7 +161,7 @@ def test_claims_and_guideline(queue: Path) -> None:
     claims = json.loads((queue / "claims.json").read_text())
     assert claims["claims"] == [json.loads(json.dumps(judgement.as_dict()))]
     assert claims["table"] == results.digest()
-    assert found.tables["Claims"][1][:3] == ["load_hurts", judgement.verdict, " mean_wait rises over load"]
+    assert found.tables["Claims"][1][:3] == ["load_hurts", judgement.verdict, " mean wait rises over load"]
     rows = [row for row in found.tables["Claims"] if row[0].startswith("mean wait (s), load: 0.9 less load: 0.5; ")]
     assert len(rows) == len(judgement.findings) == 3
     (weakest,) = (row for row, each in zip(rows, judgement.findings, strict=True) if each == judgement.weakest)
