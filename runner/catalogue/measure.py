@@ -127,6 +127,7 @@ class Measure(Configurable):
     unit = Parameter(str, "", doc="what the tokens count in")
     to = Parameter(str, "", doc="the unit in which the metric is given (default: that of the tokens)")
     doc = Parameter(str, "", doc="what it is")
+    label = Parameter(str, "", doc="what it is called in figures and reports (default: its name)")
 
     @property
     def kind(self) -> Take:

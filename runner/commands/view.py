@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, tell
-from .options import CHANGES, DONE, SEED, command, load, option
+from .options import CHANGES, DONE, SEED, check_path, command, load, option
 from .run import run
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     ),
     option("--mcap", metavar="FILE", type=Path, help="write the run for Foxglove or Lichtblick; no page without -o"),
     option("--rerun", metavar="FILE", type=Path, help="write the run for rerun; no page without -o"),
-    imports=("calls.running", "show"),
+    imports=("calls.viewing",),
 )
 def view(options: argparse.Namespace) -> int:
     """Run a model and write a page that shows the run: it needs no network, and any browser opens it.
@@ -45,42 +45,38 @@ def view(options: argparse.Namespace) -> int:
     """
     from epicycle.actors import EpicycleError
 
-    from ..calls import seconds, watched
-    from ..engine import ActorError, LoopError
-    from ..show.view import write_page
+    from ..calls import recorded, seconds
 
     if len(options.model) > 2:
         raise EpicycleError(f"a page shows one run or two, not {len(options.model)}: {', '.join(options.model)}")
     if options.out is not None:
-        _check_path("--out", options.out)
+        check_path("--out", options.out)
     exports = _exports(options)
-    names = [Path(each).name.removesuffix(".yaml") for each in options.model]
-    recordings: list[Recording] = []
-    error: EpicycleError | None = None
-    for each in options.model:
-        one = copy(options)
-        one.model = each
-        digest = _as_before(one) if Path(each).is_dir() else ""
-        recordings.append(_recording(one, is_compared=len(options.model) > 1))
-        try:
-            with watched(recordings[-1].model, seconds("--until", one.until)) as report:
-                results = recordings[-1].run(until=seconds("--until", one.until), progress=report)
-        except (ActorError, LoopError) as failure:  # what led to it is just what one wants to see
-            error = failure
-            continue
-        if digest and results.digest != digest:
-            complain(f"{each} was made by another version of the model or of Epicycle: the run is no longer the same")
+    each = [copy(options) for _ in options.model]
+    digests = []
+    for one, name in zip(each, options.model, strict=True):
+        one.model = name
+        digests.append(_as_before(one) if Path(name).is_dir() else "")
+    made = recorded(
+        [load(one) for one in each],
+        seed=[one.seed for one in each],
+        until=[seconds("--until", one.until) for one in each],
+        names=[Path(name).name.removesuffix(".yaml") for name in options.model],
+    )
+    for name, digest, recording in zip(options.model, digests, made.recordings, strict=True):
+        if digest and recording.results is not None and digest != recording.results.digest:
+            complain(f"{name} was made by another version of the model or of Epicycle: the run is no longer the same")
     for path, write in exports:
-        write(recordings[0], path)
+        write(made.recordings[0], path)
         tell(f"wrote {path}")
     page = options.out
     if page is None and not exports:
-        page = Path("results") / recordings[0].model.name / "view.html"
+        page = Path("results") / made.recordings[0].model.name / "view.html"
         page.parent.mkdir(parents=True, exist_ok=True)
     if page is not None:
-        write_page(recordings, page, names=names if len(names) > 1 else [])
+        made.save(page)
         tell(f"wrote {page}")
-    if error is not None:
+    for error in made.errors:
         raise error
     if page is not None and options.out is None:
         webbrowser.open(page.resolve().as_uri())
@@ -102,33 +98,10 @@ def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recordin
             continue
         if len(options.model) > 1:
             raise EpicycleError(f"{flag} writes one run, not two: {', '.join(options.model)}")
-        _check_path(flag, path)
+        check_path(flag, path)
         require()
         found.append((path, write))
     return found
-
-
-def _check_path(flag: str, path: Path) -> None:
-    from epicycle.actors import EpicycleError
-
-    if not path.parent.is_dir():
-        raise EpicycleError(f"{flag} {path} cannot be written: there is no folder {path.parent}")
-    if path.is_dir():
-        raise EpicycleError(f"{flag} {path} cannot be written: it is a folder")
-
-
-def _recording(options: argparse.Namespace, *, is_compared: bool) -> Recording:
-    from ..build import figures_of
-    from ..show.view import Recording
-    from ..text import Problems
-
-    problems = Problems()
-    model = load(options)
-    figures = figures_of(model, problems)
-    problems.raise_if_any()
-    if options.until is None and model.endless:
-        complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
-    return Recording(model, figures, seed=options.seed, is_compared=is_compared)
 
 
 def _as_before(options: argparse.Namespace) -> str:

@@ -19,7 +19,7 @@ from epicycle.actors import Tag, to_nanoseconds
 from ...catalogue import Mark
 from ...results import Results
 from ...shown import short
-from ..pen import LIMIT, PALETTE
+from ..sheet import LIMIT, PALETTE
 from .recording import NOTHING, Recording
 from .writing import ViewError
 

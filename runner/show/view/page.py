@@ -18,6 +18,7 @@ from ...catalogue import Figure
 from ...html import Html, tag
 from ...results import Results
 from ...shown import in_words, short
+from ..sheet import PALETTE
 from .drawing import drawn
 from .lanes import lanes
 from .packing import Pack
@@ -38,6 +39,7 @@ def page(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
     pack = Pack()
     runs = [_run(each, name, pack) for each, name in zip(recordings, [*names, "", ""], strict=False)]
     about = {
+        "palette": PALETTE,
         "runs": runs,
         "difference": _difference(recordings) if len(recordings) > 1 else None,
         "comparison": _comparison(recordings) if len(recordings) > 1 else [],

@@ -15,7 +15,7 @@ from epicycle.actors import Tag
 from epicycle.aspects import STAMP
 
 from ...results import Signal, cell, leaves
-from ..figures import selected
+from ..samples import selected
 from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, results_of, things
 from .recording import Recording
 from .writing import ViewError, replace_file
