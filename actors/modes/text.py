@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, NamedTuple
 
 from ..core import Configurable, MappingParameter, Parameter, ParameterError, brief, texts_parameter
 from ..core.units import quantity
@@ -13,14 +13,23 @@ from ..expression import Formula, FormulaParameter
 _QUOTED: Final = re.compile(r"'[^']*'|\"[^\"]*\"")
 _ARROW: Final = re.compile(r"\s*(?P<sources>[^>]+?)\s*->\s*(?P<target>[^\s;]+)(?P<rest>(\s.*)?)", re.DOTALL)
 _FLAG: Final = re.compile(
-    r"\s*(?:(?P<flag>else|immediate|nondeterministic|preemptive|history|error)|priority\s+(?P<priority>-?\d+))(?=\s|$)"
+    r"\s*(?:(?P<flag>else|immediate|nondeterministic|preemptive|history|error)|priority\s+(?P<priority>-?\d+)"
+    r"|probability\s+(?P<probability>\S+))(?=\s|$)"
 )
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
-_ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
+_TARGET: Final = r"\s*(?P<name>[A-Za-z_]\w*)\s*(?:\[\s*(?P<channel>\d{1,6})\s*\])?\s*"
+_ASSIGNMENT: Final = re.compile(_TARGET + "=(?!=)(?P<formula>.*)", re.DOTALL)
 _FORM: Final = "'a -> b on PORT after TIME when CONDITION do NAME = VALUE; ...'"
 
 _TRUTHS: Final[dict[Any, Any]] = {"true": True, "false": False}  # as YAML writes them
-Action = tuple[str, Formula]
+
+
+class Action(NamedTuple):
+    """What sets a variable, or sends from an output: by all channels, or by one."""
+
+    name: str
+    formula: Formula
+    channel: int | None = None
 
 
 class _DelayParameter(FormulaParameter):
@@ -48,9 +57,8 @@ class _ActionsParameter(Parameter[Any]):
     def convert(self, value: object) -> tuple[Action, ...]:
         if isinstance(value, tuple) or value is None:
             return value or ()
-        given = value.items() if isinstance(value, Mapping) else self._actions(value)
         found = []
-        for name, formula in given:
+        for name, channel, formula in self._said(value) if isinstance(value, Mapping) else self._actions(value):
             try:
                 read = FormulaParameter().convert(
                     _TRUTHS.get(formula, formula) if isinstance(formula, str) else formula
@@ -58,10 +66,18 @@ class _ActionsParameter(Parameter[Any]):
             except ParameterError as error:
                 raise ParameterError(f"{name} = {error}", (name,)) from None
             assert read is not None
-            found.append((name, read))
+            found.append(Action(name, read, None if channel is None else int(channel)))
         return tuple(found)
 
-    def _actions(self, text: object) -> Iterator[tuple[str, str]]:
+    @staticmethod
+    def _said(value: Mapping[Any, object]) -> Iterator[tuple[str, str | None, Any]]:
+        for name, formula in value.items():
+            match = re.fullmatch(_TARGET, str(name))
+            if match is None:
+                raise ParameterError(f"{name!r} is not a name, nor one with a channel such as 'out[1]'", (str(name),))
+            yield match["name"], match["channel"], formula
+
+    def _actions(self, text: object) -> Iterator[tuple[str, str | None, str]]:
         if not isinstance(text, str):
             raise ParameterError(f"{brief(text)} is not a {self.describe_type()}")
         start = 0
@@ -72,7 +88,7 @@ class _ActionsParameter(Parameter[Any]):
             match = _ASSIGNMENT.fullmatch(part)
             if match is None:
                 raise ParameterError(f"{part.strip()!r} is not an action: write 'name = expression'")
-            yield match["name"], match["formula"].strip()
+            yield match["name"], match["channel"], match["formula"].strip()
 
 
 class Mode(Configurable):
@@ -99,6 +115,7 @@ class Transition(Configurable):
     on = texts_parameter((), doc="inputs of which one must have a token")
     after = _DelayParameter(None, doc="how long after the entry it may be taken, in s")
     when = FormulaParameter(None, doc="the guard")
+    probability = FormulaParameter(None, doc="how likely it is to be enabled, where it would be without this")
     do = _ActionsParameter("what is done when it is taken: outputs are sent, variables are set, one after the other")
     priority = Parameter(int, 0, doc="of several that are enabled, the lower one is taken")
     else_ = Parameter(bool, False, doc="whether it is enabled only if no other is")
@@ -170,8 +187,12 @@ def read_transition(text: str) -> dict[str, object]:
     said: dict[str, object] = {"to": arrow["target"], "from": [each.strip() for each in arrow["sources"].split(",")]}
     rest = arrow["rest"]
     while (flag := _FLAG.match(rest)) is not None:
-        key = flag["flag"] or "priority"
-        said[key] = int(flag["priority"]) if key == "priority" else True
+        if flag["probability"] is not None:
+            said["probability"] = flag["probability"]
+        elif flag["priority"] is not None:
+            said["priority"] = int(flag["priority"])
+        else:
+            said[flag["flag"]] = True
         rest = rest[flag.end() :]
     masked = _masked(rest)
     clauses = list(_CLAUSE.finditer(masked))

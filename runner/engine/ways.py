@@ -28,7 +28,7 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..graph import Clock, Hop, ModelGraph, WovenAspect, channel_of, is_within
+from ..graph import Clock, Hop, ModelGraph, WovenAspect, is_within
 from ..results import EventLog, Signal
 from ..text import describe
 from .aspect_context import EngineContext
@@ -125,18 +125,22 @@ class Ways:
             self._passages.update({path: Passage(path, outside) for path in paths})
         if self.graph.refires(composite):
             self._add_border(composite, outside)
+        is_refired = composite in self.graph.modal or self.graph.refinement_of(composite) == composite != ""
+        if is_refired and self.graph.rules[composite].are_ptolemys:
+            self._let_refire(composite)
         self._directors[composite] = self._made_director(composite, clock)
         if composite in self.graph.modal:
             machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
             conductor = Conductor(composite, machine, self.director, self._directors[composite])
             self._conductors[composite] = conductor
-            if machine.is_preemptive:
+            conductor.is_refired = self.graph.rules[composite].are_ptolemys
+            if machine.is_preemptive or conductor.is_refired:
                 for path in self.graph.borders(composite)[0]:
                     self._passages[path].beside = conductor
 
     def _add_border(self, composite: str, outside: Director | Refinement) -> None:
         """Let a composite fire again as long as tokens wait at its inputs."""
-        border = self._borders[composite] = Border(composite, self.director, outside)
+        border = self._borders[composite] = Border(composite, self.graph.end_of(composite), self.director, outside)
         for paths, passages in zip(
             self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
         ):
@@ -146,9 +150,18 @@ class Ways:
         around = composite
         while around and border.poster is None:
             around = around.rpartition(".")[0]
-            border.poster = self._borders.get(around)
+            border.poster = self.director.posters.get(around)
         border.nesting = 0 if border.poster is None else border.poster.nesting + 1
-        self.director.posters[composite] = border
+        if composite not in self.graph.modal:  # whose parts are posted one by one
+            self.director.posters[composite] = border
+
+    def _let_refire(self, composite: str) -> None:
+        """Let a composite with modes, or a refinement, take a token of each channel in each firing, as in Ptolemy."""
+        inputs, outputs = self.graph.borders(composite)
+        for path in (*inputs, *outputs):
+            self._passages[path].is_refired = True
+        for path in outputs if composite in self.graph.modal else ():
+            self._passages[path].holds_one = True
 
     def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
         if not composite or self.graph.refinement_of(composite) != composite:
@@ -263,12 +276,19 @@ class Ways:
         for hops in leaving.values():
             hops.sort(key=lambda way: [hop.order for hop in way])  # as they are declared
         emitters = [
-            (output, self._emitter(output, _by_channel(leaving.get(output.path, []))))
+            (output, self._emitter(output, self._by_channel(leaving.get(output.path, []))))
             for actor in self.actors.values()
             for output in actor.outputs.values()
         ]
         self._open_requests()
         return emitters
+
+    def _by_channel(self, wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
+        """The wires of an output port by the channel, in their order."""
+        found: dict[object, list[tuple[Hop, ...]]] = {}
+        for hops in wires:
+            found.setdefault(self.graph.channel_of(hops, hops[0]), []).append(hops)
+        return list(found.values())
 
     def _open_requests(self) -> None:
         """Find the ways from the request ports of aspects that are models to the actors inside."""
@@ -335,7 +355,7 @@ class Ways:
     def _over(self, hop: Hop, onward: Way, channel: tuple[Hop, ...]) -> Way:
         """One connection: its delay, and the aspects and the passage at its far end."""
         far = hop.destination
-        passage, lane = self._passages.get(far), channel_of(channel, hop)
+        passage, lane = self._passages.get(far), self.graph.channel_of(channel, hop)
         is_output = self.graph.direction(far) == "output"
         source = far if is_output else hop.source
         # Aspects at a port of a composite stand outside of it.
@@ -477,10 +497,3 @@ class Ways:
             except Exception as error:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
 
-
-def _by_channel(wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
-    """The wires of an output port by the channel, in their order."""
-    found: dict[object, list[tuple[Hop, ...]]] = {}
-    for hops in wires:
-        found.setdefault(channel_of(hops, hops[0]), []).append(hops)
-    return list(found.values())
