@@ -17,7 +17,6 @@ from ..core import (
     Tag,
     Wake,
     did_you_mean,
-    texts_parameter,
     to_seconds,
 )
 from ..expression import Formula, operand
@@ -65,9 +64,8 @@ class StateMachine(ModalActor):
     actions; or a mapping with these keys.  Expressions are in the language of ``${...}``.  Names in them are variables,
     ``time`` (s), ``mode_time`` (s since the mode was entered), or else input ports.  A guard that asks for an input
     without a token does not hold; ``x_is_present`` says whether ``x`` has one, and inputs in ``held`` keep their
-    latest.  An action sets a variable, or sends from an output port of that name, ``y[1] = x`` by one of its channels.
-    Tokens that come together at one input are for one reaction each, at the next microsteps.  Of inputs in
-    ``by_channel`` a reaction takes a token of each channel: ``x_0``, ``x_1`` and so on; ``x`` is the last of them.
+    latest.  An action sets a variable, or sends from an output port of that name.  Tokens that come together at one
+    input are for one reaction each, at the next microsteps.
 
     In a mode with ``flow``, variables follow differential equations, as in an ``ODE``.  A comparison over them, or over
     times, in a guard is an event at the nanosecond at which it changes; one whose transition has moved a variable off
@@ -94,7 +92,6 @@ class StateMachine(ModalActor):
     held = MappingParameter(
         Parameter(object, None), {}, doc="inputs that keep their latest token, with a value before the first, or null"
     )
-    by_channel = texts_parameter((), doc="inputs whose channels expressions tell apart, as x_0, x_1, x_0_is_present")
     one_at_a_time = Parameter(
         bool, False, ptolemy=True, doc="whether tokens that come together are for one firing each, at the same tag"
     )
@@ -109,7 +106,7 @@ class StateMachine(ModalActor):
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         actions = [*(each for one in self.transitions for each in one.do), *self._at_borders()]
-        read = [each.formula for each in actions]
+        read = [formula for _, formula in actions]
         for one in self.transitions:
             read += [each for each in (one.when, one.after, one.probability) if each is not None]
         read += [formula for mode in self.modes.values() for formula in mode.flow.values()]
@@ -123,27 +120,19 @@ class StateMachine(ModalActor):
             *(name for one in self.transitions for name in one.on),
         ]
         for name in named:
-            name = self._port_of(name)
+            name = name.removesuffix(_PRESENT)
             if name not in (*self._reserved, "trigger", *ports):
                 ports[name] = InputPort(required=False, multi=True, doc="a name in guards or actions")
-        for name, _, channel in actions:
-            if channel is not None and name in self.variables:
-                raise ParameterError(f"{name}[{channel}] = ...: {name!r} is a variable, which has no channels")
+        for name, _ in actions:
             if name in self._reserved or isinstance(ports.get(name), InputPort):
                 what = "an input, for it is read" if name in ports else "a time"
                 raise ParameterError(
                     f"{name} = ...: {name!r} is {what}; declare it as a variable to set it, or rename it"
                 )
             if name not in ports:
-                kinds = {type_of(each.formula, self._type) for each in actions if each.name == name}
+                kinds = {type_of(formula, self._type) for each, formula in actions if each == name}
                 ports[name] = OutputPort(kinds.pop() if len(kinds) == 1 else Any, doc="sent by actions")
         return ports
-
-    def _port_of(self, name: str) -> str:
-        """The input that a name in an expression is about."""
-        name = name.removesuffix(_PRESENT)
-        port, _, channel = name.rpartition("_")
-        return port if port in self.by_channel and channel.isdecimal() else name
 
     def _type(self, name: str) -> Any:
         """What a name stands for, as far as that is known."""
@@ -178,8 +167,6 @@ class StateMachine(ModalActor):
         self._inputs = [name for name in self.inputs if name != "trigger"]
         for name in self.held:
             _check_name(("held", name), name, "input", self._inputs)
-        for name in self.by_channel:
-            _check_name(("by_channel", name), name, "input", self._inputs)
         for name in self._inputs:
             self.inputs[name].keep = self.one_at_a_time
         for name, mode in self.modes.items():
@@ -206,7 +193,7 @@ class StateMachine(ModalActor):
             self.refinements.begin(self._current)
         self._known: dict[str, Any] = dict(self.variables)
         self._known |= {name: value for name, value in self.held.items() if value is not None}
-        self._queues = {name: [deque[Any]() for _ in range(self._lines(name))] for name in self._inputs}
+        self._queues: dict[str, deque[Any]] = {name: deque() for name in self._inputs}
         self._tokens: dict[str, Any] = {}  # of the present reaction
         self._entered = self.context.time
         self._borders = Borders(
@@ -256,7 +243,7 @@ class StateMachine(ModalActor):
         self._tokens = {}
         if self.one_at_a_time:
             self._reacted, self._has_changed = None, False
-        elif any(line for lines in self._queues.values() for line in lines):
+        elif any(self._queues.values()):
             self.wake_in(0)
         if self._wake is not None and not self.is_due(self._wake):
             self._wake.cancel()
@@ -269,28 +256,20 @@ class StateMachine(ModalActor):
         wakes = (self._wake, self._again, *self._timers.values())
         return min((wake.time for wake in wakes if wake is not None and not self.is_due(wake)), default=None)
 
-    def _lines(self, name: str) -> int:
-        """In how many lines the tokens of an input wait."""
-        return self.inputs[name].width if name in self.by_channel else 1
-
     def _take_tokens(self) -> None:
-        """The first token that waits at each input, or on each of its channels; those of this firing are there."""
+        """The first token that waits at each input; with ``one_at_a_time``, of each of its channels."""
         for name in self._inputs:
-            if name in self._tokens:
+            if name in self._tokens:  # before the refinement fired
                 continue
-            for channel, token in self._firsts(name):
-                self._tokens[name] = token
-                if name in self.by_channel:
-                    self._tokens[f"{name}_{channel}"] = token
-
-    def _firsts(self, name: str) -> list[tuple[int, Any]]:
-        port, lines = self.inputs[name], self._queues[name]
-        if port.keep:
-            return [(channel, port.get(channel)) for channel in range(port.width) if port.waiting(channel)]
-        come = port.by_channel() if name in self.by_channel else [port.tokens]
-        for line, tokens in zip(lines, come, strict=True):
-            line.extend(tokens)
-        return [(channel, line.popleft()) for channel, line in enumerate(lines) if line]
+            port, queue = self.inputs[name], self._queues[name]
+            if port.keep:
+                for channel in range(port.width):
+                    if port.waiting(channel):
+                        self._tokens[name] = port.get(channel)
+                continue
+            queue.extend(port.tokens)
+            if queue:
+                self._tokens[name] = queue.popleft()
 
     def _hold_tokens(self) -> None:
         changed = {name: operand(self._tokens[name]) for name in self.held if name in self._tokens}
@@ -330,19 +309,18 @@ class StateMachine(ModalActor):
         self._act(rule.act)
 
     def _act(self, actions: tuple[Action, ...]) -> None:
-        for action in actions:
-            if action.name not in self.variables:
-                self.outputs[action.name].send(self._result(action), action.channel)
+        for name, formula in actions:
+            if name not in self.variables:
+                self.outputs[name].send(self._result(name, formula))
             elif self.set_last:
-                self._unset.append(action)
+                self._unset.append((name, formula))
             else:
-                self._known[action.name] = self._result(action)
+                self._known[name] = self._result(name, formula)
 
-    def _result(self, action: Action) -> Any:
-        source = action.formula.source
-        if source in self._tokens and action.name not in self.variables:
-            return self._tokens[source]  # as it came
-        return action.formula(self._values(action.formula))
+    def _result(self, name: str, formula: Formula) -> Any:
+        if formula.source in self._tokens and name not in self.variables:
+            return self._tokens[formula.source]  # as it came
+        return formula(self._values(formula))
 
     def begins(self) -> None:
         self._set()
@@ -357,8 +335,8 @@ class StateMachine(ModalActor):
     def _set(self) -> None:
         """Set the variables that wait for it."""
         if self._unset:
-            for action in self._unset:
-                self._known[action.name] = self._result(action)
+            for name, formula in self._unset:
+                self._known[name] = self._result(name, formula)
             self._unset = []
             self._enter_borders(self._current)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final
 
 from ..core import Configurable, MappingParameter, Parameter, ParameterError, brief, texts_parameter
 from ..core.units import quantity
@@ -17,19 +17,11 @@ _FLAG: Final = re.compile(
     r"|probability\s+(?P<probability>\S+))(?=\s|$)"
 )
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
-_TARGET: Final = r"\s*(?P<name>[A-Za-z_]\w*)\s*(?:\[\s*(?P<channel>\d{1,6})\s*\])?\s*"
-_ASSIGNMENT: Final = re.compile(_TARGET + "=(?!=)(?P<formula>.*)", re.DOTALL)
+_ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
 _FORM: Final = "'a -> b on PORT after TIME when CONDITION do NAME = VALUE; ...'"
 
 _TRUTHS: Final[dict[Any, Any]] = {"true": True, "false": False}  # as YAML writes them
-
-
-class Action(NamedTuple):
-    """What sets a variable, or sends from an output: by all channels, or by one."""
-
-    name: str
-    formula: Formula
-    channel: int | None = None
+Action = tuple[str, Formula]
 
 
 class _DelayParameter(FormulaParameter):
@@ -57,8 +49,9 @@ class _ActionsParameter(Parameter[Any]):
     def convert(self, value: object) -> tuple[Action, ...]:
         if isinstance(value, tuple) or value is None:
             return value or ()
+        given = value.items() if isinstance(value, Mapping) else self._actions(value)
         found = []
-        for name, channel, formula in self._said(value) if isinstance(value, Mapping) else self._actions(value):
+        for name, formula in given:
             try:
                 read = FormulaParameter().convert(
                     _TRUTHS.get(formula, formula) if isinstance(formula, str) else formula
@@ -66,18 +59,10 @@ class _ActionsParameter(Parameter[Any]):
             except ParameterError as error:
                 raise ParameterError(f"{name} = {error}", (name,)) from None
             assert read is not None
-            found.append(Action(name, read, None if channel is None else int(channel)))
+            found.append((name, read))
         return tuple(found)
 
-    @staticmethod
-    def _said(value: Mapping[Any, object]) -> Iterator[tuple[str, str | None, Any]]:
-        for name, formula in value.items():
-            match = re.fullmatch(_TARGET, str(name))
-            if match is None:
-                raise ParameterError(f"{name!r} is not a name, nor one with a channel such as 'out[1]'", (str(name),))
-            yield match["name"], match["channel"], formula
-
-    def _actions(self, text: object) -> Iterator[tuple[str, str | None, str]]:
+    def _actions(self, text: object) -> Iterator[tuple[str, str]]:
         if not isinstance(text, str):
             raise ParameterError(f"{brief(text)} is not a {self.describe_type()}")
         start = 0
@@ -88,7 +73,7 @@ class _ActionsParameter(Parameter[Any]):
             match = _ASSIGNMENT.fullmatch(part)
             if match is None:
                 raise ParameterError(f"{part.strip()!r} is not an action: write 'name = expression'")
-            yield match["name"], match["channel"], match["formula"].strip()
+            yield match["name"], match["formula"].strip()
 
 
 class Mode(Configurable):

@@ -496,4 +496,3 @@ class Ways:
                 raise
             except Exception as error:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
-

@@ -196,7 +196,7 @@ class ModelGraph:
         return self.rules[director].are_ptolemys
 
     def end_of(self, director: str) -> str:
-        """Where a composite that fires again has the turn in which it does; at the path of one with modes they begin."""
+        """Where a composite that fires again has the turn for it; one with modes begins at its own path."""
         return f"{director}.(end)" if director in self.modal else director
 
     def add_refinement(self, path: str) -> None:

@@ -31,9 +31,6 @@ OF_MODES = {
     "held": Key(
         node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: value before it'."
     ),
-    "by_channel": Key(
-        node_as(one_or_more(ref("name"))), "Inputs whose channels guards and actions tell apart, as x_0, x_1, ..."
-    ),
 }
 
 

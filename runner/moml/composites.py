@@ -226,7 +226,7 @@ class Conversion:
         for port in level.entity.ports:
             face = self.face(level.entity, port)
             if face is not None:
-                for channel in range(self._channels(level.entity, port)):
+                for channel in range(self.channels(level.entity, port)):
                     found[face.direction == "output"].append(self.port_name(level.ports, port, channel))
         for name, ours in level.requests.items():
             found[is_response(level.entity.entities[name])].append(ours)
@@ -236,7 +236,7 @@ class Conversion:
         found[1].extend(level.added_outputs)
         return found
 
-    def _channels(self, entity: Entity, port: str) -> int:
+    def channels(self, entity: Entity, port: str) -> int:
         """How many ports of ours stand for a port of a composite."""
         face = self.face(entity, port)
         if face is None or not face.multi:
@@ -414,6 +414,9 @@ class Conversion:
         part = level.parts.get(end.actor)
         if part is None or end.port in part.unwired:
             return None
+        if end.port in part.channels:
+            ours = part.channels[end.port][end.channel]
+            return None if ours is None else (f"{part.name}.{ours}", face.direction == "output")
         return f"{part.name}.{self.port_of(entity, part, end.port, end.channel)}", face.direction == "output"
 
     def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str:
