@@ -341,8 +341,8 @@ class StateMachine(ModalActor):
             self._enter_borders(self._current)
 
     def goes_on(self) -> bool:
-        if self.one_at_a_time and self._reacted is not None:
-            return self._current not in self._chart.final
+        if self.one_at_a_time:
+            return self._reacted is not None and self._current not in self._chart.final
         return super().goes_on()
 
     def probability_of(self, rule: Rule) -> float:
