@@ -15,6 +15,7 @@ from .core import (
     PortParameter,
     Wake,
     array_parameter,
+    rounds,
     to_nanoseconds,
     to_seconds,
     token_type,
@@ -183,7 +184,9 @@ class Clock(_Ticking):
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    A trigger lets one come at once, from which the time to the next is drawn anew.  Ptolemy: ``PoissonClock``.
+    A trigger lets one come at once, from which the time to the next is drawn anew.  With ``one_at_a_time``, as in
+    Ptolemy, triggers that come together let a tick come each, and the last tick of all is the first at ``stop_time`` or
+    behind it.  Ptolemy: ``PoissonClock``.
     """
 
     is_source: ClassVar[bool] = True
@@ -195,6 +198,9 @@ class PoissonClock(_Ticking):
     generator: Parameter[Generator | None] = Parameter(
         Generator, None, doc="another program's generator, if it is to give the numbers"
     )
+    one_at_a_time = Parameter(
+        bool, False, ptolemy=True, doc="whether a tick comes for each trigger, and a last one at stop_time or behind it"
+    )
 
     def check(self) -> None:
         super().check()
@@ -203,7 +209,11 @@ class PoissonClock(_Ticking):
     def initialize(self) -> None:
         self._tick = 0
         self._rest = 0.0
+        self._is_over = False
         self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
+
+    def _wake_at(self, time: int) -> Wake | None:
+        return self.context.wake(self, time) if self.one_at_a_time else super()._wake_at(time)
 
     def _interval(self) -> int:
         if self._numbers is None:
@@ -214,11 +224,20 @@ class PoissonClock(_Ticking):
         return to_nanoseconds(interval)
 
     def fire(self) -> None:
+        stop = NEVER if self.stop_time is None else to_nanoseconds(self.stop_time)
+        if self._is_over or (self.tag.time > stop and not self.one_at_a_time):
+            return
         if self._wake is not None and not self._wake.due:
             self._wake.cancel()
-        self._send(self._tick)
-        self._tick += 1
-        self._wake = self._wake_at(self.tag.time + self._interval())
+        ticks = max(1, len(list(rounds(self.trigger)))) if self.one_at_a_time else 1
+        for _ in range(ticks):
+            self._send(self._tick)
+            self._tick += 1
+            interval = self._interval()
+            if self.one_at_a_time and self.tag.time >= stop:
+                self._is_over, self._wake = True, None
+                return
+        self._wake = self._wake_at(self.tag.time + interval)
 
 
 class SingleEvent(Actor):

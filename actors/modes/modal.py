@@ -323,7 +323,7 @@ class ModalActor(Actor):
             if self._used > 1.0 + _ROUNDING:
                 raise EpicycleError(
                     f"in mode {self._current!r}, the probabilities of transitions that are enabled at once add up to "
-                    f"{self._used:g}, which is more than 1"
+                    f"{self._used:g}, more than 1"
                 )
             high = self._used if self._used < 1.0 - _ROUNDING else 1.0
             self._drawn[rule] = low <= self._number < high
