@@ -35,6 +35,8 @@ class _Ticking(Actor):
         float, None, unit="s", min=0, doc="the time after which there are no more ticks"
     )
 
+    _ends_late = False  # whether its last tick is the first behind stop_time
+
     def check(self) -> None:
         if self.values is not None and not self.values:
             raise ParameterError("values: the list is empty, there is nothing to send")
@@ -49,7 +51,7 @@ class _Ticking(Actor):
 
     def _wake_at(self, time: int) -> Wake | None:
         """The wake-up for the next tick at ``time`` ns, if there still is one."""
-        if self.stop_time is not None and time > to_nanoseconds(self.stop_time):
+        if self.stop_time is not None and time > to_nanoseconds(self.stop_time) and not self._ends_late:
             return None
         return self.context.wake(self, time)
 
@@ -210,10 +212,8 @@ class PoissonClock(_Ticking):
         self._tick = 0
         self._rest = 0.0
         self._is_over = False
+        self._ends_late = self.one_at_a_time
         self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
-
-    def _wake_at(self, time: int) -> Wake | None:
-        return self.context.wake(self, time) if self.one_at_a_time else super()._wake_at(time)
 
     def _interval(self) -> int:
         if self._numbers is None:
@@ -224,20 +224,25 @@ class PoissonClock(_Ticking):
         return to_nanoseconds(interval)
 
     def fire(self) -> None:
-        stop = NEVER if self.stop_time is None else to_nanoseconds(self.stop_time)
-        if self._is_over or (self.tag.time > stop and not self.one_at_a_time):
+        ticks = self._ticks() if self.trigger.width else 1
+        if self._is_over or not ticks:
             return
         if self._wake is not None and not self._wake.due:
             self._wake.cancel()
-        ticks = max(1, len(list(rounds(self.trigger)))) if self.one_at_a_time else 1
         for _ in range(ticks):
             self._send(self._tick)
             self._tick += 1
             interval = self._interval()
-            if self.one_at_a_time and self.tag.time >= stop:
+            if self.stop_time is not None and self._ends_late and self.tag.time >= to_nanoseconds(self.stop_time):
                 self._is_over, self._wake = True, None
                 return
         self._wake = self._wake_at(self.tag.time + interval)
+
+    def _ticks(self) -> int:
+        """How many ticks come now, where triggers let them come."""
+        if self.one_at_a_time:
+            return max(1, len(list(rounds(self.trigger))))
+        return int(self.stop_time is None or self.tag.time <= to_nanoseconds(self.stop_time))
 
 
 class SingleEvent(Actor):
