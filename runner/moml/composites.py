@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -15,7 +14,7 @@ from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
 from .counterpart import UNSAID, Counterpart, counterpart_of_type
 from .directors import director_of, said_of
-from .entities import Entity, Property, kind
+from .entities import Entity, Property, kind, version_of
 from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
@@ -428,12 +427,6 @@ class Conversion:
         if port in part.row.ports:
             return part.row.ports[port].ours
         return part.row.parameters[port].ours if port in part.row.parameters else snake(port)
-
-
-def version_of(model: Entity) -> tuple[int, int]:
-    """The version of Ptolemy that wrote a model; a recent one if that is not said."""
-    said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
-    return (int(said[1]), int(said[2])) if said is not None else (11, 0)
 
 
 def is_composite(entity: Entity) -> bool:
