@@ -48,6 +48,7 @@ class MetricOptions(TypedDict, total=False):
     unit: str
     to: str
     doc: str
+    label: str
 
 
 TAKES = {
