@@ -51,7 +51,7 @@ from .passing import (
 from .queues import Queue, Server, SharedQueue
 from .replay import Replay, ReplayError
 from .sinks import Display, Histogram, Recorder, Stop, Test
-from .sources import Clock, PoissonClock, Random, SingleEvent
+from .sources import Clock, PoissonClock, Random, SingleEvent, VaryingRandom
 from .statistics import MovingAverage, MovingStatistics
 from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
 from .triggered import Const, CurrentMicrostep, CurrentTime, Pulse, Ramp, Sequence
@@ -91,8 +91,8 @@ __all__ = [
     "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread", "StateMachine",
     "StateSpace", "Station", "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TextFunction",
     "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch",
-    "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "VonMises", "WaitingLine",
-    "WaitingTime", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text",
+    "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "VaryingRandom", "Vehicle", "VonMises",
+    "WaitingLine", "WaitingTime", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text",
     "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean",
     "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
     "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",

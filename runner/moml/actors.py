@@ -32,7 +32,7 @@ _DECORATION = re.compile(
 
 
 _UNIMPORTANT = frozenset({
-    "resetOnEachRun", "stopTimeIsLocal", "UNBOUNDED", "useLocalTime", "scaleOnLeft", "trainingMode",
+    "resetOnEachRun", "stopTimeIsLocal", "UNBOUNDED", "scaleOnLeft", "trainingMode",
 })  # fmt: skip
 
 
@@ -62,6 +62,7 @@ class Actor:
     widths: Mapping[str, int] = field(default_factory=dict)  # how many channels its ports have
     values: dict[str, Any] = field(default_factory=dict)  # what is written
     ports: dict[str, str] = field(default_factory=dict)  # ours, for those of its ports that the row does not know
+    unwired: set[str] = field(default_factory=set)  # ports of its own at which nothing counts
     used: set[str] = field(default_factory=set)  # the parameters of the model that it names
     told: set[str] = field(default_factory=set)  # parameters that are dealt with
     follow: Callable[[str, str], None] = lambda ours, text: None  # lets one of ours go by an expression over variables

@@ -202,8 +202,9 @@ class Conversion:
         row = self.rows.get(id(child))
         if row is None or row.is_view:
             return
-        for name in row.ports:
-            if not row.has_port(name) and level.entity.links.get(f"{child.name}.{name}"):
+        for port, links in level.entity.links.items():
+            actor, _, name = port.rpartition(".")
+            if actor == child.name and links and id(child) not in self.idle and self.face(child, name) is None:
                 self.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
 
     def _about_properties(self, level: Level) -> None:
@@ -304,7 +305,9 @@ class Conversion:
         actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
         actor.convert()
         level.used |= actor.used
-        part = Part(name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports)
+        part = Part(
+            name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports, frozenset(actor.unwired)
+        )
         if actor.row.type == "SetVariable":
             self.variables.note_setter(child, level, part)
         return part
@@ -314,7 +317,7 @@ class Conversion:
         """The seed that all random actors share: a value that one of them gives counts for the others."""
         for each in self.model.everything():
             said, row = each.properties.get("seed"), self.rows.get(id(each))
-            if said is not None and row is not None and row.type in ("Random", "PoissonClock"):
+            if said is not None and row is not None and row.type in ("Random", "VaryingRandom", "PoissonClock"):
                 try:
                     if (seed := self.scope_of(each).value_of(said)) not in (0, None):
                         return seed

@@ -6,10 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
-
-from epicycle import actors
-from epicycle.actors import declared_parameters
+from typing import TYPE_CHECKING
 
 from .actors import plain
 from .names import Names
@@ -36,6 +33,50 @@ def old_clock(actor: Actor) -> None:
     count = actor.get("numberOfCycles", -1)
     if isinstance(count, (int, float)) and count > 0:
         actor.values["cycles"] = int(count) + 1
+
+
+def sequential_clock(actor: Actor) -> None:
+    """The clock of former versions, which counts its cycles from its first tick."""
+    offsets = actor.get("offsets", [0.0, 1.0])
+    actor.told.discard("offsets")
+    if offsets and offsets[0]:
+        actor.notes.note(
+            f"{actor.path}.offsets: the first is {offsets[0]}, from which cycles count there, and here from 0"
+        )
+
+
+def _has_local_time(actor: Actor) -> bool:
+    """Whether there may be a time of its own where it is."""
+    around, found = actor.scope.around, False
+    while around is not None and around.around is not None:
+        found = found or any(each.java.endswith("Director") for each in around.entity.properties.values())
+        around = around.around
+    return found
+
+
+def global_time(actor: Actor) -> None:
+    """The time of the model."""
+    if _has_local_time(actor):
+        actor.notes.note(f"{actor.path} sends the time of the model, here that of the composite")
+
+
+def local_time(actor: Actor) -> None:
+    """The time where it is, unless it shall be that of the model."""
+    if actor.get("useLocalTime", True) is False:
+        global_time(actor)
+
+
+def wall_clock(actor: Actor) -> None:
+    """What it sends is the time since the run began, of which no model tells."""
+    actor.notes.note(f"{actor.path} sends how long the run has taken, in s: here 0.0")
+
+
+def chosen_input(actor: Actor) -> None:
+    """A ConfigurationSelect, of whose inputs one passes."""
+    names = ("trueInput", "falseInput")
+    chosen, other = names if actor.get("selector", False) is True else names[::-1]
+    actor.ports[chosen] = "input"
+    actor.unwired.add(other)
 
 
 def positive(*names: str) -> Special:
@@ -212,6 +253,11 @@ def delay_line(actor: Actor) -> None:
     actor.values |= {"past": initial[-2::-1], "expression": "block + past[::-1]"}
 
 
+def sample_delay(actor: Actor) -> None:
+    """SampleDelay: what is sent at the start comes one by one, with the first tokens."""
+    actor.values |= {"past": [plain(each) for each in actor.get("initialOutputs", [0])], "expression": "past[0]"}
+
+
 def repeat(actor: Actor) -> None:
     """Repeat, of single tokens or of blocks."""
     if (size := actor.get("blockSize", 1)) == 1:
@@ -229,12 +275,17 @@ def record_updater(actor: Actor) -> None:
     actor.values |= {"fields": names, "onto": "input"}
 
 
-def single(port: str) -> Special:
-    """An actor whose channels go their own ways, which ours cannot."""
+def extreme_of_array(function: str) -> Special:
+    """ArrayMinimum or ArrayMaximum, which may tell the place, too: of equals the first."""
 
     def convert(actor: Actor) -> None:
-        if (width := actor.widths.get(port, 0)) > 1:
-            actor.notes.error(f"{actor.path}.{port} has {width} channels, each of which has no counterpart")
+        best = f"{function}(input)"
+        if not actor.widths.get("index", 0):
+            actor.values["expression"] = best
+            return
+        place = f"[k for k in range(len(input)) if input[k] == {best}][0]"
+        found = f"a -> a on input do output = {best}; index = {place}"
+        actor.values = {"type": "StateMachine", "modes": ["a"], "transitions": [found]}
 
     return convert
 
@@ -310,84 +361,6 @@ def sequence(actor: Actor) -> None:
 def execution_time(actor: Actor) -> None:
     """What it sends is how long the computer took, which no model tells."""
     actor.notes.note(f"{actor.path} sends how long a computation took, in ms: here 0")
-
-
-def random(law: str, **parameters: str) -> Special:
-    """A Random with a distribution: ``ours="theirs=default"``."""
-
-    def convert(actor: Actor) -> None:
-        found: dict[str, Any] = {"type": law}
-        for ours, said in parameters.items():
-            name, _, default = said.partition("=")
-            if actor.widths.get(name, 0):
-                actor.notes.error(f"{actor.path}.{name}: a distribution that changes in a run has no counterpart")
-            value = actor.get(name, actor.scope.value(default))
-            parameter = declared_parameters(getattr(actors, law))[ours]
-            if parameter.required or parameter.default != value:
-                found[ours] = value
-        actor.values["distribution"] = found
-        generator(actor)
-
-    return convert
-
-
-def java_hash(text: str) -> int:
-    """The hash of a text in Java."""
-    found = 0
-    for character in text:
-        found = (31 * found + ord(character)) % 2**32
-    return found - 2**32 if found >= 2**31 else found
-
-
-def generator(actor: Actor) -> None:
-    """The numbers of Java's generators, where the model fixes them: by a seed of its own, or by the shared one."""
-    own, shared = actor.get("privateSeed"), actor.get("seed", actor.seed)
-    kind = "DRand" if ".colt." in actor.entity.java else "JavaRandom"
-    if (made := actor.text("generatorClass", "DRand")) != "DRand":
-        actor.notes.note(f"{actor.path}.generatorClass = {made!r}: has no counterpart, the numbers are others")
-    elif isinstance(own, int) and not isinstance(own, bool):
-        actor.values["generator"] = {"type": kind, "seed": own}
-    elif isinstance(shared, int) and shared:
-        actor.values["generator"] = {"type": kind, "seed": shared + java_hash(actor.full_name)}
-
-
-def poisson_clock(actor: Actor) -> None:
-    """Its stop time, and its random numbers."""
-    finite_stop(actor)
-    generator(actor)
-
-
-def colt_exponential(actor: Actor) -> None:
-    """Its lambda is the rate."""
-    rate = actor.get("lambda", 1.0)
-    actor.values["distribution"] = {"type": "Exponential", **({} if rate == 1.0 else {"mean": 1.0 / rate})}
-    generator(actor)
-
-
-def colt_gamma(actor: Actor) -> None:
-    """Its alpha is the shape, its lambda the rate."""
-    shape, rate = actor.get("alpha", 1.0), actor.get("lambda", 1.0)
-    actor.values["distribution"] = {"type": "Gamma", "shape": shape, "mean": shape / rate}
-    generator(actor)
-
-
-def colt_negative_binomial(actor: Actor) -> None:
-    """Its p is the probability of what is not counted."""
-    probability = 1.0 - actor.get("p", 0.5)
-    actor.values["distribution"] = {
-        "type": "NegativeBinomial",
-        "successes": actor.get("n", 1),
-        "probability": probability,
-    }
-    generator(actor)
-
-
-def colt_breit_wigner(actor: Actor) -> None:
-    """Its gamma is the width at half the height."""
-    found = {"type": "Cauchy", "median": actor.get("mean", 1.0), "scale": actor.get("gamma", 1.0) / 2.0}
-    cut = actor.get("cut", 1.0)
-    actor.values["distribution"] = found if math.isinf(cut) else {**found, "cut": cut}
-    generator(actor)
 
 
 def fields(direction: str) -> Special:
