@@ -17,8 +17,10 @@ from .directors import director_of, said_of
 from .document import MomlError, read_document
 from .entities import Builder, Entity
 from .former import rename_former
+from .instances import expand_instances
 from .names import Names
 from .notes import Notes
+from .publishing import plain_channels
 from .writing import Flow, block
 
 LIKE = {"like": "ptolemy"}
@@ -60,6 +62,8 @@ def _refusal(name: str, reasons: list[str]) -> str:
 
 def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]) -> str:
     rename_former(model)
+    expand_instances(model, notes)
+    plain_channels(model, notes)
     join_channels(model, notes)
     conversion = Conversion(model, notes, own)
     level = conversion.level(model, "")

@@ -24,7 +24,7 @@ def connections_of(conversion: Converting, level: Level) -> list[Any]:
         if each.sinks and not each.sources and any("." in sink for sink in each.sinks):
             level_path = level.told(each.sinks[0])
             conversion.notes.note(f"{level_path} is connected to nothing that sends")
-    written = [each.written() for each in _ordered(lines, conversion, level)]
+    written = [line for each in _ordered(lines, conversion, level) for line in each.written()]
     for (composite, path), port in conversion.triggers.items():
         actor, _, name = path.rpartition(".")
         if composite == id(level.entity) and (part := level.parts.get(actor)) is not None:
@@ -40,10 +40,15 @@ class _Line:
         self.ends: list[End] = net.ends
         self.sources: list[str] = []
         self.sinks: list[str] = []
+        self.again: list[str] = []  # ports to which it leads by more than one channel
         for end in net.ends:
             found = conversion.end(level, end)
-            if found is not None and found[0] not in (self.sources if found[1] else self.sinks):
+            if found is None:
+                continue
+            if found[0] not in (self.sources if found[1] else self.sinks):
                 (self.sources if found[1] else self.sinks).append(found[0])
+            elif not found[1]:
+                self.again.append(found[0])
         self.shared = self._is_shared(conversion, level, counting)
 
     def _is_shared(self, conversion: Converting, level: Level, counts: Counting) -> bool:
@@ -54,11 +59,14 @@ class _Line:
             return False
         return any(_sends_by_channel(conversion, level, end) for end in self.ends)
 
-    def written(self) -> Any:
-        sources, sinks = ", ".join(self.sources), ", ".join(self.sinks)
+    def written(self) -> list[Any]:
+        """The line, and more of them where it leads to a port by several channels."""
+        return [self._written(self.sinks), *(self._written([each]) for each in self.again)]
+
+    def _written(self, sinks: list[str]) -> Any:
         if not self.shared:
-            return f"{sources} -> {sinks}"
-        one = [each[0] if len(each) == 1 else each for each in (self.sources, self.sinks)]
+            return f"{', '.join(self.sources)} -> {', '.join(sinks)}"
+        one = [each[0] if len(each) == 1 else each for each in (self.sources, sinks)]
         return Flow({"from": one[0], "to": one[1], "shared": True})
 
 
