@@ -17,6 +17,7 @@ from .directors import director_of, said_of
 from .document import MomlError, read_document
 from .entities import Builder, Entity
 from .former import rename_former
+from .higher_order import plain_composites
 from .instances import expand_instances
 from .names import Names
 from .notes import Notes
@@ -63,6 +64,7 @@ def _refusal(name: str, reasons: list[str]) -> str:
 def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]) -> str:
     rename_former(model)
     expand_instances(model, notes)
+    plain_composites(model, notes)
     plain_channels(model, notes)
     join_channels(model, notes)
     conversion = Conversion(model, notes, own)

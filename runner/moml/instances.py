@@ -6,8 +6,8 @@ from copy import deepcopy
 from itertools import count
 
 from .actors import face_of
-from .entities import ABSTRACT_COMPOSITE, MAX_ENTITIES, Entity, Link, Property, Relation, kind
 from .document import MomlError
+from .entities import ABSTRACT_COMPOSITE, MAX_ENTITIES, Entity, Link, Property, Relation, kind
 from .notes import Notes
 from .scope import Scope
 from .syntax import ExpressionError
@@ -61,7 +61,7 @@ class _Expansion:
                         self._join(composite, first, each, name, link.relation)
 
     def _join(self, composite: Entity, first: Entity, each: Entity, port: str, relation: str) -> None:
-        """Join a port of an instance with what that of the first is joined with: a multiport by a channel of its own."""
+        """Join a port of an instance with what that of the first is joined with, a multiport by one more channel."""
         sends = first.ports[port].flag("output")
         joined = relation
         others = [path for path, links in composite.links.items() if any(link.relation == relation for link in links)]
