@@ -273,6 +273,8 @@ def face_of(actor_row: Counterpart | None, entity: Entity, port: str) -> PortFac
     said = entity.ports.get(port)
     if said is not None and (said.flag("input") or said.flag("output")):
         return PortFace("input" if said.flag("input") else "output", said.flag("multiport"))
-    if actor_row is not None and port in actor_row.parameters:  # the port of a PortParameter
+    said_parameter = entity.properties.get(port)
+    is_parameter = said_parameter is not None and said_parameter.java.endswith("PortParameter")
+    if actor_row is not None and (port in actor_row.parameters or is_parameter):  # the port of a PortParameter
         return PortFace("input", False)
     return None

@@ -189,6 +189,7 @@ class Conversion:
         for port in entity.ports.values():
             for said in port.properties.values():
                 known = said.name in ("input", "output", "multiport") or is_layout(said) or is_decoration(said)
+                known = known or (said.name == "defaultValue" and kind(entity) == "Expression")
                 if not known and said.value:
                     path = (
                         f"{level.told(entity.name)}.{port.name}"
@@ -300,7 +301,7 @@ class Conversion:
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
             f".{self.model.name}.{level.told(child.name)}", self._seed, whole_ports(self, level.entity, child),
-            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
+            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports, *child.properties}},
         )  # fmt: skip
         actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
         actor.convert()

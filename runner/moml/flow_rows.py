@@ -103,6 +103,7 @@ FLOW: Mapping[str, Counterpart] = {
     "RemoveNilTokens": counterpart("Filter", fixed={"condition": "True"}),
     "Current": counterpart("Filter", fixed={"condition": "True"}),
     "NonStrictDelay": counterpart("Previous", initialValue="value:initial"),
+    "Pre": counterpart("Previous", initialValue="value:initial"),
     "SampleDelay": counterpart("BlockExpression", special=how.sample_delay),
     "Sleep": counterpart("Filter", "input* | output*", fixed={"condition": "True"}, sleepTime="nothing"),
     "ExecutionTime": counterpart(

@@ -19,6 +19,7 @@ from .entities import Builder, Entity
 from .former import rename_former
 from .higher_order import plain_composites
 from .instances import expand_instances
+from .iterations import plain_iterations
 from .names import Names
 from .notes import Notes
 from .publishing import plain_channels
@@ -65,6 +66,7 @@ def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]
     rename_former(model)
     expand_instances(model, notes)
     plain_composites(model, notes)
+    plain_iterations(model, notes)
     plain_channels(model, notes)
     join_channels(model, notes)
     conversion = Conversion(model, notes, own)

@@ -112,9 +112,10 @@ def expression(actor: Actor) -> None:
     actor.told.add("expression")
     text = (said.value if said is not None else "") or ""
     names = Names(("output", "gives", "hold"), in_expressions=True)
-    for port in actor.entity.ports.values():
-        if port.flag("input"):
-            actor.ports[port.name] = names.of(port.name)
+    held = _held(actor)
+    for name in [port.name for port in actor.entity.ports.values() if port.flag("input")] + list(held):
+        if not _is_port_parameter(actor, name) or name in held:
+            actor.ports[name] = names.of(name)
     for name, ours in names.renamed().items():
         actor.notes.note(f"{actor.path}.{name} is called {ours}")
     try:
@@ -124,11 +125,36 @@ def expression(actor: Actor) -> None:
     except ExpressionError as error:
         actor.notes.error(f"{actor.path}: expression: {error}")
         return
-    if "iteration" in names_of(tree):
+    if held:
+        named = {name: value for name, value in held.items() if name in names_of(tree)}
+        actor.values |= {"type": "HoldingExpression", "held": {actor.ports[name]: each for name, each in named.items()}}
+    elif "iteration" in names_of(tree):
         actor.values["iteration"] = True
     actor.values["expression"] = _with_all(
         ours, [each for port, each in actor.ports.items() if actor.widths.get(port, 0)]
     )
+
+
+def _is_port_parameter(actor: Actor, name: str) -> bool:
+    said = actor.entity.properties.get(name)
+    return said is not None and said.java.endswith("PortParameter")
+
+
+def _held(actor: Actor) -> dict[str, object]:
+    """The values of inputs that hold one from the start: linked PortParameters, and ports with a default."""
+    found: dict[str, object] = {}
+    said = {name: each for name, each in actor.entity.properties.items() if _is_port_parameter(actor, name)}
+    said = {name: each for name, each in said.items() if actor.widths.get(name, 0)}
+    for port in actor.entity.ports.values():
+        default = port.properties.get("defaultValue")
+        if default is not None and (default.value or "").strip() and port.flag("input"):
+            said[port.name] = default
+    for name, each in said.items():
+        try:
+            found[name] = plain(actor.scope.value_of(each))
+        except (ExpressionError, ValueError) as error:
+            actor.notes.error(f"{actor.path}.{name} = {each.value!r}: {error}")
+    return found
 
 
 def _with_all(text: str, ports: list[str]) -> str:

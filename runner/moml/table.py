@@ -23,7 +23,6 @@ _SINKS: Mapping[str, Counterpart] = {
         special=checks.strict_test,
         tolerance="number",
         requireAllCorrectValues="flag:complete",
-        requireOrderedValues="none",
     ),
     "NonStrictTest": counterpart(
         "Test",
@@ -31,7 +30,6 @@ _SINKS: Mapping[str, Counterpart] = {
         special=checks.non_strict_test,
         tolerance="number",
         requireAllCorrectValues="flag:complete",
-        requireOrderedValues="none",
     ),
     "Recorder": counterpart("Recorder", "input* |", special=how.positive("capacity"), capacity="whole"),
     "Stop": counterpart("Stop", "input* |"),
