@@ -9,6 +9,7 @@ from typing import Any
 from .actors import is_decoration, is_layout, plain, seconds
 from .entities import Entity, Property, kind
 from .parts import Converting, Level
+from .reasons import why_not
 from .scope import Scope
 from .syntax import ExpressionError
 from .writing import Flow
@@ -84,7 +85,9 @@ def aspects_of(conversion: Converting, level: Level) -> dict[str, Flow]:
             if make is None and not here:
                 conversion.notes.note(f"{level.told(aspect.name)}, a {aspect.java}: stands nowhere, and is left out")
             elif make is None:
-                conversion.notes.error(f"{level.told(aspect.name)} is a {aspect.java}, which has no counterpart")
+                conversion.notes.error(
+                    f"{level.told(aspect.name)} is a {aspect.java}, which has no counterpart{why_not(aspect.java)}"
+                )
             else:
                 made += make(conversion, level, aspect, here)
         except (ExpressionError, ValueError, TypeError) as error:

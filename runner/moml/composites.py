@@ -12,14 +12,15 @@ from epicycle.actors import Actor as OwnActor
 
 from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
-from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
+from .aspects import MODELS, aspects_of, is_aspect, is_request, is_response
 from .counterpart import UNSAID, Counterpart, counterpart_of_type
 from .directors import director_of, said_of
 from .entities import Entity, Property, kind
+from .leftovers import about_links, about_ports, about_properties, about_unknown, is_watched
 from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
-from .parts import Level, Part
+from .parts import Level, Part, give_priority
 from .reach import iterations, leave_out_idle
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
@@ -156,8 +157,8 @@ class Conversion:
         for child in entity.entities.values():
             if child.name in level.requests:
                 continue
-            self._about_ports(child, level)
-            self._about_links(child, level)
+            about_ports(self, child, level)
+            about_links(self, child, level)
             part = level.parts[child.name] = self._part(child, level)
             if part is not None:
                 actors[part.name] = part.entry
@@ -181,39 +182,8 @@ class Conversion:
         aspects = {**aspects_of(self, level), **following}
         if aspects:
             found["aspects"] = aspects
-        self._about_properties(level)
+        about_properties(self, level)
         return found
-
-    def _about_ports(self, entity: Entity, level: Level) -> None:
-        """What the file says of ports and has no counterpart."""
-        for port in entity.ports.values():
-            for said in port.properties.values():
-                known = said.name in ("input", "output", "multiport") or is_layout(said) or is_decoration(said)
-                known = known or (said.name == "defaultValue" and kind(entity) == "Expression")
-                if not known and said.value:
-                    path = (
-                        f"{level.told(entity.name)}.{port.name}"
-                        if entity is not level.entity
-                        else level.told(port.name)
-                    )
-                    self.notes.note(f"{path}.{said.name} = {said.value!r}: has no counterpart")
-
-    def _about_links(self, child: Entity, level: Level) -> None:
-        """Ports to which something is linked, and that actors of ours do not have."""
-        row = self.rows.get(id(child))
-        if row is None or row.is_view:
-            return
-        for port, links in level.entity.links.items():
-            actor, _, name = port.rpartition(".")
-            if actor == child.name and links and id(child) not in self.idle and self.face(child, name) is None:
-                self.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
-
-    def _about_properties(self, level: Level) -> None:
-        for name, said in level.entity.properties.items():
-            if is_layout(said) or is_decoration(said) or is_variable(said) or kind(said).endswith("Director"):
-                continue
-            if said.value is not None or said.java:
-                self.notes.note(f"{level.told(name)}, a {kind(said) or 'property'}: has no counterpart")
 
     def parameters(self, level: Level) -> dict[str, Any]:
         """The parameters that something inside names."""
@@ -293,15 +263,16 @@ class Conversion:
         if id(child) in self.idle:
             return None
         if row is None:
-            self._unknown(child, level)
+            about_unknown(self, child, level)
             return None
-        if row.is_view and not self._is_watched(child, level):
+        if row.is_view and not is_watched(self, child, level):
             self.notes.count("view")
             return None
+        known = {*row.ports, *child.ports, *child.properties}
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
             f".{self.model.name}.{level.told(child.name)}", self._seed, whole_ports(self, level.entity, child),
-            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports, *child.properties}},
+            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in known},
         )  # fmt: skip
         actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
         actor.convert()
@@ -326,45 +297,6 @@ class Conversion:
                     continue
         return 0
 
-    def _unknown(self, child: Entity, level: Level) -> None:
-        told = level.told(child.name)
-        linked = [
-            port.rpartition(".")[2]
-            for port, links in level.entity.links.items()
-            if port.startswith(f"{child.name}.") and links
-        ]
-        if not linked and is_layout(child):
-            return
-        if not linked:
-            self.notes.note(
-                f"{told} is a {child.java}, has no counterpart, and is left out: nothing is connected to it"
-            )
-        elif all(self._only_takes(child, port) for port in linked):
-            self.notes.note(f"{told} is a {child.java}, has no counterpart, and is left out: it only takes what comes")
-        else:
-            self.notes.error(f"{told} is a {child.java}, which has no counterpart")
-
-    def _only_takes(self, child: Entity, port: str) -> bool:
-        face = self.face(child, port)
-        return face is not None and face.direction == "input" and (port.startswith("input") or port in child.ports)
-
-    def _is_watched(self, child: Entity, level: Level) -> bool:
-        """Whether a view cannot be left out: an aspect stands there, or it takes a channel of a multiport."""
-        if is_decorated(child):
-            return True
-        relations = {
-            link.relation
-            for port, links in level.entity.links.items()
-            if port.startswith(f"{child.name}.")
-            for link in links
-        }
-        for port, links in level.entity.links.items():
-            face = self.wiring._face(level.entity, port)
-            is_one = face is not None and face.multi and face.direction == "output" and "." in port and len(links) > 1
-            if is_one and relations & {link.relation for link in links}:
-                return True
-        return False
-
     def composite_part(self, child: Entity, level: Level, name: str) -> Part:
         """A composite as an instance of a class of ours."""
         inner = self.level(child, level.told(child.name), f"{level.at}{name}.", level)
@@ -375,9 +307,7 @@ class Conversion:
             if body.get("actors"):
                 body = _with_director(body, found)
         entry = self.instance(child, body, values)
-        for said in child.properties.values():
-            if said.name == "_priority" or kind(said) == "Priority":
-                entry["priority"] = inner.scope.value_of(said)
+        give_priority(entry, child, inner.scope, self.notes)
         return Part(name, entry)
 
     def class_name(self, name: str) -> str:

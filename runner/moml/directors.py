@@ -8,6 +8,7 @@ from typing import Any
 from .actors import is_layout, plain, seconds
 from .entities import Entity, Property, kind
 from .notes import Notes
+from .reasons import why_not
 from .scope import Scope
 from .syntax import ExpressionError
 
@@ -42,7 +43,7 @@ def said_of(director: Property, path: str, around: Scope, notes: Notes, *, of_mo
     if fires_whole(director) and not of_model:
         notes.note(f"{path}, a {kind(director)}: what is inside fires by the rules of DE")
     elif kind(director) not in _DE_LIKE:
-        notes.error(f"{path} is a {director.java}, which has no counterpart")
+        notes.error(f"{path} is a {director.java}, which has no counterpart{why_not(director.java)}")
     for name, said in director.properties.items():
         if is_layout(said) or name in _WITHOUT_EFFECT:
             continue

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from .counterpart import Counterpart
-from .entities import Entity
+from .entities import Entity, kind
 from .names import Names
 from .notes import Notes
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope
+from .syntax import ExpressionError
 from .writing import Flow
 
 
@@ -77,3 +78,13 @@ class Converting(Protocol):
     def parameters(self, level: Level) -> dict[str, Any]: ...
     def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow: ...
     def composite_part(self, child: Entity, level: Level, name: str) -> Part: ...
+
+
+def give_priority(entry: Flow, entity: Entity, scope: Scope, notes: Notes) -> None:
+    """Put the priority of a composite or machine into its entry, if it has one."""
+    for said in entity.properties.values():
+        if (said.name == "_priority" or kind(said) == "Priority") and (said.value or "").strip():
+            try:
+                entry["priority"] = scope.value_of(said)
+            except ExpressionError as error:
+                notes.note(f"{entity.name}.{said.name} = {said.value!r}: {error}")

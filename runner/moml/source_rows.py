@@ -80,6 +80,9 @@ SOURCES: Mapping[str, Counterpart] = {
     "WallClockTime": counterpart(
         "Const", "trigger* | output", needs="trigger", special=how.wall_clock, fixed={"value": 0.0}
     ),
+    "TestActorPortDepth": counterpart(
+        "Const", "trigger | output", needs="trigger", special=how.depths, fixed={"value": ""}
+    ),
     "EventButton": counterpart("Filter", "trigger*=input | output", fixed={"condition": "False"}),
     "GetCurrentMicrostep": counterpart("CurrentMicrostep", "trigger* input=trigger | output"),
 }

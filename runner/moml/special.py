@@ -71,6 +71,11 @@ def wall_clock(actor: Actor) -> None:
     actor.notes.note(f"{actor.path} sends how long the run has taken, in s: here 0.0")
 
 
+def depths(actor: Actor) -> None:
+    """What it sends names all that Ptolemy's director knows."""
+    actor.notes.note(f"{actor.path} sends the depths of all actors and ports there: here an empty text")
+
+
 def chosen_input(actor: Actor) -> None:
     """A ConfigurationSelect, of whose inputs one passes."""
     names = ("trueInput", "falseInput")

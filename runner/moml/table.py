@@ -93,6 +93,7 @@ _ALSO = {
     "TimedDelay": "TimeDelay",
     "VariableDelay": "TimeDelay",
     "IntRamp": "Ramp",
+    "ConstPlaceable": "Const",
 }
 
 _NAMED: Mapping[str, Counterpart] = {**SOURCES, **RANDOM, **TIME, **FLOW, **COMPUTING, **_SINKS}

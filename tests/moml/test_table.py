@@ -1,4 +1,4 @@
-"""Every row of the table: an actor with something at each of its ports, and all parameters given, is imported and runs."""
+"""Every row of the table: with something at each port, and all parameters given, it is imported and runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ VALUES = {
 GIVEN: dict[str, dict[str, object]] = {
     "Expression": {"expression": "2 * x"},
     "Pulse": {"indexes": "{0}"},
-    **dict.fromkeys(("Test", "NonStrictTest"), {"correctValues": "{1}"}),
+    "NonStrictTest": {"correctValues": "{1}"},
+    "Test": {"correctValues": "{1}"},
     "SetVariable": {"variableName": "P"},
     "Sequence": {"repeat": "false"},
     "IIR": {"numerator": "{1.0}", "denominator": "{1.0}"},
@@ -43,6 +44,7 @@ SAID = {
     "ExecutionTime": ["A sends how long a computation took, in ms: here 0"],
     "WallClockTime": ["A sends how long the run has taken, in s: here 0.0"],
     "SequenceToArray": ["A.arrayLength has no counterpart: its wires are left out"],
+    "TestActorPortDepth": ["A sends the depths of all actors and ports there: here an empty text"],
     "SingleEvent": ["A.trigger has no counterpart: its wires are left out"],
 }
 
