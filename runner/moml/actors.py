@@ -65,7 +65,8 @@ class Actor:
     unwired: set[str] = field(default_factory=set)  # ports of its own at which nothing counts
     used: set[str] = field(default_factory=set)  # the parameters of the model that it names
     told: set[str] = field(default_factory=set)  # parameters that are dealt with
-    follow: Callable[[str, str], None] = lambda ours, text: None  # lets one of ours go by an expression over variables
+    # Lets one of ours go by an expression over variables, or by the variable that a parameter of some name is.
+    follow: Callable[[str, str, str], None] = lambda ours, text, name: None
 
     # -- what is said in the file ---------------------------------------------------------------------------------
 
@@ -153,6 +154,7 @@ class Actor:
         said = self.said(name)
         if row.kind == "nothing":
             return
+        self.follow(row.ours, "" if said is None or is_text(said) else said.value or "", name)
         if said is None or not (said.value or "").strip():
             if row.default is not UNSAID and self.values.get(row.ours, UNSAID) is UNSAID:
                 self.values[row.ours] = written(row.default, row.kind)
@@ -166,8 +168,6 @@ class Actor:
         try:
             found = self.scope.value_of(said)
             self.values[row.ours] = self._by_name(said, found, row.kind) or written(found, row.kind)
-            if not is_text(said):
-                self.follow(row.ours, said.value or "")
         except (ExpressionError, TypeError, ValueError, OverflowError) as error:
             self.notes.error(f"{self.path}.{name} = {_brief(said.value or '')}: {error}")
 

@@ -274,7 +274,7 @@ class Conversion:
             f".{self.model.name}.{level.told(child.name)}", self._seed, whole_ports(self, level.entity, child),
             {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in known},
         )  # fmt: skip
-        actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
+        actor.follow = lambda ours, text, name: self.variables.follow(actor, level, ours, text, name)
         actor.convert()
         level.used |= actor.used
         part = Part(

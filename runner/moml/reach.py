@@ -7,6 +7,7 @@ from collections import Counter
 from epicycle.actors import InputPort, declared_ports
 
 from ..catalogue import built_in
+from .counterpart import Counterpart
 from .directors import director_of, fires_whole
 from .entities import Entity
 from .parts import Converting
@@ -17,10 +18,11 @@ MAX_ROUNDS = 200
 
 def leave_out_idle(conversion: Converting) -> None:
     """Leave out what can never fire, and then what nothing is left for."""
+    inputs: dict[int, list[str]] = {}
     for _ in range(MAX_ROUNDS):
         counting = Counting(conversion)
         composites = list(conversion.model.everything())
-        idle = [(each, found) for each in composites for found in _idle(conversion, each, counting)]
+        idle = [(each, found) for each in composites for found in _idle(conversion, each, counting, inputs)]
         if not idle:
             return
         for composite, (child, port) in idle:
@@ -29,7 +31,9 @@ def leave_out_idle(conversion: Converting) -> None:
             conversion.notes.note(f"{path} is left out: it never fires, for nothing sends to its {port}")
 
 
-def _idle(conversion: Converting, composite: Entity, counting: Counting) -> list[tuple[Entity, str]]:
+def _idle(
+    conversion: Converting, composite: Entity, counting: Counting, inputs: dict[int, list[str]]
+) -> list[tuple[Entity, str]]:
     found = []
     for child in composite.entities.values():
         row = conversion.rows.get(id(child))
@@ -40,6 +44,12 @@ def _idle(conversion: Converting, composite: Entity, counting: Counting) -> list
             continue
         if row.needs and not any(_is_fed(conversion, composite, child, name, counting) for name in row.needs):
             found.append((child, " and ".join(sorted(row.needs))))
+            continue
+        if id(child) not in inputs:
+            inputs[id(child)] = _inputs(conversion, child, row)
+        here = inputs[id(child)]
+        if not kind.is_source and not any(_is_fed(conversion, composite, child, name, counting) for name in here):
+            found.append((child, here[0] if here else "inputs"))
             continue
         declared = declared_ports(kind)
         several = Counter(said.ours for said in row.ports.values())
@@ -53,6 +63,13 @@ def _idle(conversion: Converting, composite: Entity, counting: Counting) -> list
                 found.append((child, name))
                 break
     return found
+
+
+def _inputs(conversion: Converting, child: Entity, row: Counterpart) -> list[str]:
+    """All inputs of an actor, those of parameters included."""
+    names = dict.fromkeys([*row.ports, *child.ports, *row.parameters, *child.properties])
+    faces = {name: conversion.face(child, name) for name in names}
+    return [name for name, face in faces.items() if face is not None and face.direction == "input"]
 
 
 def _is_fed(conversion: Converting, composite: Entity, child: Entity, port: str, counting: Counting) -> bool:

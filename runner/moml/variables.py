@@ -51,6 +51,10 @@ class Variables:
         around = self._conversion.container_of(entity)
         if not name or around is None:
             return
+        child, _, inner = name.rpartition(".")
+        if child and (not inner or (found_child := around.entities.get(child)) is None or found_child.entities):
+            path = self._conversion.path_of(around, entity)
+            self._conversion.notes.note(f"{path} sets {name}, which is no parameter of an actor beside it")
         home = None if scope.around is None else scope.around.home(name)
         owner = around if home is None or not isinstance(home.entity, Entity) else home.entity
         found = self._found.setdefault((id(owner), name), Changing(owner, name))
@@ -120,9 +124,12 @@ class Variables:
             changing.actor = level.names.fresh(f"{changing.name}_variable")
         return changing.actor
 
-    def follow(self, actor: Actor, level: Level, ours: str, text: str) -> None:
-        """Let a parameter of an actor go by the variables that its expression names."""
-        found = self.said(text, actor.scope)
+    def follow(self, actor: Actor, level: Level, ours: str, text: str, name: str) -> None:
+        """Let a parameter of an actor go by the variables that its expression names, or by the one that it is."""
+        found = self.said(text, actor.scope) if text else None
+        own = self._found.get((id(level.entity), f"{actor.entity.name}.{name}"))
+        if own is not None:
+            found = f"{self.actor_of(own)}.value", own
         if found is not None:
             expression, changing = found
             owner = self._conversion.levels[id(changing.owner)]

@@ -87,3 +87,12 @@ def test_a_row(tmp_path: Path, name: str) -> None:
     text = model(*clocks, made, *sinks, wires(*nets), stop=2)
     assert notes(tmp_path, text) == SAID.get(name, [])
     assert "A" in run(tmp_path, text).model.graph.actors
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_a_row_to_which_nothing_is_connected(tmp_path: Path, name: str) -> None:
+    """It is left out, unless it begins something by itself."""
+    java = next(each for each in (f"{LIB}{name}", f"{DE}{name}") if counterpart_of(each) is not None)
+    made = entity("A", java, NEEDED.get(name, ""), **GIVEN.get(name, {}))
+    others = entity("Clock", "DiscreteClock") + entity("Recorder", "Recorder")
+    run(tmp_path, model(made, others, wires("Clock.output Recorder.input"), stop=1))
