@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import ParameterError, declared_parameters
 
@@ -16,8 +16,11 @@ from .entities import Entity, Property
 from .notes import Notes
 from .relations import PortFace
 from .scope import Scope, is_text, is_variable
-from .syntax import ExpressionError
+from .syntax import ExpressionError, Tree
 from .translate import translated
+
+if TYPE_CHECKING:
+    from .variables import Changing
 
 _LAYOUT = re.compile(
     r"vergil|\.gui\.|[iI]con|Location|Annotation|SizeAttribute|WindowProperties|VersionAttribute|TextAttribute|"
@@ -67,6 +70,9 @@ class Actor:
     told: set[str] = field(default_factory=set)  # parameters that are dealt with
     # Lets one of ours go by an expression over variables, or by the variable that a parameter of some name is.
     follow: Callable[[str, str, str], None] = lambda ours, text, name: None
+    # What the names in an expression are that change in the run: each by the names of variables, and these.
+    changing: Callable[[Tree], tuple[dict[str, str], dict[str, Changing]]] = lambda tree: ({}, {})
+    reads: dict[str, Changing] = field(default_factory=dict)  # ports of ours to which variables lead
 
     # -- what is said in the file ---------------------------------------------------------------------------------
 
@@ -107,6 +113,7 @@ class Actor:
         for name, row in self.row.parameters.items():
             if name not in self.told:
                 self._parameter(name, row)
+        self._tell_fixed()
         given = {name: value for name, value in self.values.items() if not self._is_default(name, value)}
         self.values = {**self.row.fixed, **given}
         for name, said in self.entity.properties.items():
@@ -120,6 +127,16 @@ class Actor:
                 self._limit(name)
             elif not self._is_only_named(name, said):
                 self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: has no counterpart")
+
+    def _tell_fixed(self) -> None:
+        """Parameters from which something else was computed, though they change in the run."""
+        for name in sorted(self.told - self.row.parameters.keys()) if not self.reads else ():
+            said = self.said(name)
+            try:
+                if said is not None and not is_text(said) and self.changing(self.scope.tree(said.value or ""))[1]:
+                    self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: goes by what it is at the start")
+            except ExpressionError:
+                continue
 
     def _is_default(self, name: str, value: object) -> bool:
         """Whether our actor has this value anyway, under a director that is like Ptolemy's."""

@@ -205,6 +205,7 @@ class Conversion:
         for each in self.variables.of(level.entity):
             if each.is_port and each.name not in level.entity.ports:
                 found[0].append(level.ports.of(each.name))
+        found[0].extend(level.added_inputs)
         found[1].extend(level.added_outputs)
         return found
 
@@ -275,11 +276,14 @@ class Conversion:
             {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in known},
         )  # fmt: skip
         actor.follow = lambda ours, text, name: self.variables.follow(actor, level, ours, text, name)
+        actor.changing = lambda tree: self.variables.names_in(tree, actor.scope)
         actor.convert()
         level.used |= actor.used
         part = Part(
             name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports, frozenset(actor.unwired)
         )
+        for port, changing in actor.reads.items():
+            self.variables.lead_to(changing, level, f"{name}.{port}")
         if actor.row.type == "SetVariable":
             self.variables.note_setter(child, level, part)
         return part

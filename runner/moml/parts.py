@@ -43,6 +43,7 @@ class Level:
     used: set[str] = field(default_factory=set)
     parts: dict[str, Part | None] = field(default_factory=dict)
     requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are actors there
+    added_inputs: list[str] = field(default_factory=list)  # by which something in it knows a variable around it
     added_outputs: list[str] = field(default_factory=list)  # by which something in it sets a variable around it
     added_connections: list[str] = field(default_factory=list)
 

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 
 from .actors import plain
 from .names import Names
+from .scope import is_text
 from .syntax import ExpressionError
 from .translate import names_of, translated
 
 if TYPE_CHECKING:
     from .actors import Actor
+    from .variables import Changing
 
 Special = Callable[["Actor"], None]
 
@@ -125,14 +127,19 @@ def expression(actor: Actor) -> None:
         actor.notes.note(f"{actor.path}.{name} is called {ours}")
     try:
         tree = actor.scope.tree(text)
-        known = {**actor.ports, "time": "time", "iteration": "iteration"}
+        changing, actor.reads = actor.changing(tree)
+        held |= {name: _first_value(actor, each) for name, each in actor.reads.items()}
+        actor.ports |= {name: name for name in actor.reads}
+        known = {**changing, **actor.ports, "time": "time", "iteration": "iteration"}
         ours = translated(tree, known, actor.scope, {*actor.whole, "iteration"})
     except ExpressionError as error:
         actor.notes.error(f"{actor.path}: expression: {error}")
         return
     if held:
-        named = {name: value for name, value in held.items() if name in names_of(tree)}
+        named = {name: value for name, value in held.items() if name in names_of(tree) or name in actor.reads}
         actor.values |= {"type": "HoldingExpression", "held": {actor.ports[name]: each for name, each in named.items()}}
+        if "iteration" in names_of(tree):
+            actor.notes.error(f"{actor.path}: expression: iteration has no counterpart beside inputs that hold a value")
     elif "iteration" in names_of(tree):
         actor.values["iteration"] = True
     actor.values["expression"] = _with_all(
@@ -162,6 +169,31 @@ def _held(actor: Actor) -> dict[str, object]:
     return found
 
 
+def _of_variables(actor: Actor, name: str) -> str | None:
+    """A parameter in terms of variables, which are to be led to the actor; None if it does not change."""
+    said = actor.said(name)
+    try:
+        if said is None or is_text(said):
+            return None
+        tree = actor.scope.tree(said.value or "")
+        names, reads = actor.changing(tree)
+        actor.reads |= reads
+        return translated(tree, names, actor.scope) if reads else None
+    except ExpressionError:
+        return None
+
+
+def _first_value(actor: Actor, changing: Changing) -> object:
+    """The value of a variable before the first change."""
+    scope = actor.scope
+    while scope.entity is not changing.owner and scope.around is not None:
+        scope = scope.around
+    try:
+        return plain(scope(changing.name))
+    except (KeyError, ValueError):
+        return 0
+
+
 def _with_all(text: str, ports: list[str]) -> str:
     """The expression, in which all ports are named: one that is not would be no port."""
     left = [each for each in ports if not re.search(rf"(?<!\w){each}(?!\w)", text)]
@@ -183,6 +215,9 @@ def formula(template: str, **defaults: object) -> Special:
                 said[name] = name
                 if value is not None:
                     held[name] = plain(value)
+            elif (changing := _of_variables(actor, name)) is not None:
+                said[name] = f"({changing})"
+                held |= {each: _first_value(actor, variable) for each, variable in actor.reads.items()}
             else:
                 said[name] = f"({value!r})" if isinstance(value, (int, float)) and value < 0 else repr(value)
         if held:

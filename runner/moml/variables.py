@@ -5,6 +5,7 @@ Each is a ``Variable`` beside the actors of the composite that declares it; what
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from .actors import Actor, plain
@@ -29,6 +30,7 @@ class Changing:
     actor: str = ""  # our name of the Variable
     setters: list[str] = field(default_factory=list)  # what leads to it, as seen from the owner
     readers: list[tuple[str, str]] = field(default_factory=list)  # where parameters go by it, and how
+    inputs: list[str] = field(default_factory=list)  # to which it leads
 
 
 class Variables:
@@ -94,6 +96,27 @@ class Variables:
             return None if found is None else (translated(tree, names, scope), found)
         except ExpressionError:
             return None
+
+    def names_in(self, tree: Tree, scope: Scope) -> tuple[dict[str, str], dict[str, Changing]]:
+        """What changes of an expression: its names in terms of our names for variables, and these."""
+        if not self._found:
+            return {}, {}
+        names, _ = self._names(tree, scope, 0)
+        variables = {self.actor_of(each): each for each in self._found.values() if each.owner.entities}
+        ours = {name: text.replace(".value", "") for name, text in names.items()}
+        said = " ".join(ours.values())
+        return ours, {name: each for name, each in variables.items() if re.search(rf"(?<!\w){name}(?!\w)", said)}
+
+    def lead_to(self, changing: Changing, level: Level, port: str) -> None:
+        """Lead a variable to the input of an actor, through the composites between."""
+        here = level
+        while here.entity is not changing.owner and here.outer is not None:
+            name = here.names.fresh(f"{changing.name}_is")
+            here.added_inputs.append(name)
+            here.added_connections.append(f"{name} -> {port}")
+            port = f"{here.at.rstrip('.').rpartition('.')[2]}.{name}"
+            here = here.outer
+        changing.inputs.append(port)
 
     def _names(self, tree: Tree, scope: Scope, depth: int) -> tuple[dict[str, str], Changing | None]:
         names: dict[str, str] = {}
@@ -167,10 +190,32 @@ class Variables:
             )
             sources = [level.ports.of(each.name)] if each.is_port else each.setters
             connections += [f"{source} -> {name}.input" for source in sources]
+            setters = {source.partition(".")[0] for source in sources if not each.delayed and not each.is_port}
+            for port in each.inputs:
+                if setters & self._behind(level, port.partition(".")[0]):  # it is read on the way to where it is set
+                    connections.append(Flow({"from": f"{name}.value", "to": port, "delay": "0 s"}))
+                else:
+                    connections.append(f"{name}.value -> {port}")
             for path, expression in each.readers:
                 aspect = level.names.fresh(f"{each.name}_in_{path.replace('.', '_')}")
                 aspects[aspect] = Flow({"type": "Replace", "to": expression, "at": path})
         return aspects
+
+    def _behind(self, level: Level, name: str) -> set[str]:
+        """All parts of a composite to which tokens come from one of them, itself included, by our names."""
+        ways: dict[str, set[str]] = {}
+        for net in self._conversion.nets_of(level.entity):
+            ends = {end.actor: self._conversion.end(level, end) for end in net.ends if end.actor}
+            receivers = {found[0].partition(".")[0] for found in ends.values() if found is not None and not found[1]}
+            for found in ends.values():
+                if found is not None and found[1]:
+                    ways.setdefault(found[0].partition(".")[0], set()).update(receivers)
+        reached, waiting = {name}, [name]
+        while waiting:
+            for each in ways.get(waiting.pop(), set()) - reached:
+                reached.add(each)
+                waiting.append(each)
+        return reached
 
 
 def set_variable(actor: Actor) -> None:
