@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from epicycle.actors import ParameterError, declared_parameters
 
@@ -14,13 +14,11 @@ from ..catalogue import built_in
 from .counterpart import UNSAID, Counterpart, ParameterSaid
 from .entities import Entity, Property
 from .notes import Notes
+from .parts import Changing
 from .relations import PortFace
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError, Tree
 from .translate import translated
-
-if TYPE_CHECKING:
-    from .variables import Changing
 
 _LAYOUT = re.compile(
     r"vergil|\.gui\.|[iI]con|Location|Annotation|SizeAttribute|WindowProperties|VersionAttribute|TextAttribute|"

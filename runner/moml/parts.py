@@ -52,6 +52,20 @@ class Level:
         return f"{self.path}.{name}" if self.path else name
 
 
+@dataclass
+class Changing:
+    """One parameter that changes."""
+
+    owner: Entity
+    name: str
+    delayed: bool = True
+    is_port: bool = False  # of a composite, by which its values come
+    actor: str = ""  # our name of the Variable
+    setters: list[str] = field(default_factory=list)  # what leads to it, as seen from the owner
+    readers: list[tuple[str, str]] = field(default_factory=list)  # where parameters go by it, and how
+    inputs: list[str] = field(default_factory=list)  # to which it leads
+
+
 class Converting(Protocol):
     """The import of a model, as those know it who do a part of it."""
 

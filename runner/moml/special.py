@@ -16,7 +16,7 @@ from .translate import names_of, translated
 
 if TYPE_CHECKING:
     from .actors import Actor
-    from .variables import Changing
+    from .parts import Changing
 
 Special = Callable[["Actor"], None]
 

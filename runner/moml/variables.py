@@ -6,31 +6,16 @@ Each is a ``Variable`` beside the actors of the composite that declares it; what
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 
 from .actors import Actor, plain
 from .entities import Entity
-from .parts import Converting, Level, Part
+from .parts import Changing, Converting, Level, Part
 from .scope import Scope
 from .syntax import ExpressionError, Tree
 from .translate import names_of, translated
 from .writing import Flow
 
 _FIRST = -1000  # a priority: a new value counts for all who fire at that microstep
-
-
-@dataclass
-class Changing:
-    """One parameter that changes."""
-
-    owner: Entity
-    name: str
-    delayed: bool = True
-    is_port: bool = False  # of a composite, by which its values come
-    actor: str = ""  # our name of the Variable
-    setters: list[str] = field(default_factory=list)  # what leads to it, as seen from the owner
-    readers: list[tuple[str, str]] = field(default_factory=list)  # where parameters go by it, and how
-    inputs: list[str] = field(default_factory=list)  # to which it leads
 
 
 class Variables:
