@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Callable
 from typing import Any
@@ -38,6 +39,12 @@ def short(value: Any) -> str:
         text = value if isinstance(value, str) else repr(value)
     text = " ".join(text.split())
     return text if len(text) <= SHORT else text[: SHORT - 3] + "..."
+
+
+def json_line(value: Any, widest: int) -> str:
+    """Plain data as JSON on one line, its numbers to six digits, and not too much of it."""
+    text = json.dumps(six_digits(value), ensure_ascii=False)
+    return text if len(text) <= widest else f"{text[: widest - 3]}..."
 
 
 def rounded(value: float, width: float) -> str:

@@ -1,6 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
-from .figure import Figure, figure_types
+from .figure import Figure, Mark, Shape, figure_types
 from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
 from .packaged import (
     find,
@@ -37,10 +37,12 @@ __all__ = [
     "Catalogue",
     "CatalogueError",
     "Figure",
+    "Mark",
     "Measure",
     "ParameterReference",
     "PortReference",
     "PortTypeError",
+    "Shape",
     "TypeReference",
     "Types",
     "as_written",

@@ -1,9 +1,10 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import describe, imports, run, studies, trace
+from . import describe, imports, run, studies, trace, view
 
 COMMANDS = (
     run.run,
+    view.view,
     studies.study,
     studies.resume,
     studies.status,

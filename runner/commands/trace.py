@@ -122,12 +122,10 @@ def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], 
 
 
 def _token(token: Any) -> str:
-    """A token on one line, its numbers to six digits, and not too much of it."""
     from ..results import plain
-    from ..shown import six_digits
+    from ..shown import json_line
 
-    text = json.dumps(six_digits(plain(token)), ensure_ascii=False)
-    return text if len(text) <= WIDEST else f"{text[: WIDEST - 3]}..."
+    return json_line(plain(token), WIDEST)
 
 
 def _as_json(firing: Firing) -> str:

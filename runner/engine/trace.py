@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from epicycle.actors import Actor, InputPort, Tag, Wake, Way, When
 from epicycle.aspects import Job
@@ -23,13 +23,14 @@ from .way import Call
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """A token at an input port, the output port that sent it, and when."""
+    """A token at an input port, the output port that sent it, when, and the number of that record in the log."""
 
     port: str
     channel: int
     token: Any
     source: str
     sent: Tag
+    number: int
 
 
 @dataclass(slots=True)
@@ -49,13 +50,32 @@ class Firing:
     records: list[Record] = field(default_factory=list)
 
 
-class Tracer:
-    """Tells ``report`` of each firing of some actors, in order, when it is over."""
+class Origin(NamedTuple):
+    """What is on its way: which port sent it, when, and the number of that record in the log."""
 
-    def __init__(self, actors: Mapping[str, Actor], report: Callable[[Firing], None]) -> None:
+    port: str
+    tag: Tag
+    number: int
+
+
+class Tracer:
+    """Tells ``report`` of each firing of some actors, in order, when it is over.
+
+    Before, ``seen`` is told of each record of the log, in order: the record, whether it belongs to the firing that goes
+    on, and the number of the send that it is about: its own if it is a send, -1 if nothing has been sent yet.
+    """
+
+    def __init__(
+        self,
+        actors: Mapping[str, Actor],
+        report: Callable[[Firing], None],
+        seen: Callable[[Record, bool, int], None] | None = None,
+    ) -> None:
         self.actors = actors
         self.report = report
-        self.origin: tuple[str, Tag] = ("", Tag(0, 0))  # what is on its way just now: which port sent it, and when
+        self.seen = seen
+        self.count = 0  # of records
+        self.origin = Origin("", Tag(0, 0), -1)  # what is on its way just now
         self.firing: Firing | None = None  # the one that is going on
         self.releasing = False  # whether something that was kept is on its way
 
@@ -73,10 +93,17 @@ class Tracer:
     def add(self, record: Record) -> None:
         """Something has been written into the log."""
         if record.event == "send":
-            self.origin = (f"{record.actor}.{record.port}", record.tag)
+            self.origin = Origin(f"{record.actor}.{record.port}", record.tag, self.count)
+        self.count += 1
         # What aspects do at the actor's inputs is not its doing.
-        if record.actor not in self.actors or record.port not in self.actors[record.actor].outputs:
-            return
+        is_own = record.actor in self.actors and record.port in self.actors[record.actor].outputs
+        if is_own:
+            self._own(record)
+        if self.seen is not None:
+            is_about = record.event == "send" or not is_own  # at an output, nothing has been sent yet
+            self.seen(record, is_own, self.origin.number if is_about else -1)
+
+    def _own(self, record: Record) -> None:
         if self.firing is None or (self.firing.tag, self.firing.actor) != (record.tag, record.actor):
             self.begin(Firing(record.tag, record.actor, outside="released" if self.releasing else "resumed"))
         assert self.firing is not None

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from epicycle.actors import EpicycleError, Parameter, array_parameter, texts_parameter
+from epicycle.actors import Parameter, array_parameter, texts_parameter
 from epicycle.aspects import STAMP
 
-from ..catalogue import Figure
+from ..catalogue import Figure, Mark, Shape
 from ..results import Results, Signal, cell, leaves
 from ..shown import short
 from ..text import select
 from .pen import LIMIT, PALETTE, Sheet, legend_beside
+from .space import ellipses, positions, sights, tubes
 
 MAX_STATES = 24  # in a legend
 
@@ -38,9 +40,42 @@ class Trajectories(Figure):
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where the first robot is to arrive")
     safe_distance = Parameter(float, 2.0, unit="m", min=0.0, doc="radius of the obstacle's disc")
     interval = Parameter(float, 1.0, unit="s", min=1e-3, doc="time between dots, discs and ellipses")
+    plans = texts_parameter((), doc="signals of the robots' plans (patterns), which the page of a run shows as tubes")
+    sights = texts_parameter((), doc="signals of measurements (patterns), which the page shows as lines of sight")
+    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="time for which each control of a plan acts")
+    tube_initial = Parameter(float, 0.0, unit="m", min=0.0, doc="radius of a plan's tube where it begins")
+    tube_growth = Parameter(float, 0.0, unit="m", min=0.0, doc="by how much the radius grows in a period")
 
     def signal_patterns(self) -> tuple[str, ...]:
         return tuple(pattern for pattern in (*self.robots, self.obstacle, self.estimate) if pattern)
+
+    def mark_patterns(self) -> tuple[str, ...]:
+        return (*self.plans, *self.sights)
+
+    def marks(self, results: Results) -> Iterator[Mark]:
+        owners: dict[str, int] = {}  # the colour of what a robot sends is its own
+        for name in selected(self.robots, results):
+            owners[name.rpartition(".")[0]] = len(owners)
+
+        def made(names: Iterable[str], shape: Shape, colour: int | None, **look: float) -> Iterator[Mark]:
+            for name in names:
+                signal, path = results.signals[name], name.rpartition(".")[0]
+                times = signal.times
+                if shape == "tube":
+                    rows = tubes(signal, self.period, self.tube_initial, self.tube_growth)
+                elif shape == "line":
+                    seen, rows = sights(signal)
+                    times = times[seen]
+                else:
+                    rows = ellipses(signal) if shape == "ellipse" else positions(signal)
+                yield Mark(name, shape, times.tolist(), rows, colour=owners.get(path, colour), **look)
+
+        yield from made(selected(self.sights, results), "line", None)
+        yield from made(selected(self.plans, results), "tube", None)
+        yield from made([self.estimate] if self.estimate else [], "ellipse", None)
+        yield from made([self.obstacle] if self.obstacle else [], "body", None, radius=self.safe_distance)
+        yield from made(selected(self.robots, results), "body", 0)
+        yield Mark("goal", "goal", [0.0], np.array([self.goal], dtype=float))
 
     def draw(self, results: Results, path: Path) -> None:
         sheet = Sheet([_title(results)], heights=[4.4])
@@ -86,13 +121,12 @@ class Trajectories(Figure):
         from matplotlib.patches import Ellipse
 
         label: str | None = "estimate, 2 std. dev."
+        rows = ellipses(signal)
         for index in self._every(signal):
-            estimate = signal.tokens[index]
-            spread, axis = np.linalg.eigh(np.asarray(estimate.covariance)[:2, :2])
-            sizes = 4.0 * np.sqrt(np.maximum(spread[::-1], 0.0))  # two deviations to each side
-            angle = float(np.degrees(np.arctan2(axis[1, 1], axis[0, 1])))
+            x, y, along, across, angle = map(float, rows[index])
             look: Any = {"fill": False, "edgecolor": LIMIT, "linewidth": 0.8, "alpha": 0.8, "zorder": 3}
-            axes.add_patch(Ellipse(estimate.mean[:2], *sizes, angle=angle, label=label, **look))
+            place, turned = (x, y), float(np.degrees(angle))
+            axes.add_patch(Ellipse(place, 2.0 * along, 2.0 * across, angle=turned, label=label, **look))
             label = None
 
     def _every(self, signal: Signal) -> list[int]:
@@ -122,7 +156,7 @@ class TimeSeries(Figure):
         return self.signals
 
     def draw(self, results: Results, path: Path) -> None:
-        lines, strips = _leaves(self.signals, results)
+        lines, strips = read(self.signals, results)
         # Strips have a part of the sheet of their own, below the lines if there are any.
         heights = ([3.0] if lines or not strips else []) + ([0.3 + 0.3 * len(strips)] if strips else [])
         sheet = Sheet([_title(results), ""][: len(heights)], heights=heights, same_x=True)
@@ -184,7 +218,7 @@ class Histogram(Figure):
         return self.signals
 
     def draw(self, results: Results, path: Path) -> None:
-        numbers, states = _leaves(self.signals, results)
+        numbers, states = read(self.signals, results)
         sheet = Sheet([_title(results)], heights=[3.0])
         if numbers or not states:
             self._bins(sheet.axes[0], {name: np.array(values) for name, (_, values) in numbers.items()})
@@ -221,15 +255,7 @@ def selected(patterns: tuple[str, ...], results: Results) -> list[str]:
     return list(dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals)))
 
 
-def positions(signal: Signal) -> NDArray[np.float64]:
-    """The positions in a signal of body states, shape (n, 2); raises ``EpicycleError`` for other signals."""
-    try:
-        return np.array([token.position for token in signal.tokens], dtype=float).reshape(-1, 2)
-    except AttributeError:
-        raise EpicycleError(f"the tokens of {signal.name} have no 'position'") from None
-
-
-def _leaves(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
+def read(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
     """All numbers and all states in tokens, by signal and place in them, but for what says of when a token is.
 
     A state is None where there is something else; what never is one is left out.

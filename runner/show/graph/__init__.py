@@ -19,12 +19,23 @@ from epicycle.actors import EpicycleError
 
 from . import mermaid_text
 from .chart import Statechart, chart_text, statechart, write_statechart
-from .layout import draw
+from .layout import Drawing, draw
 from .outlines import Outline, outline
 
 PICTURES, TEXTS = (".svg", ".png", ".pdf"), (".mmd", ".md")
 
-__all__ = ["GraphError", "Outline", "Statechart", "check_graph_path", "mermaid", "outline", "statechart", "write_graph"]
+__all__ = [
+    "Drawing",
+    "GraphError",
+    "Outline",
+    "Statechart",
+    "check_graph_path",
+    "draw",
+    "mermaid",
+    "outline",
+    "statechart",
+    "write_graph",
+]
 
 
 class GraphError(EpicycleError):

@@ -74,6 +74,7 @@ class Pill:
     x: float
     y: float  # of its middle
     delay: int | None = None  # ns
+    place: str = ""  # where the aspect stands: path of a port, or of an actor or composite
 
     @property
     def width(self) -> float:
@@ -249,13 +250,14 @@ class _Scope:
                     ports.append(PlacedPort(port, side, edge, at, port.path in joined))
                     start = edge - HEAD - _pills_width(port) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
                     for aspect in port.aspects:
-                        drawing.pills.append(Pill(aspect, aspect, start, at))
+                        drawing.pills.append(Pill(aspect, aspect, start, at, place=port.path))
                         start += pill_width(aspect) + PILL_GAP
                     drawing.words.append(_port_name(ports[-1], child.is_open))
             drawing.words += self._names(child, left, upper, cell.width)
             hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
             for name in reversed(child.aspects):
-                drawing.pills.append(Pill(name, name, left + (cell.width - pill_width(name)) / 2, hidden))
+                middle = left + (cell.width - pill_width(name)) / 2
+                drawing.pills.append(Pill(name, name, middle, hidden, place=child.path))
                 hidden -= PILL_HEIGHT + PILL_GAP
             drawing.boxes.append(PlacedBox(child, left, upper, cell.width, cell.height, level, tuple(ports)))
             if child in self.inner:

@@ -28,8 +28,9 @@ from ...catalogue import Figure
 from ...results import Results
 from ...study import Plan, half_width
 from ...text import Problems
-from ..figures import positions, selected
+from ..figures import selected
 from ..pen import DASHES, FORMATS, PALETTE, draw
+from ..space import positions
 from .data import Condition, Data, Names
 from .figure import RunKey, SignalFigure
 

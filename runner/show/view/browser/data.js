@@ -1,0 +1,174 @@
+// The data of the page: runs in columns, as packing.py writes them, and the indices to look things up in them.
+
+const MISSING = -2, NOTHING = -1;
+
+async function readData(text) {
+  const packed = atob(text.trim()), bytes = new Uint8Array(packed.length);
+  for (let i = 0; i < packed.length; i++) bytes[i] = packed.charCodeAt(i);
+  const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const buffer = await new Response(unpacked).arrayBuffer();
+  const size = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)));
+  const body = new Uint8Array(buffer, 4 + size);
+  head.runs = head.runs.map((each) => new Run(each, (column) => readColumn(body, column)));
+  return head;
+}
+
+// Whole numbers are differences to the one before; the bytes of one place in all numbers stand together.
+function readColumn(body, [kind, start, count]) {
+  if (kind === "b") return body.subarray(start, start + count);
+  const width = kind === "d" ? 8 : 4, whole = new Uint8Array(width * count);
+  for (let plane = 0; plane < width; plane++) {
+    const from = start + plane * count;
+    for (let i = 0; i < count; i++) whole[i * width + plane] = body[from + i];
+  }
+  if (kind === "d") return new Float64Array(whole.buffer);
+  if (kind === "f") return new Float32Array(whole.buffer);
+  const numbers = new Int32Array(whole.buffer);
+  for (let i = 1; i < count; i++) numbers[i] += numbers[i - 1];
+  return numbers;
+}
+
+// Which rows have each number from 0 to count in a column; rows with a negative one are left out.
+class Index {
+  constructor(column, count) {
+    this.starts = new Int32Array(count + 1);
+    for (const number of column) if (number >= 0) this.starts[number + 1]++;
+    for (let i = 0; i < count; i++) this.starts[i + 1] += this.starts[i];
+    this.rows = new Int32Array(this.starts[count]);
+    const next = this.starts.slice(0, count);
+    column.forEach((number, row) => { if (number >= 0) this.rows[next[number]++] = row; });
+  }
+
+  of(number) {
+    return this.rows.subarray(this.starts[number], this.starts[number + 1]);
+  }
+}
+
+// The first of some places in a row for which something is so, if it is so for all after that, too.
+function search(count, isSo) {
+  let low = 0, high = count;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (isSo(middle)) high = middle;
+    else low = middle + 1;
+  }
+  return low;
+}
+
+class Run {
+  constructor(head, read) {
+    Object.assign(this, head);
+    for (const [name, column] of Object.entries(head.columns)) this[name] = read(column);
+    this.times = read(head.tags[0]); // ns
+    this.microsteps = read(head.tags[1]);
+    this.textBytes = read(head.texts[0]);
+    this.textEnds = read(head.texts[1]); // lengths
+    for (let i = 1; i < this.textEnds.length; i++) this.textEnds[i] += this.textEnds[i - 1];
+    this.lanes = head.lanes.map((lane) => ({ ...lane, times: read(lane.times), values: read(lane.values) }));
+    this.marks = head.marks.map((mark) => ({ ...mark, times: read(mark.times), rows: read(mark.rows) }));
+    const firings = this.firing_tag.length, records = this.record_tag.length;
+    this.recordsOf = new Index(this.record_firing, firings);
+    this.arrivalsOf = new Index(this.arrival_firing, firings);
+    this.arrivalsFrom = new Index(this.arrival_record, records);
+    this.actsAbout = new Index(this.record_about, records);
+    this.wakesOf = new Index(this.wake_firing, firings);
+    this.firingsOf = new Index(this.firing_actor, this.places.length);
+    this.recordsAt = new Index(this.record_port, this.ports.length);
+    this.placeOf = new Map(this.places.map((path, place) => [path, place]));
+    this.portOf = new Map(this.ports.map((port, number) => [this.portPath(number), number]));
+    this.wake_asker = this.askers();
+    this.wakesAsked = new Index(this.wake_asker, firings);
+    this.isSend = new Uint8Array(records).map((_, row) => this.record_aspect[row] === NOTHING ? 1 : 0);
+    this.hasSent = new Uint8Array(firings);
+    this.record_firing.forEach((firing, row) => { if (firing >= 0 && this.isSend[row]) this.hasSent[firing] = 1; });
+    this.acts = Int32Array.from(this.record_tag.keys()).filter((row) => !this.isSend[row]);
+    this.findLosses();
+    this.findFlights();
+  }
+
+  portPath(port) {
+    const { place, name } = this.ports[port];
+    return name ? `${this.places[place]}.${name}` : this.places[place];
+  }
+
+  text(record) {
+    const text = this.record_text[record], start = text ? this.textEnds[text - 1] : 0;
+    return new TextDecoder().decode(this.textBytes.subarray(start, this.textEnds[text]));
+  }
+
+  // The last tag at a time (ns) or before; -1 before the first.
+  tagAt(time) {
+    return search(this.times.length, (tag) => this.times[tag] > time) - 1;
+  }
+
+  // The last firing of an actor at a tag or before, and the first one at it or after; -1 if there is none.
+  lastFiring(actor, tag) {
+    const rows = this.firingsOf.of(actor), place = search(rows.length, (i) => this.firing_tag[rows[i]] > tag);
+    return place ? rows[place - 1] : -1;
+  }
+
+  nextFiring(actor, tag) {
+    const rows = this.firingsOf.of(actor), place = search(rows.length, (i) => this.firing_tag[rows[i]] >= tag);
+    return place < rows.length ? rows[place] : -1;
+  }
+
+  // Which firing asked for each wake-up.
+  askers() {
+    return this.wake_tag.map((tag, wake) => {
+      if (tag < 0) return tag;
+      const found = this.lastFiring(this.firing_actor[this.wake_firing[wake]], tag);
+      return found >= 0 && this.firing_tag[found] === tag ? found : MISSING;
+    });
+  }
+
+  // A token is lost to an actor if an aspect did something to it on the way there, and it never arrived.
+  findLosses() {
+    this.losses = []; // {record, actor}, in order
+    for (const record of this.acts) {
+      const about = this.record_about[record];
+      if (about === MISSING) continue;
+      for (const actor of this.ports[this.record_port[record]].leads) {
+        const arrives = about >= 0 && this.arrivalsFrom.of(about).some(
+          (arrival) => this.firing_actor[this.arrival_firing[arrival]] === actor);
+        if (!arrives) this.losses.push({ record, actor });
+      }
+    }
+    this.isLoss = new Set(this.losses.map((loss) => loss.record));
+    this.lossesOf = new Map();
+    for (const loss of this.losses) {
+      if (!this.lossesOf.has(loss.actor)) this.lossesOf.set(loss.actor, []);
+      this.lossesOf.get(loss.actor).push(loss.record);
+    }
+  }
+
+  // Tokens that take time, in the order in which they are sent, and the longest of these times (ns).
+  findFlights() {
+    const flights = [];
+    this.arrival_record.forEach((record, arrival) => {
+      if (record < 0) return;
+      const sent = this.times[this.record_tag[record]];
+      const arrived = this.times[this.firing_tag[this.arrival_firing[arrival]]];
+      if (arrived > sent) flights.push({ arrival, record, sent, arrived });
+    });
+    this.flights = flights.sort((one, other) => one.sent - other.sent);
+  }
+
+  tagText(tag) {
+    const micro = this.microsteps[tag];
+    return `${secondsText(this.times[tag])}${micro > 1 ? `, microstep ${micro}` : ""}`;
+  }
+
+  actorName(firing) {
+    return this.places[this.firing_actor[firing]];
+  }
+
+  // How a port is called with its channel.
+  portText(port, channel) {
+    return this.portPath(port) + (channel >= 0 && this.ports[port].multi ? `[${channel}]` : "");
+  }
+}
+
+function secondsText(nanoseconds) {
+  return `${parseFloat((nanoseconds / 1e9).toPrecision(9))} s`;
+}

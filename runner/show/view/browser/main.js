@@ -1,0 +1,164 @@
+// The page: views in their places, buttons, keys, and the loop that draws.
+
+async function main() {
+  const holder = document.getElementById("data"), page = document.getElementById("page");
+  readTheme();
+  let data;
+  try {
+    data = await readData(holder.textContent);
+  } catch (error) {
+    page.replaceChildren(element("p", { className: "note", text: `This browser cannot read the page's data (${error.message}); it needs DecompressionStream, which browsers have since 2023.` }));
+    return;
+  }
+  holder.remove();
+  data.runs.forEach((run, i) => {
+    const record = data.difference?.records[i] ?? NOTHING;
+    run.tagOfDifference = record >= 0 ? run.record_tag[record] : undefined;
+  });
+  const state = new State(data), scrubber = new Scrubber(state), lanes = new Lanes(state), chart = new Chart(state);
+  const camera = { scale: 0, extent: Space.extent(data.runs) }, hasSpace = data.runs.some((run) => run.marks.length);
+  const spaces = hasSpace ? data.runs.map((_, i) => new Space(state, i, camera)) : [];
+  const graphs = data.runs.map((_, i) => new Graph(state, i)), details = new Details(state, lanes);
+  const pane = (name, title, ...content) => {
+    const made = element("section", { className: `pane ${name}` }, element("h1", { text: title }), ...content);
+    made.dataset.pane = name;
+    return made;
+  };
+  const named = (views, what) => views.map((view, i) => pane(`${what} of${i}`, data.runs.length > 1 ? `${what}: ${data.runs[i].name}` : what, view.canvas));
+  const panes = element("div", { id: "panes", className: `runs${data.runs.length}${hasSpace ? "" : " flat"}` },
+    ...named(spaces, "space"), ...named(graphs, "graph"),
+    pane("chart", "sequence", coneOnly(state, chart), chart.canvas), pane("lanes", "signals", picker(state, lanes), lanes.canvas),
+    pane("about", "details", details.box));
+  page.replaceChildren(bar(state, data), element("div", { className: "scrub" }, scrubber.canvas), panes, tabs(panes, hasSpace, state));
+  const views = [scrubber, ...spaces, ...graphs, chart, lanes];
+  keys(state);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    readTheme();
+    state.changed();
+  });
+  let before = performance.now();
+  const frame = (now) => {
+    state.advance(Math.min(0.1, (now - before) / 1000));
+    before = now;
+    if (state.isDirty) {
+      state.isDirty = false;
+      for (const view of views) view.paint();
+      tell(state);
+    }
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+  // For scripts, and for the tests of this page.
+  window.epicycle = { state, views: { scrubber, spaces, graphs, chart, lanes }, details };
+  page.dataset.ready = "yes";
+}
+
+function bar(state, data) {
+  const [first] = data.runs, play = button("▶", () => state.play(!state.isPlaying), "play");
+  play.id = "play";
+  const speed = element("select", { label: "model seconds in a second", id: "speed" });
+  for (const each of [...new Set([...SPEEDS, state.speed])].sort((a, b) => a - b)) speed.append(element("option", { value: each, text: `×${each}` }));
+  speed.value = state.speed;
+  speed.addEventListener("change", () => { state.speed = Number(speed.value); });
+  const axis = element("select", { label: "axis of time", id: "axis" }, element("option", { value: "time", text: "by time" }), element("option", { value: "tag", text: "by tag" }));
+  axis.addEventListener("change", () => state.setByTag(axis.value === "tag"));
+  const toggle = (name, words) => {
+    const made = button(words, () => {
+      state.directions[name] = !state.directions[name];
+      made.setAttribute("aria-pressed", state.directions[name]);
+      state.findCone();
+      for (const listener of state.listeners) listener();
+    }, `toggle ${name}`);
+    made.setAttribute("aria-pressed", "true");
+    return made;
+  };
+  const runs = data.runs.length < 2 ? [] : data.runs.map((run, i) => {
+    const made = button(run.name, () => state.activate(i), "toggle");
+    state.listeners.push(() => made.setAttribute("aria-pressed", state.active === i));
+    made.setAttribute("aria-pressed", state.active === i);
+    return made;
+  });
+  return element("header", {},
+    element("strong", { text: data.runs.length > 1 ? first.model : first.name || first.model }), ...runs,
+    element("span", { className: "group" },
+      button("|◀", () => state.setTag(0)), button("◀", () => state.step(-1)), play, button("▶|", () => state.step(1)), speed),
+    element("output", { id: "now" }), axis,
+    element("span", { className: "group" }, toggle("back", "what led to it"), toggle("ahead", "what came of it")));
+}
+
+function tell(state) {
+  const { run, tag } = state;
+  const now = state.isPlaying || tag < 0 ? secondsText(Math.round(state.time / 1e3) * 1e3) : run.tagText(tag);
+  document.getElementById("now").textContent = now;
+  document.getElementById("play").textContent = state.isPlaying ? "❚❚" : "▶";
+  document.getElementById("speed").value = state.speed;
+  document.getElementById("axis").value = state.axis.byTag ? "tag" : "time";
+}
+
+function coneOnly(state, chart) {
+  const box = element("input", { type: "checkbox", id: "cone-only" });
+  box.addEventListener("change", () => {
+    chart.isConeOnly = box.checked;
+    state.changed();
+  });
+  return element("label", { className: "option" }, box, " actors of the cone only");
+}
+
+function picker(state, lanes) {
+  const select = element("select", { label: "signals to show or hide", className: "option" }, element("option", { value: "", text: "signals…" }));
+  const fill = () => {
+    while (select.options.length > 1) select.remove(1);
+    for (const name of lanes.names) select.append(element("option", { value: name, text: `${lanes.shown.has(name) ? "✓ " : "   "}${name}` }));
+  };
+  select.addEventListener("pointerdown", fill);
+  select.addEventListener("focus", fill);
+  select.addEventListener("change", () => {
+    if (!lanes.shown.delete(select.value)) lanes.shown.add(select.value);
+    select.value = "";
+    fill();
+    state.changed();
+  });
+  return select;
+}
+
+// On a narrow screen one pane is seen at a time.
+function tabs(panes, hasSpace, state) {
+  const names = [...(hasSpace ? ["space"] : []), "graph", "chart", "lanes", "about"], made = element("nav", {});
+  for (const name of names) {
+    const tab = button(name === "chart" ? "sequence" : name === "lanes" ? "signals" : name === "about" ? "details" : name, () => {
+      panes.dataset.tab = name;
+      for (const each of made.children) each.setAttribute("aria-pressed", each === tab);
+      state.changed();
+    }, "toggle");
+    tab.setAttribute("aria-pressed", name === names[0]);
+    made.append(tab);
+  }
+  panes.dataset.tab = names[0];
+  return made;
+}
+
+function keys(state) {
+  document.addEventListener("keydown", (event) => {
+    if (event.target.matches("select, input") || event.altKey || event.ctrlKey || event.metaKey) return;
+    const size = state.axis.high - state.axis.low, last = state.run.times.length - 1;
+    const acts = {
+      " ": () => state.play(!state.isPlaying),
+      ArrowRight: () => state.step(event.shiftKey ? 20 : 1),
+      ArrowLeft: () => state.step(event.shiftKey ? -20 : -1),
+      Home: () => state.setTag(0),
+      End: () => state.setTag(last),
+      "+": () => state.zoom(0.7, state.cursor),
+      "-": () => state.zoom(1 / 0.7, state.cursor),
+      "0": () => state.show(...state.extent),
+      "[": () => state.show(state.axis.low - size / 4, state.axis.high - size / 4),
+      "]": () => state.show(state.axis.low + size / 4, state.axis.high + size / 4),
+      t: () => state.setByTag(!state.axis.byTag),
+      Escape: () => state.select(null),
+    };
+    if (!acts[event.key] || (event.key === " " && event.target.matches("button"))) return;
+    event.preventDefault();
+    acts[event.key]();
+  });
+}
+
+main();

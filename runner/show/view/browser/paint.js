@@ -1,0 +1,163 @@
+// Canvases that fit their boxes, colours of the theme, and the gestures that all views share.
+
+const PALETTE = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#8C6BB1", "#A6761D"];
+
+function element(name, options = {}, ...children) {
+  const { text, label, ...rest } = options, made = document.createElement(name);
+  if (text !== undefined) made.textContent = text;
+  if (label) made.setAttribute("aria-label", label);
+  Object.assign(made, rest);
+  made.append(...children.filter((child) => child !== null));
+  return made;
+}
+
+// The colours of the page's style, read anew when the theme changes.
+const theme = {};
+function readTheme() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of ["ink", "soft", "faint", "paper", "panel", "frame", "back", "ahead", "loss", "limit", "now"])
+    theme[name] = style.getPropertyValue(`--${name}`).trim();
+}
+
+class View {
+  // A canvas in a box; `draw` paints it in CSS pixels.
+  constructor(state, label) {
+    this.state = state;
+    this.canvas = element("canvas", { label, tabIndex: 0, className: "view" });
+    this.canvas.setAttribute("role", "img");
+    this.width = this.height = 0;
+    new ResizeObserver(() => this.fit()).observe(this.canvas);
+  }
+
+  fit() {
+    const { clientWidth: width, clientHeight: height } = this.canvas, ratio = window.devicePixelRatio || 1;
+    if (!width || !height) return;
+    this.width = width;
+    this.height = height;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    this.paper = this.canvas.getContext("2d");
+    this.resized?.();
+    this.state.changed();
+  }
+
+  paint() {
+    if (!this.width || !this.canvas.offsetParent) return;
+    const ratio = this.canvas.width / this.width;
+    this.paper.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.paper.clearRect(0, 0, this.width, this.height);
+    this.paper.lineJoin = "round";
+    this.draw(this.paper);
+  }
+
+  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity } = {}) {
+    const { paper } = this;
+    paper.font = `${bold ? "600 " : ""}${size}px system-ui, sans-serif`;
+    paper.fillStyle = colour;
+    paper.textAlign = align;
+    paper.textBaseline = "alphabetic";
+    if (width < Infinity && paper.measureText(words).width > width) {
+      if (width < 12) return;
+      const fits = search(words.length, (count) => paper.measureText(`${words.slice(0, count + 1)}…`).width > width);
+      words = `${words.slice(0, fits)}…`;
+    }
+    paper.fillText(words, x, y);
+  }
+
+  line(points, colour, width = 1, dash = []) {
+    const { paper } = this;
+    if (points.length < 4) return;
+    paper.beginPath();
+    paper.moveTo(points[0], points[1]);
+    for (let i = 2; i < points.length; i += 2) paper.lineTo(points[i], points[i + 1]);
+    paper.strokeStyle = colour;
+    paper.lineWidth = width;
+    paper.setLineDash(dash);
+    paper.stroke();
+    paper.setLineDash([]);
+  }
+
+  dot(x, y, radius, colour, rim = null) {
+    const { paper } = this;
+    paper.beginPath();
+    paper.arc(x, y, radius, 0, 2 * Math.PI);
+    paper.fillStyle = colour;
+    paper.fill();
+    if (rim) {
+      paper.strokeStyle = rim;
+      paper.lineWidth = 1.5;
+      paper.stroke();
+    }
+  }
+
+  cross(x, y, size, colour) {
+    this.line([x - size, y - size, x + size, y + size], colour, 2);
+    this.line([x - size, y + size, x + size, y - size], colour, 2);
+  }
+}
+
+// Drags, wheel and pinches of a canvas: `move(dx, dy, x, y)`, `zoom(factor, x, y)`, `click(x, y)`; a drag begins with
+// `grab(x, y)`, which may return another way to go on with it.
+function gestures(canvas, { move, zoom, click, grab, hover }) {
+  const held = new Map();
+  let start = null, way = null, spread = 0;
+  const at = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  };
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    held.set(event.pointerId, at(event));
+    if (held.size === 1) {
+      start = at(event);
+      way = grab?.(...start) ?? null;
+    } else start = null;
+    spread = 0;
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const place = at(event), before = held.get(event.pointerId);
+    if (!before) return hover?.(...place);
+    held.set(event.pointerId, place);
+    if (held.size === 2) {
+      const [[ax, ay], [bx, by]] = held.values(), size = Math.hypot(ax - bx, ay - by);
+      if (spread) zoom?.(spread / size, (ax + bx) / 2, (ay + by) / 2);
+      spread = size;
+    } else {
+      if (start && Math.hypot(place[0] - start[0], place[1] - start[1]) > 5) start = null;
+      if (way) way(...place);
+      else if (!start) move?.(place[0] - before[0], place[1] - before[1], ...place);
+    }
+  });
+  const end = (event) => {
+    if (!held.delete(event.pointerId)) return;
+    if (start && event.type === "pointerup") click?.(...start);
+    start = way = null;
+  };
+  canvas.addEventListener("pointerup", end);
+  canvas.addEventListener("pointercancel", end);
+  canvas.addEventListener("pointerleave", () => hover?.(NaN, NaN));
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    const [x, y] = at(event);
+    if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY)) move?.(-(event.deltaX || event.deltaY), 0, x, y);
+    else if (event.ctrlKey || !canvas.dataset.scrolls) zoom?.(Math.exp(event.deltaY * 0.0015), x, y);
+    else move?.(0, -event.deltaY, x, y);
+  }, { passive: false });
+}
+
+// Marks at round numbers.
+function ticks(low, high, count) {
+  const raw = (high - low) / Math.max(1, count), power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * ([1, 2, 5, 10].find((each) => each * power >= raw) ?? 10), found = [];
+  for (let at = Math.ceil(low / step); at * step <= high && found.length < 200; at++) found.push(at * step);
+  return { step, at: found };
+}
+
+function numberText(value) {
+  return Number.isFinite(value) ? String(parseFloat(value.toPrecision(6))) : String(value);
+}
+
+function faded(colour, share) {
+  const number = parseInt(colour.slice(1), 16);
+  return `rgba(${number >> 16}, ${(number >> 8) & 255}, ${number & 255}, ${share})`;
+}

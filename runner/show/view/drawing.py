@@ -1,0 +1,61 @@
+"""The model graph as a page draws it: every composite open, so that any of them can be closed and opened there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...build import Model
+from ..graph import Drawing, draw, outline
+
+MOST = 3_000  # boxes that are laid out one by one; above, arrays whose instances are alike are one box
+
+
+def drawn(model: Model) -> dict[str, Any]:
+    """Boxes with their ports, wires as trees of lines, and badges, all with places in points."""
+    graph = model.graph
+    everything = len(graph.actors) + len(graph.composites)
+    drawing: Drawing = draw(outline(model, depth=len(graph.composites) + 1, expand=everything <= MOST))
+    return {
+        "width": round(drawing.width, 1),
+        "height": round(drawing.height, 1),
+        "boxes": [
+            {
+                "path": placed.box.path,
+                "name": placed.box.name,
+                "kind": placed.box.kind,
+                "doc": _doc(model, placed.box.path),
+                "at": _rounded(placed.x, placed.y, placed.width, placed.height),
+                "level": placed.level,
+                "composite": placed.box.is_composite,
+                "director": placed.box.has_director,
+                "count": placed.box.count,
+                "ports": [
+                    [each.port.path, each.port.name, each.side, *_rounded(each.x, each.y), each.port.is_multi]
+                    for each in placed.ports
+                ],
+            }
+            for placed in drawing.boxes
+        ],
+        "wires": [
+            {
+                "source": wire.source,
+                "targets": wire.targets,
+                "heads": [_rounded(*head) for head in wire.heads],
+                "lines": [[value for point in line for value in _rounded(*point)] for line in wire.lines],
+                "level": wire.level,
+            }
+            for wire in drawing.wires
+        ],
+        "pills": [
+            [pill.text, pill.aspect, *_rounded(pill.x, pill.y, pill.width), pill.place] for pill in drawing.pills
+        ],
+    }
+
+
+def _rounded(*values: float) -> list[float]:
+    return [round(value, 1) for value in values]
+
+
+def _doc(model: Model, path: str) -> str:
+    actor = model.graph.actors.get(path)
+    return "" if actor is None else (type(actor).__doc__ or "").strip().partition("\n")[0]

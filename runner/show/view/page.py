@@ -1,0 +1,226 @@
+"""One page of a run, or of two: data and program in one file, which loads nothing and runs nothing else."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from base64 import b64encode
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from epicycle.actors import EpicycleError, shortened, to_nanoseconds
+
+from ...catalogue import Figure
+from ...html import Html, tag
+from ...results import Results
+from ...shown import in_words, short
+from .drawing import drawn
+from .lanes import lanes
+from .packing import Pack
+from .recording import NOTHING, Recording
+
+# In this order, for each uses what stands before.
+PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "main")
+
+
+class ViewError(EpicycleError):
+    """A page that cannot be made."""
+
+
+def write_page(recordings: Sequence[Recording], path: Path, *, names: Sequence[str] = ()) -> None:
+    """Write the page of one run, or of two that are compared; raises ``ViewError``."""
+    text = page(recordings, names=names)
+    aside = path.with_name(f".{path.name}")
+    try:
+        aside.write_text(text, encoding="utf-8")
+        os.replace(aside, path)
+    except OSError as error:
+        raise ViewError(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+def page(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
+    """The page as text; ``names`` tell the runs apart."""
+    pack = Pack()
+    runs = [_run(each, name, pack) for each, name in zip(recordings, [*names, "", ""], strict=False)]
+    about = {
+        "runs": runs,
+        "difference": _difference(recordings) if len(recordings) > 1 else None,
+        "comparison": _comparison(recordings) if len(recordings) > 1 else [],
+    }
+    return _document(recordings[0].model.name, pack.text(about))
+
+
+def _document(title: str, data: str) -> str:
+    source = files(__package__) / "browser"
+    style = (source / "page.css").read_text(encoding="utf-8")
+    parts = "\n".join((source / f"{name}.js").read_text(encoding="utf-8") for name in PARTS)
+    script = f'"use strict";\n(() => {{\n{parts}}})();\n'
+    allowed = f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; base-uri 'none'"
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        Html(f'<meta http-equiv="Content-Security-Policy" content="{escape(allowed)}">'),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", f"{title} - Epicycle"),
+        tag("style", Html(style)),
+    )
+    body = tag(
+        "body",
+        tag("div", tag("noscript", "This page shows a run of a simulation; it needs JavaScript."), id="page"),
+        tag("script", Html(data), type="text/plain", id="data"),
+        tag("script", Html(script)),
+    )
+    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+
+
+def _hash(text: str) -> str:
+    return f"sha256-{b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+# -- data of a run ----------------------------------------------------------------------------------------------------
+
+
+def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
+    model, results, kept = recording.model, recording.results, recording.kept()
+    if results is None:
+        raise ViewError("a page shows a run that has been made: call Recording.run first")
+    figures = recording.figures.values()
+    return {
+        "name": name,
+        "model": model.name,
+        "doc": model.doc,
+        "seed": results.seed,
+        "end": to_nanoseconds(results.end),
+        "stopped": results.stopped,
+        "digest": results.digest,
+        "settings": [f"{key} = {short(value)}" for key, value in results.parameters.items()][:40],
+        "metrics": _metrics(recording),
+        "firings": recording.firings,
+        "records": recording.records,
+        "gaps": recording.gaps(),
+        "places": list(recording.places),
+        "ports": [_port(recording, *port) for port in recording.ports],
+        "events": list(recording.events),
+        "aspects": list(recording.aspects),
+        "columns": {column: pack.whole(values) for column, values in kept.columns.items()},
+        "tags": [pack.exact([tag.time for tag in kept.tags]), pack.whole([tag.microstep for tag in kept.tags])],
+        "texts": pack.texts(kept.texts),
+        "drawing": drawn(model),
+        "lanes": [
+            {
+                "name": lane.name,
+                "times": pack.exact(lane.times),
+                "values": pack.rough(lane.values),
+                "states": lane.states,
+                "line": lane.is_line,
+                "asked": lane.is_asked,
+                "left_out": lane.left_out,
+            }
+            for lane in lanes(results, figures)
+        ],
+        "marks": [each for figure in figures for each in _marks(recording, results, figure, pack)],
+    }
+
+
+def _metrics(recording: Recording) -> list[list[str]]:
+    results, model = recording.results, recording.model
+    assert results is not None
+    return [
+        [each.name, results.outcomes[each.name].shown(_four), "" if each.unit == "1" else each.unit, each.measure.doc]
+        for each in model.metrics
+    ]
+
+
+def _four(value: Any) -> str:
+    return in_words(value, digits=4, nothing="–")
+
+
+def _port(recording: Recording, place: int, name: str) -> dict[str, Any]:
+    """A port, and the actors to whose inputs its tokens lead within connections."""
+    graph, path = recording.model.graph, list(recording.places)[place]
+    actor = graph.actors.get(path)
+    port = None if actor is None else {**actor.inputs, **actor.outputs}.get(name)
+    leads: dict[str, None] = {}
+    waiting, seen = [f"{path}.{name}"], set[str]()
+    while waiting:
+        here = waiting.pop()
+        owner = here.rpartition(".")[0]
+        if owner in graph.actors and here.rpartition(".")[2] in graph.actors[owner].inputs:
+            leads[owner] = None
+        elif here not in seen and here in graph.ports:
+            seen.add(here)
+            waiting += [hop.destination for hop in graph.outgoing(here)]
+    return {
+        "place": place,
+        "name": name,
+        "multi": port is not None and port.multi,
+        "leads": [recording.places[owner] for owner in leads],
+    }
+
+
+def _marks(recording: Recording, results: Results, figure: Figure, pack: Pack) -> list[dict[str, Any]]:
+    graph, found = recording.model.graph, []
+    for mark in figure.marks(results):
+        times, rows = np.asarray(mark.times, dtype=float), np.asarray(mark.rows, dtype=float)
+        ends = graph.source_of(mark.name) if mark.name in graph.ports else []
+        found.append(
+            {
+                "name": mark.name,
+                "port": ends[0].path if ends else "",
+                "shape": mark.shape,
+                "times": pack.exact(times),
+                "rows": pack.rough(rows),
+                "width": rows.shape[1],
+                "interval": float(np.median(np.diff(times))) if len(times) > 1 else 1e18,
+                "radius": mark.radius,
+                "colour": mark.colour,
+            }
+        )
+    return found
+
+
+# -- two runs ---------------------------------------------------------------------------------------------------------
+
+
+def _difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
+    """The first record of the logs that differs: its number among those that are kept, and the record in words."""
+    one, other = (each.hashes for each in recordings[:2])
+    same = next(
+        (number for number, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other))
+    )
+    if same == len(one) == len(other):
+        return None
+    return {
+        "records": [each.kept_record(same) for each in recordings],
+        "texts": [_said(each, each.kept_record(same)) for each in recordings],
+    }
+
+
+def _said(recording: Recording, number: int) -> str:
+    """A kept record in words."""
+    if number < 0:
+        return "nothing more, the run is over"
+    columns, tags, texts = recording.kept()
+    place, name = list(recording.ports)[columns["record_port"][number]]
+    event, aspect = list(recording.events)[columns["record_event"][number]], columns["record_aspect"][number]
+    by = f" by {list(recording.aspects)[aspect]}" if aspect != NOTHING else ""
+    what = f"{list(recording.places)[place]}.{name} {event}{by}: {shortened(texts[columns['record_text'][number]], 80)}"
+    return f"{tags[columns['record_tag'][number]]} {what}"
+
+
+def _comparison(recordings: Sequence[Recording]) -> list[list[str]]:
+    rows = []
+    one, other = (each.results for each in recordings[:2])
+    assert one is not None
+    assert other is not None
+    for name, value in one.metrics.items():
+        if name in other.metrics:
+            numbers = [each for each in (value, other.metrics[name]) if isinstance(each, (int, float))]
+            change = _four(float(numbers[1] - numbers[0])) if len(numbers) == 2 else ""
+            rows.append([name, one.outcomes[name].shown(_four), other.outcomes[name].shown(_four), change])
+    return rows

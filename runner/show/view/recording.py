@@ -1,0 +1,223 @@
+"""A run as a page shows it: who fired when, what was sent, and what led to it, in columns.
+
+A recording holds each firing, each record of the event log, each token that arrived and each wake-up.  Beyond a number
+of firings it is thinned as it grows: firings are kept in stretches, and whenever there are too many, every second
+stretch goes.  What is left is spread evenly over the run, whole within each stretch, and the page says what is missing.
+"""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from epicycle.actors import Tag
+
+from ...build import Model
+from ...catalogue import Figure
+from ...engine import Firing, Simulation, Tracer
+from ...results import Record, Results, plain
+from ...shown import json_line
+from ...text import select
+
+MOST = 1_600_000  # firings that are kept: a page of some 15 MB
+STRETCH = 512  # firings in a row that are kept or left out together
+LONGEST = 160  # characters of a token
+MISSING, NOTHING = -2, -1  # in a column of numbers: what was left out, and what there is not
+
+
+class Names(dict[Any, int]):
+    """Numbers the things that it is asked for, in the order in which they come."""
+
+    def __missing__(self, key: Any) -> int:
+        self[key] = number = len(self)
+        return number
+
+
+# The columns of firings, of records, of tokens that arrived and of wake-ups.  Firings and records go by their numbers:
+# ``record_firing`` is whose doing a record is, ``record_about`` the send that an act of an aspect is about,
+# ``arrival_record`` the send of a token, ``wake_tag`` when a wake-up was asked for, if not in ``initialize``.
+COLUMNS = {
+    "firing": ("tag", "actor", "outside"),
+    "record": ("tag", "firing", "port", "channel", "event", "aspect", "text", "about"),
+    "arrival": ("firing", "port", "channel", "record"),
+    "wake": ("firing", "tag"),
+}
+OUTSIDE = ("", "resumed", "released")
+
+
+class Stretch:
+    """Firings in a row from a number on, and all that belongs to them, in columns."""
+
+    def __init__(self, firing: int, record: int) -> None:
+        self.firing = firing
+        self.record = record
+        self.tags, self.texts = Names(), Names()  # here, so that they go where the stretch goes
+        self.columns = {f"{kind}_{name}": array("i") for kind, names in COLUMNS.items() for name in names}
+
+    def add(self, kind: str, *row: int) -> None:
+        for name, value in zip(COLUMNS[kind], row, strict=True):
+            self.columns[f"{kind}_{name}"].append(value)
+
+    def count(self, kind: str) -> int:
+        return len(self.columns[f"{kind}_tag"])
+
+
+class Kept(NamedTuple):
+    """The columns of a recording; a tag and a text is its number among these."""
+
+    columns: dict[str, array[int]]
+    tags: list[Tag]
+    texts: list[str]
+
+
+class Recording:
+    """One run of a model, recorded while it goes on; ``results`` are what came of it, too.
+
+    ``most`` is how many firings are kept.  The bits are those of any other run of the model and seed; signals that the
+    model's ``figures`` show in space are recorded as well.  ``hashes`` are of all records, to find the first one in
+    which two runs differ.
+    """
+
+    def __init__(
+        self, model: Model, figures: Mapping[str, Figure], *, seed: int | None = None, most: int = MOST
+    ) -> None:
+        self.model = model
+        self.figures = figures
+        self.hashes = array("q")
+        self.results: Results | None = None
+        self.firings = self.records = 0  # that there were
+        self.events, self.aspects = Names(), Names()
+        self.places = Names()  # of actors and composites
+        self.ports = Names()  # (place, name)
+        self._most = max(2, most // STRETCH)
+        self._stride = 1  # of so many stretches one is kept
+        self._stretches: list[Stretch] = []
+        self._last: Stretch | None = None
+        patterns = [pattern for figure in figures.values() for pattern in figure.mark_patterns()]
+        outputs = [path for path in model.graph.ports if model.graph.direction(path) == "output"]
+        recorded = model.recorded
+        model.recorded = list(
+            dict.fromkeys((*recorded, *(path for each in patterns for path in select(each, outputs))))
+        )
+        self._simulation = Simulation(model, seed=seed, tracer=Tracer(model.graph.actors, self._fired, self._seen))
+        model.recorded = recorded
+
+    def run(self, *, until: float | None = None, progress: Callable[[float], None] | None = None) -> Results:
+        """Run to the end; an exception in an actor is raised as ``ActorError``, and what came before is recorded."""
+        try:
+            self.results = self._simulation.run(until=until, progress=progress)
+        except BaseException as error:
+            self.results = self._simulation.results("interrupted" if isinstance(error, KeyboardInterrupt) else "failed")
+            raise
+        return self.results
+
+    # -- what the tracer tells --------------------------------------------------------------------------------------
+
+    def _fired(self, firing: Firing) -> None:
+        kept, number, actor = self._stretch(), self.firings, self.places[firing.actor]
+        kept.add("firing", kept.tags[firing.tag], actor, OUTSIDE.index(firing.outside))
+        for arrival in firing.arrivals:
+            kept.add("arrival", number, self.ports[actor, arrival.port], arrival.channel, arrival.number)
+        for asked in firing.wakes:
+            kept.add("wake", number, NOTHING if asked is None else kept.tags[asked])
+        self.firings += 1
+
+    def _seen(self, record: Record, is_own: bool, about: int) -> None:
+        kept = self._stretch()
+        kept.add(
+            "record",
+            kept.tags[record.tag],
+            self.firings if is_own else NOTHING,
+            self.ports[self.places[record.actor], record.port],
+            NOTHING if record.channel is None else record.channel,
+            self.events[record.event],
+            self.aspects[record.aspect] if record.aspect else NOTHING,
+            kept.texts[_text(record.value)],
+            NOTHING if about == self.records else about,
+        )
+        self.hashes.append(hash(record.encoded()))
+        self.records += 1
+
+    def _stretch(self) -> Stretch:
+        """The stretch to which what happens now belongs."""
+        place = self.firings // STRETCH
+        if self._last is None or self._last.firing != place * STRETCH:
+            self._last = Stretch(place * STRETCH, self.records)
+            if place % self._stride == 0:
+                self._stretches.append(self._last)
+            if len(self._stretches) > self._most:
+                self._stride *= 2
+                self._stretches = [each for each in self._stretches if each.firing // STRETCH % self._stride == 0]
+        return self._last
+
+    # -- what is left -------------------------------------------------------------------------------------------------
+
+    def kept(self) -> Kept:
+        """What was kept, whole: firings and records are counted anew, tags in their order."""
+        firings, records, texts = _Renumbered(), _Renumbered(), Names()
+        for stretch in self._stretches:
+            firings.add(stretch.firing, stretch.count("firing"))
+            records.add(stretch.record, stretch.count("record"))
+        tags = sorted({tag for stretch in self._stretches for tag in stretch.tags})
+        place = {tag: number for number, tag in enumerate(tags)}
+        columns = {name: array("i") for name in Stretch(0, 0).columns}
+        for stretch in self._stretches:
+            own_tags, own_texts = [place[tag] for tag in stretch.tags], [texts[text] for text in stretch.texts]
+            numbers: dict[str, Callable[[int], int]] = {
+                "tag": lambda tag, own=own_tags: tag if tag < 0 else own[tag],  # type: ignore[misc]
+                "text": own_texts.__getitem__,
+                "firing": firings.number,
+                "about": records.number,
+                "record": records.number,
+            }
+            for name, column in stretch.columns.items():
+                number = numbers.get(name.partition("_")[2])
+                columns[name].extend(column if number is None else map(number, column))
+        return Kept(columns, tags, list(texts))
+
+    def kept_record(self, number: int) -> int:
+        """The number of a record among those that were kept; ``MISSING`` if it is left out, or there is none."""
+        records = _Renumbered()
+        for stretch in self._stretches:
+            records.add(stretch.record, stretch.count("record"))
+        return records.number(number)
+
+    def gaps(self) -> list[tuple[int, int]]:
+        """Between which kept firings others are left out: the number of the first one after the gap, and how many."""
+        found, kept, before = [], 0, 0
+        for stretch in self._stretches:
+            if stretch.firing > before:
+                found.append((kept, stretch.firing - before))
+            kept += stretch.count("firing")
+            before = stretch.firing + stretch.count("firing")
+        return [*found, (kept, self.firings - before)] if self.firings > before else found
+
+
+class _Renumbered:
+    """What is left of things in a row: their numbers before and now."""
+
+    def __init__(self) -> None:
+        self._starts: list[int] = []
+        self._counts: list[int] = []
+        self._before: list[int] = []  # how many are kept before each start
+
+    def add(self, start: int, count: int) -> None:
+        self._before.append(self._before[-1] + self._counts[-1] if self._before else 0)
+        self._starts.append(start)
+        self._counts.append(count)
+
+    def number(self, old: int) -> int:
+        """The number now of what had a number; ``MISSING`` if it is left out, ``NOTHING`` for nothing."""
+        at = bisect_right(self._starts, old) - 1
+        if old < 0 or at < 0:
+            return old if old < 0 else MISSING
+        place = old - self._starts[at]
+        return self._before[at] + place if place < self._counts[at] else MISSING
+
+
+def _text(token: Any) -> str:
+    if type(token) is float:  # as most are, and as ``json_line`` would have it
+        return f"{token:.6g}"
+    return json_line(plain(token), LONGEST)

@@ -1,0 +1,99 @@
+"""A real browser, offline, in which pages are opened from their files."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from epicycle.runner import load_model
+from epicycle.runner.build import figures_of
+from epicycle.runner.show.view import Recording, write_page
+from epicycle.runner.text import Problems
+
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium: install the distribution's package chromium")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield started
+        started.close()
+
+
+class Opened:
+    """A page in a tab, and what it said and asked for since."""
+
+    def __init__(self, browser: Any, path: Path, width: int, height: int, scheme: str) -> None:
+        context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme, offline=True)
+        self.tab = context.new_page()
+        self.said: list[str] = []
+        self.asked: list[str] = []
+        self.tab.on("console", lambda message: self.said.append(message.text))
+        self.tab.on("pageerror", lambda error: self.said.append(str(error)))
+        self.tab.on("dialog", lambda dialog: self.said.append(dialog.message))
+        self.tab.on("request", lambda request: self.asked.append(request.url))
+        self.tab.goto(path.as_uri())
+        self.tab.wait_for_selector("#page[data-ready]", timeout=30_000)
+
+    def do(self, script: str) -> Any:
+        """What a function of ``state`` and ``views`` returns; the page is drawn after it."""
+        found = self.tab.evaluate(f"() => (({{state, views, details}}) => {{ {script} }})(epicycle)")
+        self.tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        return found
+
+    def words(self, place: str = ".details") -> str:
+        """What stands somewhere, without empty lines."""
+        self.do("")
+        return "\n".join(line for line in self.tab.locator(place).inner_text().splitlines() if line)
+
+    def ink(self, view: str) -> int:
+        """How many pixels of a canvas are painted."""
+        count: int = self.tab.evaluate(
+            "(name) => { const c = document.querySelector(`canvas[data-view=${name}]`);"
+            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+            "let n = 0; for (let i = 3; i < d.length; i += 4) n += d[i] > 0; return n }",
+            view,
+        )
+        return count
+
+
+@pytest.fixture
+def opened(browser: Any) -> Iterator[Callable[..., Opened]]:
+    """Opens a page; in the end it must have said nothing and asked for nothing but itself."""
+    pages: list[tuple[Opened, Path]] = []
+
+    def open_page(path: Path, width: int = 1280, height: int = 900, scheme: str = "light") -> Opened:
+        page = Opened(browser, path, width, height, scheme)
+        pages.append((page, path))
+        return page
+
+    yield open_page
+    for page, path in pages:
+        said, asked = page.said, page.asked
+        page.tab.context.close()
+        assert said == []
+        assert asked == [path.as_uri()]
+
+
+def written(
+    path: Path, *runs: tuple[str, dict[str, Any]], until: float | None = None, names: tuple[str, ...] = ()
+) -> Path:
+    """The page of a run, or of two."""
+    recordings = []
+    for model, given in runs:
+        loaded = load_model(model, **given)
+        recordings.append(Recording(loaded, figures_of(loaded, Problems())))
+        recordings[-1].run(until=until)
+    write_page(recordings, path, names=names)
+    return path

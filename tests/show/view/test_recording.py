@@ -1,0 +1,110 @@
+"""What a page holds of a run: every firing and what caused it, or whole stretches of a run that is too long."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from epicycle.runner import load_model
+from epicycle.runner.build import Model, figures_of
+from epicycle.runner.engine import Firing, Simulation, Tracer
+from epicycle.runner.show.view import Recording
+from epicycle.runner.show.view.recording import MISSING, NOTHING, STRETCH
+from epicycle.runner.text import Problems
+
+
+def recorded(model: Model, until: float | None = None, **given: Any) -> Recording:
+    recording = Recording(model, figures_of(model, Problems()), **given)
+    recording.run(until=until)
+    return recording
+
+
+def test_a_recorded_run_has_the_bits_of_any_other() -> None:
+    model = load_model("mm1")
+    recording = recorded(model, 300.0, seed=3)
+    results = Simulation(model, seed=3).run(until=300.0)
+    assert recording.results is not None
+    assert recording.results.digest == results.digest
+    assert (recording.firings, recording.records) == (results.firings, results.events)
+
+
+def test_columns_say_what_a_tracer_is_told() -> None:
+    model = load_model("switched_network")
+    told: list[Firing] = []
+    Simulation(model, tracer=Tracer(model.graph.actors, told.append)).run()
+    recording = recorded(model)
+    columns, tags, texts = recording.kept()
+    places, ports = list(recording.places), list(recording.ports)
+
+    def port(number: int) -> str:
+        place, name = ports[number]
+        return f"{places[place]}.{name}"
+
+    assert [
+        (tags[tag], places[actor]) for tag, actor in zip(columns["firing_tag"], columns["firing_actor"], strict=True)
+    ] == [(firing.tag, firing.actor) for firing in told]
+    arrivals = [(number, each) for number, firing in enumerate(told) for each in firing.arrivals]
+    assert list(columns["arrival_firing"]) == [number for number, _ in arrivals]
+    for row, (number, each) in enumerate(arrivals):
+        record = columns["arrival_record"][row]
+        assert port(columns["arrival_port"][row]) == f"{told[number].actor}.{each.port}"
+        assert port(columns["record_port"][record]) == each.source
+        assert tags[columns["record_tag"][record]] == each.sent
+    asked = [None if tag == NOTHING else tags[tag] for tag in columns["wake_tag"]]
+    assert asked == [wake for firing in told for wake in firing.wakes]
+    sent = [len(firing.records) for firing in told]
+    assert np.bincount([each for each in columns["record_firing"] if each >= 0], minlength=len(told)).tolist() == sent
+    assert all(texts)
+
+
+def test_acts_are_about_the_send_that_they_concern() -> None:
+    model = load_model("collision_avoidance", disturb=["wifi_burst"])
+    recording = recorded(model)
+    columns, tags, texts = recording.kept()
+    events = list(recording.events)
+    drops = [row for row, event in enumerate(columns["record_event"]) if events[event] == "dropped"]
+    assert len(drops) > 100
+    for row in drops:
+        about = columns["record_about"][row]
+        assert events[columns["record_event"][about]] == "send"
+        assert texts[columns["record_text"][about]] == texts[columns["record_text"][row]]
+        assert tags[columns["record_tag"][about]] <= tags[columns["record_tag"][row]]
+
+
+def test_a_long_run_is_thinned_to_stretches_that_are_whole() -> None:
+    model = load_model("mm1")
+    whole, thinned = recorded(model, 8_000.0), recorded(model, 8_000.0, most=8 * STRETCH)
+    columns, _, _ = thinned.kept()
+    kept = len(columns["firing_tag"])
+    gaps = thinned.gaps()
+    assert thinned.firings == whole.firings > 40 * STRETCH
+    assert 4 * STRETCH <= kept <= 8 * STRETCH
+    assert kept + sum(count for _, count in gaps) == whole.firings
+    assert all(at % STRETCH == 0 for at, _ in gaps[:-1])
+    # What was kept is numbered anew, and what caused it is either kept or told to be missing.
+    of_whole = whole.kept()
+    assert (0, 0) not in gaps
+    starts = np.cumsum([0, *(STRETCH + count for _, count in gaps)])[: len(gaps)]
+    for stretch, start in enumerate(starts[:4]):
+        own = columns["firing_actor"][stretch * STRETCH : (stretch + 1) * STRETCH]
+        assert own == of_whole.columns["firing_actor"][start : start + STRETCH]
+    missing = sum(record == MISSING for record in columns["arrival_record"])
+    assert 0 < missing < kept / 20
+    senders = [columns["record_firing"][record] for record in columns["arrival_record"] if record >= 0]
+    takers = [
+        firing
+        for firing, record in zip(columns["arrival_firing"], columns["arrival_record"], strict=True)
+        if record >= 0
+    ]
+    assert all(sender <= taker for sender, taker in zip(senders, takers, strict=True))
+
+
+def test_signals_that_figures_show_in_space_are_recorded_for_the_page_alone() -> None:
+    model = load_model("collision_avoidance")
+    before = list(model.recorded)
+    recording = recorded(model)
+    assert recording.results is not None
+    assert {"main.plan", "observer[2].measurement"} <= recording.results.signals.keys()
+    assert model.recorded == before
+    assert "main.plan" not in before
