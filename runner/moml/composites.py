@@ -21,13 +21,14 @@ from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
 from .parts import Level, Part, give_priority
-from .reach import iterations, leave_out_idle
+from .reach import is_fed, iterations, leave_out_idle
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
 from .table import counterpart_of
 from .variables import Variables
 from .whole import whole_ports
+from .wires import Counting, connections_of
 from .writing import Flow
 
 COMPOSITES = frozenset({
@@ -273,7 +274,7 @@ class Conversion:
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
             f".{self.model.name}.{level.told(child.name)}", self._seed, whole_ports(self, level.entity, child),
-            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in known},
+            {port: self._fed_width(level.entity, child, port) for port in known},
         )  # fmt: skip
         actor.follow = lambda ours, text, name: self.variables.follow(actor, level, ours, text, name)
         actor.changing = lambda tree: self.variables.names_in(tree, actor.scope)
@@ -287,6 +288,17 @@ class Conversion:
         if actor.row.type == "SetVariable":
             self.variables.note_setter(child, level, part)
         return part
+
+    @cached_property
+    def _counting(self) -> Counting:
+        return Counting(self)
+
+    def _fed_width(self, composite: Entity, child: Entity, port: str) -> int:
+        """How many channels a port of an actor has; none if it is an input to which nothing sends."""
+        face = self.face(child, port)
+        if face is not None and face.direction == "input" and not is_fed(self, composite, child, port, self._counting):
+            return 0
+        return self.wiring.width(composite, f"{child.name}.{port}")
 
     @cached_property
     def _seed(self) -> object:
@@ -335,8 +347,6 @@ class Conversion:
     # -- wires ----------------------------------------------------------------------------------------------------
 
     def _connections(self, level: Level) -> list[Any]:
-        from .wires import connections_of
-
         return connections_of(self, level)
 
     def end(self, level: Level, end: End) -> tuple[str, bool] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 
 from epicycle.actors import InputPort, declared_ports
 
@@ -42,14 +43,25 @@ def _idle(
         kind = built_in().actors.get(row.type)
         if kind is None:
             continue
-        if row.needs and not any(_is_fed(conversion, composite, child, name, counting) for name in row.needs):
+        if row.needs and not any(is_fed(conversion, composite, child, name, counting) for name in row.needs):
             found.append((child, " and ".join(sorted(row.needs))))
             continue
         if id(child) not in inputs:
             inputs[id(child)] = _inputs(conversion, child, row)
         here = inputs[id(child)]
-        if not kind.is_source and not any(_is_fed(conversion, composite, child, name, counting) for name in here):
+        if not kind.is_source and not any(is_fed(conversion, composite, child, name, counting) for name in here):
             found.append((child, here[0] if here else "inputs"))
+            continue
+        waits_for = next(
+            (
+                name
+                for name in _waits_for(composite, child, row)
+                if not is_fed(conversion, composite, child, name, counting)
+            ),
+            None,
+        )
+        if waits_for is not None:
+            found.append((child, waits_for))
             continue
         declared = declared_ports(kind)
         several = Counter(said.ours for said in row.ports.values())
@@ -58,11 +70,26 @@ def _idle(
             if (
                 isinstance(port, InputPort)
                 and port.required
-                and not _is_fed(conversion, composite, child, name, counting)
+                and not is_fed(conversion, composite, child, name, counting)
             ):
                 found.append((child, name))
                 break
     return found
+
+
+def _waits_for(composite: Entity, child: Entity, row: Counterpart) -> Iterator[str]:
+    """The linked inputs that somebody added to an actor that waits for a token at each of them."""
+    if row.type not in ("Expression", "RecordAssembler") or row.fixed.get("apart"):
+        return
+    for name, port in child.ports.items():
+        has_value = "defaultValue" in port.properties or name in child.properties
+        if (
+            name not in row.ports
+            and port.flag("input")
+            and not has_value
+            and composite.links.get(f"{child.name}.{name}")
+        ):
+            yield name
 
 
 def _inputs(conversion: Converting, child: Entity, row: Counterpart) -> list[str]:
@@ -72,7 +99,7 @@ def _inputs(conversion: Converting, child: Entity, row: Counterpart) -> list[str
     return [name for name, face in faces.items() if face is not None and face.direction == "input"]
 
 
-def _is_fed(conversion: Converting, composite: Entity, child: Entity, port: str, counting: Counting) -> bool:
+def is_fed(conversion: Converting, composite: Entity, child: Entity, port: str, counting: Counting) -> bool:
     """Whether anything sends to a port."""
     path = f"{child.name}.{port}"
     if any(counting.senders(composite, net.ends) for net in conversion.nets_at(composite, child.name, port)):

@@ -63,7 +63,7 @@ SOURCES: Mapping[str, Counterpart] = {
     ),
     "Const": counterpart("Const", "trigger* | output", needs="trigger", value="value"),
     "StringConst": counterpart("Const", "trigger* | output", needs="trigger", special=how.text_value, value="text"),
-    "Ramp": counterpart("Ramp", "trigger* init step | output", init="value", step="value"),
+    "Ramp": counterpart("Ramp", "trigger* init step | output", special=how.ramp, init="value", step="value"),
     "Sequence": counterpart(
         "Sequence",
         "trigger* enable | output",

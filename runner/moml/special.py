@@ -78,6 +78,16 @@ def depths(actor: Actor) -> None:
     actor.notes.note(f"{actor.path} sends the depths of all actors and ports there: here an empty text")
 
 
+def ramp(actor: Actor) -> None:
+    """A Ramp of numbers that are not whole, where such may come for its step or its beginning."""
+    ports = [name for name in ("init", "step") if actor.widths.get(name, 0)]
+    init = actor.get("init", 0)
+    actor.told.discard("init")
+    if any(name not in actor.whole for name in ports) and type(init) is int:
+        actor.told.add("init")
+        actor.values["init"] = float(init)
+
+
 def chosen_input(actor: Actor) -> None:
     """A ConfigurationSelect, of whose inputs one passes."""
     names = ("trueInput", "falseInput")
