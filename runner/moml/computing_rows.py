@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from . import formulas
 from . import special as how
 from .counterpart import Counterpart, counterpart
 
@@ -18,8 +19,8 @@ _REPLACE = counterpart(
     replacement="text:new",
 )
 _SIMPLE_REPLACE = replace(_REPLACE, special=None, fixed={"function": "replace"})
-_DOUBLE = counterpart("Expression", "input=input | output", special=how.formula("float(input)"))
-_DECIBEL = counterpart("Expression", "input=input | output", special=how.decibel)
+_DOUBLE = counterpart("Expression", "input=input | output", special=formulas.formula("float(input)"))
+_DECIBEL = counterpart("Expression", "input=input | output", special=formulas.decibel)
 COMPUTING: Mapping[str, Counterpart] = {
     "Comparator": counterpart(
         "Comparator",
@@ -40,7 +41,7 @@ COMPUTING: Mapping[str, Counterpart] = {
     "Scale": counterpart("Scale", "input factor | output", factor="number"),
     "AbsoluteValue": counterpart("MathFunction", fixed={"function": "abs"}),
     "MathFunction": counterpart(
-        "MathFunction", "firstOperand=input secondOperand=input | output", special=how.math_function
+        "MathFunction", "firstOperand=input secondOperand=input | output", special=formulas.math_function
     ),
     "UnaryMathFunction": counterpart(
         "MathFunction",
@@ -54,7 +55,7 @@ COMPUTING: Mapping[str, Counterpart] = {
             "function", "function", "sin", {each: each for each in ("sin", "cos", "tan", "asin", "acos", "atan")}
         ),
     ),
-    "Round": counterpart("Expression", "input=input | output", special=how.rounding),
+    "Round": counterpart("Expression", "input=input | output", special=formulas.rounding),
     "Accumulator": counterpart(
         "Accumulator",
         "input* reset* | output",
@@ -69,10 +70,10 @@ COMPUTING: Mapping[str, Counterpart] = {
     "Integrator": counterpart(
         "Integrator", "input reset | output", fixed={"method": "trapezoid"}, initialValue="number:initial"
     ),
-    "Expression": counterpart("Expression", "| output", special=how.expression),
+    "Expression": counterpart("Expression", "| output", special=formulas.expression),
     "LookupTable": counterpart("LookupTable", table="list:values=[0, 1]"),
     "Limiter": counterpart("Limiter", special=how.limiter),
-    "Quantizer": counterpart("Expression", "input=input | output", special=how.quantizer),
+    "Quantizer": counterpart("Expression", "input=input | output", special=formulas.quantizer),
     "Maximum": counterpart("Extreme", "input* | maximumValue=value channelNumber=channel", fixed={"take": "greatest"}),
     "Minimum": counterpart("Extreme", "input* | minimumValue=value channelNumber=channel", fixed={"take": "least"}),
     "MaxIndex": counterpart("Extreme", "input* | output=channel", fixed={"take": "greatest"}),
@@ -85,58 +86,60 @@ COMPUTING: Mapping[str, Counterpart] = {
     "Remainder": counterpart(
         "Expression",
         "input=input | output",
-        special=how.formula("input - {divisor} * round(input / {divisor})", divisor=1.0),
+        special=formulas.formula("input - {divisor} * round(input / {divisor})", divisor=1.0),
     ),
     "ArrayElement": counterpart(
-        "Expression", "input=input index=index | output", special=how.formula("input[{index}]", index=0)
+        "Expression", "input=input index=index | output", special=formulas.formula("input[{index}]", index=0)
     ),
-    "ArrayLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
-    "ArraySum": counterpart("Expression", "input=input | output", special=how.formula("sum(input)")),
-    "ArrayMinimum": counterpart("Expression", "input=input | output index", special=how.extreme_of_array("min")),
-    "ArrayMaximum": counterpart("Expression", "input=input | output index", special=how.extreme_of_array("max")),
-    "ArrayAverage": counterpart("Expression", "input=input | output", special=how.formula("sum(input) / len(input)")),
+    "ArrayLength": counterpart("Expression", "input=input | output", special=formulas.formula("len(input)")),
+    "ArraySum": counterpart("Expression", "input=input | output", special=formulas.formula("sum(input)")),
+    "ArrayMinimum": counterpart("Expression", "input=input | output index", special=formulas.extreme_of_array("min")),
+    "ArrayMaximum": counterpart("Expression", "input=input | output index", special=formulas.extreme_of_array("max")),
+    "ArrayAverage": counterpart(
+        "Expression", "input=input | output", special=formulas.formula("sum(input) / len(input)")
+    ),
     "ArrayExtract": counterpart(
         "Expression",
         "input=input sourcePosition=sourcePosition extractLength=extractLength "
         "destinationPosition=destinationPosition outputArrayLength=outputArrayLength | output",
-        special=how.array_extract,
+        special=formulas.array_extract,
     ),
     "ArrayUpdate": counterpart(
         "Expression",
         "input=input index=index value=value | output",
-        special=how.formula("input[:{index}] + [{value}] + input[{index} + 1:]", index=0, value=1),
+        special=formulas.formula("input[:{index}] + [{value}] + input[{index} + 1:]", index=0, value=1),
     ),
     "ArrayRemoveElement": counterpart(
         "Expression",
         "array=array element=element | output",
-        special=how.formula("[each for each in array if each != {element}]"),
+        special=formulas.formula("[each for each in array if each != {element}]"),
     ),
     "ArrayAppend": counterpart("Collect", "input* | output", fixed={"joined": True}),
-    "ArraySort": counterpart("Expression", "input=input | output", special=how.array_sort),
+    "ArraySort": counterpart("Expression", "input=input | output", special=formulas.array_sort),
     "DotProduct": counterpart(
         "Expression",
         "input1=input1 input2=input2 | output",
-        special=how.formula("sum([input1[k] * input2[k] for k in range(len(input1))])"),
+        special=formulas.formula("sum([input1[k] * input2[k] for k in range(len(input1))])"),
     ),
     "ArrayContains": counterpart(
-        "Expression", "array=array element=element | output", special=how.formula("{element} in array")
+        "Expression", "array=array element=element | output", special=formulas.formula("{element} in array")
     ),
     "BooleanToAnything": counterpart(
         "Expression",
         "input=input | output",
-        special=how.formula("{trueValue} if input else {falseValue}", trueValue=1, falseValue=0),
+        special=formulas.formula("{trueValue} if input else {falseValue}", trueValue=1, falseValue=0),
     ),
     "DB": _DECIBEL,
     "dB": _DECIBEL,
     "LongToDouble": _DOUBLE,
     "AnythingToDouble": _DOUBLE,
     "StringToDouble": _DOUBLE,
-    "StringToInt": counterpart("Expression", "input=input | output", special=how.formula("int(input)")),
-    "StringToBoolean": counterpart("Expression", "input=input | output", special=how.formula("input == 'true'")),
+    "StringToInt": counterpart("Expression", "input=input | output", special=formulas.formula("int(input)")),
+    "StringToBoolean": counterpart("Expression", "input=input | output", special=formulas.formula("input == 'true'")),
     "StringSubstring": counterpart(
         "Expression",
         "input=input start=start stop=stop | output",
-        special=how.formula("input[{start}:{stop}] if {stop} >= {start} else input[{start}:]", start=0, stop=0),
+        special=formulas.formula("input[{start}:{stop}] if {stop} >= {start} else input[{start}:]", start=0, stop=0),
     ),
     "StringCompare": counterpart(
         "TextFunction",
@@ -177,5 +180,5 @@ COMPUTING: Mapping[str, Counterpart] = {
     ),
     "StringReplace": _REPLACE,
     "StringSimpleReplace": _SIMPLE_REPLACE,
-    "StringLength": counterpart("Expression", "input=input | output", special=how.formula("len(input)")),
+    "StringLength": counterpart("Expression", "input=input | output", special=formulas.formula("len(input)")),
 }

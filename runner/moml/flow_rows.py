@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from . import formulas
 from . import special as how
 from .counterpart import Counterpart, counterpart
 from .variables import set_variable
@@ -77,15 +78,15 @@ FLOW: Mapping[str, Counterpart] = {
     "Repeat": counterpart(
         "Repeat",
         "input numberOfTimes=times | output",
-        special=how.repeat,
+        special=formulas.repeat,
         numberOfTimes="whole:times",
     ),
     "DownSample": counterpart(
-        "BlockExpression", special=how.blocks("block[-1 - {phase}]", "factor", items=False, factor=2, phase=0)
+        "BlockExpression", special=formulas.blocks("block[-1 - {phase}]", "factor", items=False, factor=2, phase=0)
     ),
-    "UpSample": counterpart("BlockExpression", special=how.up_sample),
-    "Chop": counterpart("BlockExpression", special=how.chop),
-    "DelayLine": counterpart("BlockExpression", special=how.delay_line),
+    "UpSample": counterpart("BlockExpression", special=formulas.up_sample),
+    "Chop": counterpart("BlockExpression", special=formulas.chop),
+    "DelayLine": counterpart("BlockExpression", special=formulas.delay_line),
     "RecordUpdater": counterpart("RecordAssembler", "input=input | output", special=how.record_updater),
     "SequenceToArray": counterpart("Batch", "input arrayLength | output", arrayLength="whole:number=1"),
     "ArrayToSequence": counterpart("Unbatch", arrayLength="nothing", enforceArrayLength="nothing"),
@@ -104,7 +105,7 @@ FLOW: Mapping[str, Counterpart] = {
     "Current": counterpart("Filter", fixed={"condition": "True"}),
     "NonStrictDelay": counterpart("Previous", initialValue="value:initial"),
     "Pre": counterpart("Previous", initialValue="value:initial"),
-    "SampleDelay": counterpart("BlockExpression", special=how.sample_delay),
+    "SampleDelay": counterpart("BlockExpression", special=formulas.sample_delay),
     "Sleep": counterpart("Filter", "input* | output*", fixed={"condition": "True"}, sleepTime="nothing"),
     "ExecutionTime": counterpart(
         "Const",
