@@ -21,6 +21,8 @@ _REPLACE = counterpart(
 _SIMPLE_REPLACE = replace(_REPLACE, special=None, fixed={"function": "replace"})
 _DOUBLE = counterpart("Expression", "input=input | output", special=formulas.formula("float(input)"))
 _DECIBEL = counterpart("Expression", "input=input | output", special=formulas.decibel)
+# Of whole numbers, which are told by their texts, it is one.
+_AVERAGE = "int(sum(input) / len(input)) if str(input[0]) == str(int(input[0])) else sum(input) / len(input)"
 COMPUTING: Mapping[str, Counterpart] = {
     "Comparator": counterpart(
         "Comparator",
@@ -95,9 +97,7 @@ COMPUTING: Mapping[str, Counterpart] = {
     "ArraySum": counterpart("Expression", "input=input | output", special=formulas.formula("sum(input)")),
     "ArrayMinimum": counterpart("Expression", "input=input | output index", special=formulas.extreme_of_array("min")),
     "ArrayMaximum": counterpart("Expression", "input=input | output index", special=formulas.extreme_of_array("max")),
-    "ArrayAverage": counterpart(
-        "Expression", "input=input | output", special=formulas.formula("sum(input) / len(input)")
-    ),
+    "ArrayAverage": counterpart("Expression", "input=input | output", special=formulas.formula(_AVERAGE)),
     "ArrayExtract": counterpart(
         "Expression",
         "input=input sourcePosition=sourcePosition extractLength=extractLength "
