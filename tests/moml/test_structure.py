@@ -9,7 +9,9 @@ import pytest
 
 from epicycle.runner.moml import MomlError
 from tests.moml.moml_parts import (
+    COMPOSITE,
     DIRECTOR,
+    HEAD,
     LIB,
     TEXT,
     composite,
@@ -179,6 +181,32 @@ def test_iterations_with_a_period(tmp_path: Path) -> None:
     inner = composite("C", OUT, sdf(period="1.0 / 2"), entity("Ramp", "Ramp"), wires("Ramp.output out"))
     text = model(inner, RECORDER, wires("C.out Recorder.input"), stop=1)
     assert values(tmp_path, text) == [(0.0, 0), (0.5, 1), (1.0, 2)]
+
+
+def whole(*inner: str, **parameters: object) -> str:
+    """A model with an SDF director."""
+    return HEAD + entity("m", COMPOSITE, sdf(**parameters), *inner)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        ({"iterations": 3}, [(0.0, 1, 0), (0.0, 2, 3), (0.0, 3, 6)]),
+        ({"iterations": 3, "period": 0.5}, [(0.0, 1, 0), (0.5, 1, 3), (1.0, 1, 6)]),
+        ({"iterations": "AUTO"}, [(0.0, 1, 0)]),
+    ],
+)
+def test_a_model_of_iterations(tmp_path: Path, parameters: dict[str, object], expected: list[Any]) -> None:
+    inner = composite("D", IN, OUT, entity("S", "Scale", factor=3), wires("in S.input", "S.output out"), director=True)
+    nets = wires("Ramp.output D.in", "D.out Recorder.input")
+    text = whole(entity("Ramp", "Ramp"), inner, RECORDER, nets, **parameters)
+    assert recorded(tmp_path, text) == expected
+
+
+def test_a_model_of_endless_iterations(tmp_path: Path) -> None:
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, whole(entity("Ramp", "Ramp"), RECORDER, wires("Ramp.output Recorder.input"), iterations=0))
+    assert str(caught.value).endswith("   - m: endless iterations at one time have no counterpart")
 
 
 def test_a_delay_of_one_iteration_in_a_loop(tmp_path: Path) -> None:
