@@ -49,34 +49,42 @@ class _Expansion:
             raise MomlError(f"{first.name}: its instances come to more than {MAX_ENTITIES:,} entities")
         _number(first, 0)
         first.java = ABSTRACT_COMPOSITE
-        ports = {name: list(composite.links.get(f"{first.name}.{name}", ())) for name in first.ports}
+        joins = [
+            (name, link.relation, self._beyond(composite, first, name, link.relation))
+            for name in first.ports
+            for link in composite.links.get(f"{first.name}.{name}", ())
+            if link.relation is not None
+        ]
         for place in range(1, number):
             each = deepcopy(first)
             each.name = f"{first.name}_{place}"
             _number(each, place)
             composite.entities[each.name] = each
-            for name, links in ports.items():
-                for link in links:
-                    if link.relation is not None:
-                        self._join(composite, first, each, name, link.relation)
+            for name, relation, beyond in joins:
+                self._join(composite, f"{each.name}.{name}", relation, beyond)
 
-    def _join(self, composite: Entity, first: Entity, each: Entity, port: str, relation: str) -> None:
-        """Join a port of an instance with what that of the first is joined with, a multiport by one more channel."""
+    def _beyond(self, composite: Entity, first: Entity, port: str, relation: str) -> list[str]:
+        """The multiports at the other end of a port's relation."""
         sends = first.ports[port].flag("output")
-        joined = relation
-        others = [path for path, links in composite.links.items() if any(link.relation == relation for link in links)]
-        for path in others:
+        found = []
+        for path, links in composite.links.items():
+            if all(link.relation != relation for link in links) or path == f"{first.name}.{port}":
+                continue
             actor, _, name = path.rpartition(".")
             other = composite.entities.get(actor) if actor else composite
             face = None if other is None else face_of(counterpart_of(other.java), other, name)
-            takes = face is not None and (face.direction == "input") == bool(actor)
-            if face is None or takes is not sends or (actor, name) == (first.name, port):
-                continue
-            if face.multi:
-                joined = f"r_{each.name}_{port}"
-                composite.relations.setdefault(joined, Relation(joined))
-                self._link(composite, path, joined)
-        self._link(composite, f"{each.name}.{port}", joined)
+            if face is not None and face.multi and ((face.direction == "input") == bool(actor)) is sends:
+                found.append(path)
+        return found
+
+    def _join(self, composite: Entity, port: str, relation: str, beyond: list[str]) -> None:
+        """Join a port of an instance as that of the first is joined, with multiports by one more channel."""
+        if beyond:
+            relation = f"r_{port.replace('.', '_')}"
+            composite.relations[relation] = Relation(relation)
+            for path in beyond:
+                self._link(composite, path, relation)
+        self._link(composite, port, relation)
 
     def _link(self, composite: Entity, port: str, relation: str) -> None:
         composite.links.setdefault(port, []).append(Link(port, relation, 0, next(self._orders)))

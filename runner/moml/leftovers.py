@@ -24,11 +24,10 @@ def about_ports(conversion: Converting, entity: Entity, level: Level) -> None:
 def about_links(conversion: Converting, child: Entity, level: Level) -> None:
     """Ports to which something is linked, and that actors of ours do not have."""
     row = conversion.rows.get(id(child))
-    if row is None or row.is_view:
+    if row is None or row.is_view or id(child) in conversion.idle:
         return
-    for port, links in level.entity.links.items():
-        actor, _, name = port.rpartition(".")
-        if actor == child.name and links and id(child) not in conversion.idle and conversion.face(child, name) is None:
+    for name in level.linked.get(child.name, ()):
+        if conversion.face(child, name) is None:
             conversion.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
 
 
@@ -41,12 +40,9 @@ def about_properties(conversion: Converting, level: Level) -> None:
 
 
 def about_unknown(conversion: Converting, child: Entity, level: Level) -> None:
+    """An actor whose class has no row: whether the model can do without it."""
     told = level.told(child.name)
-    linked = [
-        port.rpartition(".")[2]
-        for port, links in level.entity.links.items()
-        if port.startswith(f"{child.name}.") and links
-    ]
+    linked = level.linked.get(child.name, [])
     if not linked and is_layout(child):
         return
     if not linked:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 from .counterpart import Counterpart
@@ -46,6 +47,16 @@ class Level:
     added_inputs: list[str] = field(default_factory=list)  # by which something in it knows a variable around it
     added_outputs: list[str] = field(default_factory=list)  # by which something in it sets a variable around it
     added_connections: list[str] = field(default_factory=list)
+
+    @cached_property
+    def linked(self) -> dict[str, list[str]]:
+        """The ports of each child to which something is linked."""
+        found: dict[str, list[str]] = {}
+        for path, links in self.entity.links.items():
+            actor, _, port = path.rpartition(".")
+            if links:
+                found.setdefault(actor, []).append(port)
+        return found
 
     def told(self, name: str) -> str:
         """The path of something within, for messages."""
