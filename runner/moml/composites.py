@@ -54,7 +54,7 @@ class Conversion:
             self.rows[id(each)] = self._row(each, own) if is_row else None
         self._scopes: dict[int, Scope] = {}
         self._nets: dict[int, list[Net]] = {}
-        self._at: dict[int, dict[tuple[str, str], list[Net]]] = {}
+        self._at: dict[int, dict[tuple[str, str, int | None], list[Net]]] = {}
         self.version = version_of(model)
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
@@ -74,7 +74,7 @@ class Conversion:
         """The direction of a port, and whether it is a multiport; None if nothing is to be wired to it."""
         if id(entity) in self.idle:
             return None
-        if (id(entity), port) in self.variables.ports:
+        if self.variables.has_port(entity, port):
             return PortFace("input", False)
         if is_request(entity) or is_response(entity):
             return PortFace("output" if is_request(entity) else "input", False)
@@ -240,14 +240,15 @@ class Conversion:
             self._nets[id(composite)] = self.wiring.nets(composite) if id(composite) in self.wiring.groups else []
         return self._nets[id(composite)]
 
-    def nets_at(self, composite: Entity, actor: str, port: str) -> list[Net]:
-        """The nets at a port of a child, or with no actor at a port of the composite itself."""
+    def nets_at(self, composite: Entity, actor: str, port: str, channel: int | None = None) -> list[Net]:
+        """The nets at a port of a child, or with no actor at a port of the composite itself; or at one channel."""
         if id(composite) not in self._at:
             found = self._at[id(composite)] = {}
             for net in self.nets_of(composite):
-                for place in dict.fromkeys((end.actor, end.port) for end in net.ends):
+                places = [(end.actor, end.port, each) for end in net.ends for each in (None, end.channel)]
+                for place in dict.fromkeys(places):
                     found.setdefault(place, []).append(net)
-        return self._at[id(composite)].get((actor, port), [])
+        return self._at[id(composite)].get((actor, port, channel), [])
 
     def port_name(self, names: Names, port: str, channel: int) -> str:
         """Our name for a channel of a composite's port: each channel is a port by itself."""
@@ -290,13 +291,14 @@ class Conversion:
         return part
 
     @cached_property
-    def _counting(self) -> Counting:
+    def counting(self) -> Counting:
+        """How many actors there are at the ends of nets, once it is known who never fires."""
         return Counting(self)
 
     def _fed_width(self, composite: Entity, child: Entity, port: str) -> int:
         """How many channels a port of an actor has; none if it is an input to which nothing sends."""
         face = self.face(child, port)
-        if face is not None and face.direction == "input" and not is_fed(self, composite, child, port, self._counting):
+        if face is not None and face.direction == "input" and not is_fed(self, composite, child, port, self.counting):
             return 0
         return self.wiring.width(composite, f"{child.name}.{port}")
 

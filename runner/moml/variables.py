@@ -47,10 +47,10 @@ class Variables:
         found = self._found.setdefault((id(owner), name), Changing(owner, name))
         found.delayed = (entity.text("delayed") or "true").strip() != "false"
 
-    @property
-    def ports(self) -> set[tuple[int, str]]:
-        """The ports of composites by which values come."""
-        return {key for key, each in self._found.items() if each.is_port}
+    def has_port(self, entity: Entity, port: str) -> bool:
+        """Whether values come by a port of a composite."""
+        found = self._found.get((id(entity), port))
+        return found is not None and found.is_port
 
     def hand(self, refinement: Entity, name: str) -> None:
         """Let a refinement go by a variable of its machine, which comes by an input of that name at each entry."""
