@@ -49,6 +49,8 @@ def view(options: argparse.Namespace) -> int:
     path = options.out
     if path is not None and not path.parent.is_dir():
         raise EpicycleError(f"--out {path} cannot be written: there is no folder {path.parent}")
+    if path is not None and path.is_dir():
+        raise EpicycleError(f"--out {path} cannot be written: it is a folder")
     names = [Path(each).name.removesuffix(".yaml") for each in options.model]
     recordings: list[Recording] = []
     error: EpicycleError | None = None
@@ -56,7 +58,7 @@ def view(options: argparse.Namespace) -> int:
         one = copy(options)
         one.model = each
         digest = _as_before(one) if Path(each).is_dir() else ""
-        recordings.append(_recording(one))
+        recordings.append(_recording(one, is_compared=len(options.model) > 1))
         try:
             with progress(recordings[-1].model, seconds("--until", one.until)) as report:
                 results = recordings[-1].run(until=seconds("--until", one.until), progress=report)
@@ -64,9 +66,7 @@ def view(options: argparse.Namespace) -> int:
             error = failure
             continue
         if digest and results.digest != digest:
-            complain(
-                f"{each} was made by another version of the model or of Epicycle: the run is not the same any more"
-            )
+            complain(f"{each} was made by another version of the model or of Epicycle: the run is no longer the same")
     if path is None:
         path = Path("results") / recordings[0].model.name / "view.html"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -79,7 +79,7 @@ def view(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _recording(options: argparse.Namespace) -> Recording:
+def _recording(options: argparse.Namespace, *, is_compared: bool) -> Recording:
     from ..build import figures_of
     from ..show.view import Recording
     from ..text import Problems
@@ -90,7 +90,7 @@ def _recording(options: argparse.Namespace) -> Recording:
     problems.raise_if_any()
     if options.until is None and model.endless:
         complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
-    return Recording(model, figures, seed=options.seed)
+    return Recording(model, figures, seed=options.seed, is_compared=is_compared)
 
 
 def _as_before(options: argparse.Namespace) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -141,6 +142,26 @@ def test_clicks_on_bodies_and_actors_select_what_they_did(wifi: Path, opened: Op
     assert page.words().startswith("observer[1].vehicle\nfired at 2.4 s")
     page.tab.keyboard.press("Escape")
     assert page.words().startswith("collision_avoidance")
+
+
+def test_clicks_on_aspects_select_what_they_did(wifi: Path, opened: Open) -> None:
+    page = opened(wifi, 2000, 1400)
+    page.do("""
+        state.setTime(2.45e9);
+        const graph = views.graphs[0]; graph.shut.set("main", false); graph.paint();
+        const pill = graph.drawing.pills.find((each) => each[1] === "wifi_loss" && each[5] === "main.peer_plan");
+        const {x, y, scale} = graph.camera;
+        graph.pick((pill[2] + 3 - x) * scale, (pill[3] - y) * scale);
+    """)
+    assert re.match(r"dropped by wifi_loss\nat main\.peer_plan, 2\.201 s\n", page.words())
+    page.do("""
+        const {run} = state, row = run.aspects.indexOf("wifi_latency");
+        const act = run.acts.find((record) =>
+            run.record_aspect[record] === row && run.times[run.record_tag[record]] > 1e9);
+        state.show(0.9e9, 1.2e9);
+        views.lanes.pick(views.lanes.x(run.times[run.record_tag[act]]), 18 + 17 * row + 8);
+    """)
+    assert page.words().startswith("delayed by wifi_latency\nat ")
 
 
 def test_tokens_travel_along_their_wires(wifi: Path, opened: Open) -> None:

@@ -102,7 +102,7 @@ class Details {
     for (const taker of [...takers].slice(0, 12)) line.append(" ", this.link(`→ ${run.actorName(taker)}`, taker, NOTHING));
     if (takers.size > 12) line.append(` and ${takers.size - 12} more`);
     for (const act of run.actsAbout.of(record)) if (run.isLoss.has(act)) line.append(" ", this.link(`✕ ${run.portPath(run.record_port[act])}`, NOTHING, act));
-    line.append(" ", button("show as a lane", () => this.lanes.addPort(run.portPath(run.record_port[record]))));
+    line.append(" ", button("show as a lane", () => this.lanes.toggle(run.portPath(run.record_port[record]), true)));
     return line;
   }
 

@@ -159,9 +159,9 @@ class Graph extends View {
     const isOpen = box.composite && !isShut;
     if (box.composite) this.sign(x + width - 11, y + 4, isShut);
     if (scale * 9 < LEGIBLE) {
-      if (isShut && scale * width > 30) {
-        const size = Math.min(12 / scale, height / 2, width / 6);
-        this.text(box.name, x + width / 2, y + height / 2 + size / 3, { align: "center", bold: true, size, width: width - 4 });
+      if (!isOpen && scale * width > 24) {
+        const size = Math.min(12 / scale, height / 2, (1.5 * width) / box.name.length);
+        this.text(box.name, x + width / 2, y + height / 2 + size / 3, { align: "center", bold: true, size, width: width - 2 });
       }
       return;
     }
@@ -373,6 +373,9 @@ class Graph extends View {
 
   pick(px, py) {
     const { camera, run, state } = this, x = px / camera.scale + camera.x, y = py / camera.scale + camera.y;
+    const pill = this.drawing.pills.find(([, aspect, left, middle, width, place]) =>
+      aspect && x >= left && x <= left + width && Math.abs(y - middle) < 7 && !this.cover(place));
+    if (pill) return this.pickAct(pill[1], pill[5]);
     const boxes = this.drawing.boxes.filter(({ at: [left, top, width, height], path }) =>
       x >= left && y >= top && x <= left + width && y <= top + height && !this.cover(path));
     const box = boxes.at(-1); // the innermost
@@ -388,6 +391,15 @@ class Graph extends View {
     const tag = state.tags[this.number], firing = Math.max(run.lastFiring(place, tag), NOTHING);
     const found = firing >= 0 ? firing : run.nextFiring(place, tag);
     return state.select(found < 0 ? null : { run: this.number, firing: found, record: NOTHING });
+  }
+
+  // The last act of an aspect at a place until now, or else its first.
+  pickAct(aspect, place) {
+    const { run, state } = this, last = state.tags[this.number];
+    const acts = run.acts.filter((record) =>
+      shortName(run.aspects[run.record_aspect[record]]) === aspect && run.portPath(run.record_port[record]) === place);
+    const record = acts[Math.max(0, search(acts.length, (i) => run.record_tag[acts[i]] > last) - 1)];
+    return record === undefined ? state.select(null) : state.goTo({ run: this.number, firing: NOTHING, record });
   }
 }
 

@@ -1,6 +1,6 @@
 // Lanes: acts of each aspect, then signals, numbers as lines and states as strips; of two runs, one over the other.
 
-const LANE = 46, ACTS = 17, RULER = 18;
+const LANE = 46, ACTS = 17, RULER = 18, MODES = 8;
 
 class Lanes extends Timeline {
   constructor(state) {
@@ -9,21 +9,27 @@ class Lanes extends Timeline {
     this.names = [...new Set(state.runs.flatMap((run) => run.lanes.map((lane) => lane.name)))];
     const asked = state.runs[0].lanes.filter((lane) => lane.asked).map((lane) => lane.name);
     this.shown = new Set(asked.length ? asked.slice(0, 12) : this.names.slice(0, 6));
+    this.addModes(state.runs[0]);
   }
 
-  // Shows a port whose sends were numbers or texts, recorded or not.
-  addPort(path) {
-    for (const run of this.state.runs) {
-      const port = run.portOf.get(path);
-      if (port === undefined || run.lanes.some((lane) => lane.name === path)) continue;
-      const rows = run.recordsAt.of(port).filter((row) => run.isSend[row]);
-      const values = Float64Array.from(rows, (row) => parseFloat(run.text(row)));
-      const times = Float64Array.from(rows, (row) => run.times[run.record_tag[row]] / 1e9);
-      if (values.length && !values.every(Number.isNaN))
-        run.lanes.push({ name: path, times, values, states: null, line: false, left_out: 0 });
+  // Ports that send words, as the modes of machines are, have lanes whether they are recorded or not.
+  addModes(run) {
+    const modes = [...run.ports.keys()].filter((port) => {
+      const rows = run.recordsAt.of(port).slice(0, 40).filter((row) => run.isSend[row]);
+      return rows.length && rows.every((row) => run.text(row).startsWith('"'));
+    });
+    for (const port of modes.slice(0, MODES)) this.toggle(run.portPath(port), true);
+  }
+
+  // Shows or hides a signal, or what a port sent though it was not recorded: numbers, or words.
+  toggle(path, isShown = !this.shown.has(path)) {
+    if (!isShown) this.shown.delete(path);
+    else {
+      for (const run of this.state.runs)
+        if (run.portOf.has(path) && !run.lanes.some((lane) => lane.name === path)) run.lanes.push(laneOf(run, path));
+      if (!this.names.includes(path)) this.names.push(path);
+      this.shown.add(path);
     }
-    if (!this.names.includes(path)) this.names.push(path);
-    this.shown.add(path);
     this.state.changed();
   }
 
@@ -49,6 +55,22 @@ class Lanes extends Timeline {
       this.text("Nothing is recorded. Select an actor: each port that it sends from can be shown as a lane.", this.margin + 8, 40, { colour: theme.soft });
     paper.restore();
     this.cursor();
+  }
+
+  // A click near an act selects it.
+  pick(x, y) {
+    const { state } = this, { run } = state, aspect = Math.floor((y + this.scroll - RULER) / ACTS);
+    let best = NOTHING, least = 8;
+    if (aspect >= 0 && aspect < run.aspects.length && y > RULER) {
+      const around = this.at(x - least), first = search(run.acts.length, (i) => state.place(run, run.record_tag[run.acts[i]]) >= around);
+      for (let i = first; i < run.acts.length; i++) {
+        const record = run.acts[i], away = this.x(state.place(run, run.record_tag[record])) - x;
+        if (away > least) break;
+        if (run.record_aspect[record] === aspect && Math.abs(away) < least) [best, least] = [record, Math.abs(away)];
+      }
+    }
+    if (best >= 0) state.goTo({ run: state.active, firing: NOTHING, record: best });
+    else super.pick(x);
   }
 
   acts(number, name, y) {
@@ -146,4 +168,16 @@ class Lanes extends Timeline {
       if (tall > 12) this.text(lane.states[state], begin + 3, y + tall / 2 + 3, { size: 10, width: end - begin - 6 });
     }
   }
+}
+
+// What a port sent, of the firings that were kept.
+function laneOf(run, path) {
+  const rows = run.recordsAt.of(run.portOf.get(path)).filter((row) => run.isSend[row]);
+  const times = Float64Array.from(rows, (row) => run.times[run.record_tag[row]] / 1e9);
+  const numbers = Float64Array.from(rows, (row) => parseFloat(run.text(row)));
+  const lane = { name: path, times, values: numbers, states: null, line: false, left_out: 0 };
+  if (numbers.some((number) => !Number.isNaN(number))) return lane;
+  const words = Array.from(rows, (row) => run.text(row).replace(/^"|"$/g, "")), states = [...new Set(words)];
+  const place = new Map(states.map((state, i) => [state, i]));
+  return { ...lane, values: Float64Array.from(words, (word) => place.get(word)), states };
 }

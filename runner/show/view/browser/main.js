@@ -113,7 +113,7 @@ function picker(state, lanes) {
   select.addEventListener("pointerdown", fill);
   select.addEventListener("focus", fill);
   select.addEventListener("change", () => {
-    if (!lanes.shown.delete(select.value)) lanes.shown.add(select.value);
+    lanes.toggle(select.value);
     select.value = "";
     fill();
     state.changed();

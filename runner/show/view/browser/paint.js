@@ -19,8 +19,13 @@ function readTheme() {
     theme[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
+// CSS pixels in what views take for one: on a very wide screen letters and lines are larger.
+function unit() {
+  return window.innerWidth >= 2400 ? 1.5 : 1;
+}
+
 class View {
-  // A canvas in a box; `draw` paints it in CSS pixels.
+  // A canvas in a box; `draw` paints it in CSS pixels, or larger units on a screen that is far away.
   constructor(state, label) {
     this.state = state;
     this.canvas = element("canvas", { label, tabIndex: 0, className: "view" });
@@ -32,8 +37,8 @@ class View {
   fit() {
     const { clientWidth: width, clientHeight: height } = this.canvas, ratio = window.devicePixelRatio || 1;
     if (!width || !height) return;
-    this.width = width;
-    this.height = height;
+    this.width = width / unit();
+    this.height = height / unit();
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
     this.paper = this.canvas.getContext("2d");
@@ -103,7 +108,7 @@ function gestures(canvas, { move, zoom, click, grab, hover }) {
   let start = null, way = null, spread = 0;
   const at = (event) => {
     const box = canvas.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
+    return [(event.clientX - box.left) / unit(), (event.clientY - box.top) / unit()];
   };
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
