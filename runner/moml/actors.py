@@ -70,6 +70,7 @@ class Actor:
     follow: Callable[[str, str, str], None] = lambda ours, text, name: None
     # What the names in an expression are that change in the run: each by the names of variables, and these.
     changing: Callable[[Tree], tuple[dict[str, str], dict[str, Changing]]] = lambda tree: ({}, {})
+    arrays: frozenset[str] = frozenset()  # ports at which only arrays come
     reads: dict[str, Changing] = field(default_factory=dict)  # ports of ours to which variables lead
 
     # -- what is said in the file ---------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
 from .table import counterpart_of
 from .variables import Variables
-from .whole import whole_ports
+from .whole import array_ports, whole_ports
 from .wires import Counting, connections_of
 from .writing import Flow
 
@@ -278,6 +278,7 @@ class Conversion:
             {port: self._fed_width(level.entity, child, port) for port in known},
         )  # fmt: skip
         actor.follow = lambda ours, text, name: self.variables.follow(actor, level, ours, text, name)
+        actor.arrays = array_ports(self, level.entity, child)
         actor.changing = lambda tree: self.variables.names_in(tree, actor.scope)
         actor.convert()
         level.used |= actor.used

@@ -36,7 +36,7 @@ def expression(actor: Actor) -> None:
         held |= {name: _first_value(actor, each) for name, each in actor.reads.items()}
         actor.ports |= {name: name for name in actor.reads}
         known = {**changing, **actor.ports, "time": "time", "iteration": "iteration"}
-        ours = translated(tree, known, actor.scope, {*actor.whole, "iteration"})
+        ours = translated(tree, known, actor.scope, {*actor.whole, "iteration"}, actor.arrays)
     except ExpressionError as error:
         actor.notes.error(f"{actor.path}: expression: {error}")
         return

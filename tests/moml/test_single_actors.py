@@ -195,3 +195,16 @@ def test_values_that_cannot_be_written(tmp_path: Path, said: str, why: str) -> N
     with pytest.raises(MomlError) as caught:
         imported(tmp_path, text)
     assert str(caught.value) == f"m.xml cannot be imported:\n   - a.value = {said!r}: {why}"
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [("x + y", [11, 22]), ("-x * 2 - 1", [-3, -5]), ("x + n", [6, 7]), ("{1, 2} * y", [10, 40]), ("s * 2", 6)],
+)
+def test_arrays_are_added_item_by_item(tmp_path: Path, expression: str, expected: object) -> None:
+    ports = "".join(port(name, "input") for name in "xys")
+    actors = entity("X", "DiscreteClock", values="{{1, 2}}") + entity("Y", "DiscreteClock", values="{{10, 20}}")
+    actors += entity("S", "DiscreteClock", values="{3}") + entity("E", "Expression", ports, expression=expression)
+    nets = wires("X.output E.x", "Y.output E.y", "S.output E.s", "E.output Recorder.input")
+    text = model(prop("n", "{5, 5}"), actors, entity("Recorder", "Recorder"), nets, stop=0)
+    assert [token for _, _, token in recorded(tmp_path, text)] == [expected]
