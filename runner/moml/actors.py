@@ -291,6 +291,7 @@ def face_of(actor_row: Counterpart | None, entity: Entity, port: str) -> PortFac
         return PortFace("input" if said.flag("input") else "output", said.flag("multiport"))
     said_parameter = entity.properties.get(port)
     is_parameter = said_parameter is not None and said_parameter.java.endswith("PortParameter")
-    if actor_row is not None and (port in actor_row.parameters or is_parameter):  # the port of a PortParameter
+    row = None if actor_row is None else actor_row.parameters.get(port)
+    if actor_row is not None and (is_parameter if row is None else row.kind != "nothing"):  # of a PortParameter
         return PortFace("input", False)
     return None
