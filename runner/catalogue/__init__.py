@@ -1,7 +1,17 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
-from .figure import Figure, Mark, Shape, figure_types
-from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
+from .figure import Figure, Mark, Shape, own_figures
+from .measure import (
+    MSER5,
+    TAKES,
+    TIME,
+    TOKENS,
+    Measure,
+    MetricOptions,
+    TakeName,
+    conversion_problem,
+    take_problem,
+)
 from .packaged import (
     find,
     is_path,
@@ -27,7 +37,17 @@ from .reference import (
     shown,
     topic_order,
 )
-from .types import Catalogue, CatalogueError, Types, built_in, installed, load_all, types_of_file
+from .types import (
+    Catalogue,
+    CatalogueError,
+    Types,
+    built_in,
+    figure_types,
+    installed,
+    load_all,
+    types_of_file,
+    with_offered,
+)
 
 __all__ = [
     "MSER5",
@@ -39,10 +59,12 @@ __all__ = [
     "Figure",
     "Mark",
     "Measure",
+    "MetricOptions",
     "ParameterReference",
     "PortReference",
     "PortTypeError",
     "Shape",
+    "TakeName",
     "TypeReference",
     "Types",
     "as_written",
@@ -58,6 +80,7 @@ __all__ = [
     "is_path",
     "load_all",
     "model_folders",
+    "own_figures",
     "packaged_disturbances",
     "packaged_files",
     "packaged_models",
@@ -71,4 +94,5 @@ __all__ = [
     "topic_order",
     "types_of_file",
     "unreadable",
+    "with_offered",
 ]

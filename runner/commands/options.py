@@ -77,18 +77,6 @@ def number(text: str) -> float:
         return math.nan
 
 
-def seconds(flag: str, text: str | None) -> float | None:
-    """A model time that an option gives, in seconds or with a unit."""
-    from epicycle.actors import EpicycleError, convert
-
-    if text is None:
-        return None
-    time = convert(text, "s")
-    if not 0.0 <= time < 1e9:
-        raise EpicycleError(f"{flag} {text}: expected a time from 0 s to 1e9 s")
-    return time
-
-
 # -- options ----------------------------------------------------------------------------------------------------------
 
 COUNT = whole(1, 10**9, "1e9")
@@ -98,6 +86,12 @@ TYPES = several(
     "--types",
     metavar="FILE",
     help="a Python file with actors and aspects of your own, whose code is run; may be repeated",
+)
+DISTURB = several(
+    "--disturb",
+    metavar="NAME or FILE",
+    help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
+    "--aspect and --without count after it",
 )
 CHANGES = (  # to a model
     several(
@@ -110,12 +104,7 @@ CHANGES = (  # to a model
         metavar="FILE",
         help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
     ),
-    several(
-        "--disturb",
-        metavar="NAME or FILE",
-        help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
-        "--aspect and --without count after it",
-    ),
+    DISTURB,
     several(
         "--aspect",
         metavar="NAME=TYPE,KEY=VALUE,...",
@@ -163,6 +152,16 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     for warning in model.warnings:
         complain(str(warning))
     return model
+
+
+def check_path(flag: str, path: Path) -> None:
+    """Raise ``EpicycleError`` where no file can be written, before a run is made for it."""
+    from epicycle.actors import EpicycleError
+
+    if not path.parent.is_dir():
+        raise EpicycleError(f"{flag} {path} cannot be written: there is no folder {path.parent}")
+    if path.is_dir():
+        raise EpicycleError(f"{flag} {path} cannot be written: it is a folder")
 
 
 def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) -> int:

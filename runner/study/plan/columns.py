@@ -18,10 +18,11 @@ from ...text import Problems, inside, select
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table: what it counts in (empty if that is not known), and what it is."""
+    """A column of the table: what it counts in (empty if that is not known), what it is, and what it is called."""
 
     unit: str = ""
     doc: str = ""
+    label: str = ""
 
 
 # -- metrics ----------------------------------------------------------------------------------------------------------
@@ -110,17 +111,18 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
                 # A number with a unit is in the table in SI units, one without in the parameter's own.
                 unit = si_unit(written[1]) if written is not None and written[1] else declared.unit
                 found[setting.path] = Column(unit, declared.doc)
-    own = {metric.name: Column(metric.unit, metric.measure.doc) for metric in model.metrics}
+    own = {metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.metrics}
     for metric in metrics:
         known = own.get(metric.source.strip(), Column())
-        found[metric.name] = Column(metric.to or known.unit or metric.unit, metric.doc or known.doc)
+        unit = metric.to or known.unit or metric.unit
+        found[metric.name] = Column(unit, metric.doc or known.doc, metric.label or known.label)
     return found
 
 
 def _declared(path: str, model: Model) -> Column:
     """Unit and doc of a parameter of the model, or of those actors' that a pattern selects."""
-    if path in model.declared:
-        return Column(*model.declared[path])
+    if (declared := model.declared.get(path)) is not None:
+        return Column(declared.unit, declared.doc)
     owner, _, name = path.rpartition(".")
     for actor in select(owner, model.graph.actors) if owner else ():
         if (parameter := declared_parameters(type(model.graph.actors[actor])).get(name)) is not None:

@@ -1,0 +1,54 @@
+"""What a program calls: load, run, study, compare, view, plot, draw and save.  Commands go the same way.
+
+``epicycle`` itself offers all of these.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .comparing import Comparison, Difference, compare
+    from .picturing import Picture, Pictures, draw, plot, save
+    from .running import Changes, Done, load, perform, run, seconds, watched
+    from .studying import study
+    from .viewing import Page, recorded, view
+
+__all__ = [
+    "Changes",
+    "Comparison",
+    "Difference",
+    "Done",
+    "Page",
+    "Picture",
+    "Pictures",
+    "compare",
+    "draw",
+    "load",
+    "perform",
+    "plot",
+    "recorded",
+    "run",
+    "save",
+    "seconds",
+    "study",
+    "view",
+    "watched",
+]
+
+_HOMES = {
+    "comparing": ("Comparison", "Difference", "compare"),
+    "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
+    "running": ("Changes", "Done", "load", "perform", "run", "seconds", "watched"),
+    "studying": ("study",),
+    "viewing": ("Page", "recorded", "view"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    # On first use: a run needs neither studies nor what draws.
+    home = next((home for home, names in _HOMES.items() if name in names), None)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{home}", __name__), name)

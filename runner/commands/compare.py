@@ -1,0 +1,87 @@
+"""compare variants of a model"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..printing import complain, tell, tell_json
+from .options import (
+    CHANGES,
+    COUNT,
+    DISTURB,
+    DONE,
+    FAILED,
+    SEED,
+    check_path,
+    command,
+    option,
+    own_types,
+    several,
+)
+
+if TYPE_CHECKING:
+    from ..calls import Changes
+
+
+@command(
+    "compare variants of a model in pairs of runs",
+    option("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"),
+    several(
+        "--disturb",
+        metavar="NAME or FILE",
+        help="a variant with this disturbance, a packaged one or a YAML file; 'none' is the model as it is; repeat it",
+    ),
+    several("--vary", metavar="PATH=VALUE", help="a variant with this parameter, such as load=0.9; repeat it"),
+    *(each for each in CHANGES if each is not DISTURB),
+    option("--replications", type=COUNT, metavar="N", default=10, help="runs of each variant (default: 10)"),
+    SEED,
+    option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
+    option("--json", action="store_true", help="print one JSON object instead of the table"),
+    option(
+        "-o", "--out", metavar="FILE", type=Path, help="a page that shows the first runs of the first two side by side"
+    ),
+    imports=("calls.comparing",),
+)
+def compare(options: argparse.Namespace) -> int:
+    """Run variants of a model with the same seeds and compare their metrics with those of the first one: the mean
+    difference over pairs of runs, its 95 % interval, and the p-value of Student's paired test, corrected by Holm's
+    method. A single variant is compared with the model as it is."""
+    from dataclasses import asdict
+
+    from ..calls import compare, load, recorded, seconds
+    from ..shown import finite
+
+    common: Changes = {
+        "set": options.set,
+        "overrides": options.overrides,
+        "aspects": options.aspect,
+        "without_aspects": options.without,
+        "types": own_types(options),
+    }
+    if options.max_actors is not None:
+        common["max_actors"] = options.max_actors
+    variants: dict[str, Changes] = {
+        name: common if name == "none" else {**common, "disturb": name} for name in options.disturb
+    }
+    variants |= {each: {**common, "set": [*options.set, each]} for each in options.vary}
+    if len(variants) == 1:
+        variants = {"none": common, **variants}
+    if options.out is not None:
+        check_path("--out", options.out)
+    models = {name: load(options.model, **changes) for name, changes in variants.items()}
+    found = compare(options.model, models, replications=options.replications, seed=options.seed, until=options.until)
+    if options.json:
+        told = {"model": found.model, "seeds": list(found.seeds), "units": found.units}
+        tell_json(finite({**told, "differences": [asdict(each) for each in found.differences()]}))
+    else:
+        tell(str(found))
+    if options.out is not None:
+        until, names = seconds("--until", options.until), list(models)[:2]
+        recorded([models[name] for name in names], seed=found.seeds[0], until=until, names=names).save(options.out)
+        if not options.json:
+            tell(f"wrote {options.out}")
+    for (name, seed), error in found.failures.items():
+        complain(f"error: {name}, seed {seed}: {error}")
+    return FAILED if found.failures else DONE
