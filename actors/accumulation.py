@@ -3,9 +3,11 @@ Difference."""
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import Any
 
 from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
+from .items import added
 from .matching import taken
 
 
@@ -52,12 +54,12 @@ class Counter(Actor):
 class Accumulator(Actor):
     """The sum of all tokens so far, those of this tag included.
 
-    Ptolemy: ``Accumulator``.
+    Under ``like: ptolemy`` lists are added up item by item, too.  Ptolemy: ``Accumulator``.
     """
 
-    input = InputPort(float, multi=True, doc="what is added up")
+    input = InputPort(float, multi=True, ptolemy={"type": Any}, doc="what is added up")
     reset = InputPort(multi=True, required=False, doc="sets the sum back, before the tag is added")
-    output = OutputPort(float, doc="the sum; sent for each round of tokens, and at a reset")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="the sum; sent for each round of tokens, and at a reset")
 
     initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
     reset_by = Parameter(
@@ -67,7 +69,7 @@ class Accumulator(Actor):
     high: Parameter[float | None] = Parameter(int | float, None, doc="the greatest that the sum can be")
 
     def initialize(self) -> None:
-        self._sum = self.initial
+        self._sum: Any = self.initial
 
     def fire(self) -> None:
         if self.reset.present:
@@ -76,7 +78,11 @@ class Accumulator(Actor):
             if not self.input.present:
                 self._send()
         for (tokens,) in rounds(self.input):
-            self._sum += elementary.total(present(tokens))
+            there = present(tokens)
+            if all(isinstance(each, (int, float)) for each in there) and isinstance(self._sum, (int, float)):
+                self._sum += elementary.total(there)
+            else:
+                self._sum = reduce(added, there, self._sum)
             self._send()
 
     def _send(self) -> None:
@@ -192,7 +198,7 @@ class Difference(Actor):
     """
 
     input = InputPort(float, doc="the numbers")
-    output = OutputPort(float, doc="x[k] - x[k-1]")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="x[k] - x[k-1]")
 
     initial: Parameter[float | None] = Parameter(int | float, None, doc="what counts as the token before the first")
 

@@ -15,7 +15,10 @@ from .core import (
     PortParameter,
     Wake,
     array_parameter,
+    declared_parameters,
+    did_you_mean,
     rounds,
+    texts_parameter,
     to_nanoseconds,
     to_seconds,
     token_type,
@@ -292,3 +295,33 @@ class Random(Actor):
         numbers: Any = self.random if self._numbers is None else self._numbers
         for _ in range(_times(self.trigger)):
             self.output.send(self.distribution.draw(numbers))
+
+
+class VaryingRandom(Random):
+    """A ``Random`` whose distribution changes in the run: some of its parameters have inputs of their names.
+
+    What came there last counts; before, what the distribution says.  Ptolemy: the ports of ``Gaussian`` and the others.
+    """
+
+    varying = texts_parameter(doc="parameters of the distribution that have inputs")
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        known = declared_parameters(type(self.distribution))
+        for name in self.varying:
+            if name not in known:
+                raise ParameterError(
+                    f"varying: {type(self.distribution).__name__} has no parameter {name!r}{did_you_mean(name, known)}"
+                )
+        return {name: InputPort(doc="a parameter of the distribution") for name in dict.fromkeys(self.varying)}
+
+    def initialize(self) -> None:
+        self._law = self.distribution
+
+    def fire(self) -> None:
+        came = {name: port.value for name in self.varying if (port := self.inputs[name]).present}
+        if came:
+            said = {name: getattr(self._law, name) for name in declared_parameters(type(self._law))}
+            self._law = type(self._law)(**{**said, **came})
+        numbers: Any = self.random if self._numbers is None else self._numbers
+        for _ in range(_times(self.trigger)):
+            self.output.send(self._law.draw(numbers))

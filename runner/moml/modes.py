@@ -10,7 +10,7 @@ from .actors import is_decoration, is_layout, plain
 from .directors import director_of, said_of
 from .entities import Entity, Property, Relation, kind
 from .names import Names
-from .parts import Converting, Level, Part
+from .parts import Converting, Level, Part, give_priority
 from .scope import is_variable
 from .syntax import ExpressionError
 from .words import QUOTED, Words
@@ -316,8 +316,7 @@ def machine_part(conversion: Converting, child: Entity, level: Level, name: str)
         channels = machine.words.wired()
     else:
         entry = conversion.instance(child, _class(machine), {})
-    if (priority := child.properties.get("_priority")) is not None and priority.value:
-        entry["priority"] = conversion.scope_of(child).value_of(priority)
+    give_priority(entry, child, conversion.scope_of(child), conversion.notes)
     first = {name: ours[0] for name, ours in {**machine.inputs, **machine.outputs}.items()}
     return Part(name, entry, ports=first, channels=channels)
 
