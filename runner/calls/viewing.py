@@ -16,7 +16,7 @@ from ..bars import SOON
 from ..build import Model, figures_of
 from ..engine import ActorError, LoopError
 from ..printing import complain
-from ..show.view import Recording, page, write_page
+from ..show.view import Recording, page_of, write_page
 from ..text import Problems
 from .running import Changes, loaded, seconds, watched
 
@@ -47,7 +47,7 @@ class Page:
         return f"<Page of {' and '.join(self.names or [self.recordings[0].model.name])}>"
 
     def _repr_html_(self) -> str:
-        whole = html.escape(page(self.recordings, names=self.names))
+        whole = html.escape(page_of(self.recordings, names=self.names))
         look = "width: 100%; height: 80vh; border: 0"
         return f'<iframe sandbox="allow-scripts" srcdoc="{whole}" style="{look}"></iframe>'
 

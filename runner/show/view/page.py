@@ -31,10 +31,10 @@ PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lane
 
 def write_page(recordings: Sequence[Recording], path: Path, *, names: Sequence[str] = ()) -> None:
     """Write the page of one run, or of two that are compared; raises ``ViewError``."""
-    replace_file(path, page(recordings, names=names).encode())
+    replace_file(path, page_of(recordings, names=names).encode())
 
 
-def page(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
+def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
     """The page as text; ``names`` tell the runs apart."""
     pack = Pack()
     runs = [_run(each, name, pack) for each, name in zip(recordings, [*names, "", ""], strict=False)]
