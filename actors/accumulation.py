@@ -20,22 +20,35 @@ class Counter(Actor):
 
     increment = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one up")
     decrement = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one down")
-    reset = InputPort(required=False, doc="sets the number back, before the tag is counted")
+    reset = InputPort(required=False, ptolemy={"keep": True}, doc="sets the number back, before the tag is counted")
     output = OutputPort(int, doc="the number")
 
     initial = Parameter(int, 0, doc="the number at the start and after a reset")
+    reset_by = Parameter(
+        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset it: any, or those that are true"
+    )
+    reset_last = Parameter(
+        bool, False, ptolemy=True, doc="whether a reset counts behind what is counted at its tag, not before it"
+    )
 
     def initialize(self) -> None:
         self._number = self.initial
 
     def fire(self) -> None:
-        if self.reset.present:
+        resets = [self.reset.get()] if self.reset.keep and self.reset.waiting() else self.reset.tokens
+        is_reset = any(token is True or self.reset_by == "any" for token in resets)
+        if is_reset and not self.reset_last:
             self._number = self.initial
-        if self.increment.keep:
-            self._number += taken(self.increment) - taken(self.decrement)
-        else:
-            self._number += len(self.increment.tokens) - len(self.decrement.tokens)
-        self.output.send(self._number)
+        up, down = self._counted(self.increment), self._counted(self.decrement)
+        self._number += up - down
+        if is_reset and self.reset_last:
+            self._number = self.initial
+        if is_reset or up or down:
+            self.output.send(self._number)
+
+    @staticmethod
+    def _counted(port: InputPort[Any]) -> int:
+        return taken(port) if port.keep else len(port.tokens)
 
 
 class Accumulator(Actor):

@@ -162,7 +162,7 @@ class Constant(_Constant):
 
 class Counter(_Counter):
     """Counts tokens of any kind: up for each at `increment`, down for each at `decrement`."""
-    def __init__(self, path: str, *, initial: _Whole = ...) -> None: ...
+    def __init__(self, path: str, *, initial: _Whole = ..., reset_by: Literal['any', 'true'] = ..., reset_last: bool = ...) -> None: ...
 
 class CurrentMicrostep(_CurrentMicrostep):
     """Sends the present microstep for each trigger."""
@@ -370,7 +370,7 @@ class Poisson(_Poisson):
 
 class PoissonClock(_PoissonClock):
     """Ticks at random: the times between ticks are independent and exponentially distributed."""
-    def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., generator: Generator | abc.Mapping[str, object] | None = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
+    def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., generator: Generator | abc.Mapping[str, object] | None = ..., one_at_a_time: bool = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
 
 class Pool(_Pool):
     """Units of a resource: a token at `acquire` asks for some, comes back by `granted` when it has them, and one at `release` returns them."""
@@ -506,7 +506,7 @@ class Spread(_Spread):
 
 class StateMachine(_StateMachine):
     """A state machine, with a transition a line and variables that may flow."""
-    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
+    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., one_at_a_time: bool = ..., set_last: bool = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
 
 class StateSpace(_StateSpace):
     """A linear system in state space, `dx/dt = A x + B u`, `y = C x + D u`."""

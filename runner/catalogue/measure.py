@@ -47,6 +47,7 @@ class MetricOptions(TypedDict, total=False):
     unit: str
     to: str
     doc: str
+    label: str
 
 
 TAKES = {

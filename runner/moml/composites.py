@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -15,7 +14,7 @@ from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_request, is_response
 from .counterpart import UNSAID, Counterpart, counterpart_of_type
 from .directors import director_of, said_of
-from .entities import Entity, Property, kind
+from .entities import Entity, Property, kind, version_of
 from .leftovers import about_links, about_ports, about_properties, about_unknown, is_watched
 from .modes import is_machine, machine_part
 from .names import Names, snake
@@ -199,7 +198,7 @@ class Conversion:
         for port in level.entity.ports:
             face = self.face(level.entity, port)
             if face is not None:
-                for channel in range(self._channels(level.entity, port)):
+                for channel in range(self.channels(level.entity, port)):
                     found[face.direction == "output"].append(self.port_name(level.ports, port, channel))
         for name, ours in level.requests.items():
             found[is_response(level.entity.entities[name])].append(ours)
@@ -210,7 +209,7 @@ class Conversion:
         found[1].extend(level.added_outputs)
         return found
 
-    def _channels(self, entity: Entity, port: str) -> int:
+    def channels(self, entity: Entity, port: str) -> int:
         """How many ports of ours stand for a port of a composite."""
         face = self.face(entity, port)
         if face is None or not face.multi:
@@ -365,6 +364,9 @@ class Conversion:
         part = level.parts.get(end.actor)
         if part is None or end.port in part.unwired:
             return None
+        if end.port in part.channels:
+            ours = part.channels[end.port][end.channel]
+            return None if ours is None else (f"{part.name}.{ours}", face.direction == "output")
         return f"{part.name}.{self.port_of(entity, part, end.port, end.channel)}", face.direction == "output"
 
     def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str:
@@ -376,12 +378,6 @@ class Conversion:
         if port in part.row.ports:
             return part.row.ports[port].ours
         return part.row.parameters[port].ours if port in part.row.parameters else snake(port)
-
-
-def version_of(model: Entity) -> tuple[int, int]:
-    """The version of Ptolemy that wrote a model; a recent one if that is not said."""
-    said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
-    return (int(said[1]), int(said[2])) if said is not None else (11, 0)
 
 
 def is_composite(entity: Entity) -> bool:
