@@ -215,6 +215,7 @@ class PoissonClock(_Ticking):
         self._tick = 0
         self._rest = 0.0
         self._is_over = False
+        self._is_plain = not self.trigger.width and (self.stop_time is None or not self.one_at_a_time)
         self._ends_late = self.one_at_a_time
         self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
@@ -227,6 +228,17 @@ class PoissonClock(_Ticking):
         return to_nanoseconds(interval)
 
     def fire(self) -> None:
+        if not self._is_plain:
+            self._fire_for_triggers()
+            return
+        if self._wake is not None and not self._wake.due:
+            self._wake.cancel()
+        self._send(self._tick)
+        self._tick += 1
+        self._wake = self._wake_at(self.tag.time + self._interval())
+
+    def _fire_for_triggers(self) -> None:
+        """What it does where triggers let ticks come, or the last one comes late."""
         ticks = self._ticks() if self.trigger.width else 1
         if self._is_over or not ticks:
             return

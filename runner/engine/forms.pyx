@@ -338,7 +338,7 @@ SOURCES = (
     ("queues.py", "Server", "b1b76d0c79386ea5"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
     ("sources.py", "Clock", "e8869bd338027fbd"),
-    ("sources.py", "PoissonClock", "61931c571f7873f4"),
+    ("sources.py", "PoissonClock", "844c4f1ae2278480"),
     ("sources.py", "_Ticking", "dab6953921bd02e9"),
     ("arithmetic.py", "Scale", "8aa8628e425a69a5"),
     ("timing.py", "TimeDelay", "2525e8b2de82467c"),
