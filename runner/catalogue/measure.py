@@ -22,6 +22,7 @@ class Take:
 
     over: str
     doc: str
+    label: str
     of: str = "numbers"  # or "any" tokens, or "single" values: numbers and texts
     options: tuple[str, ...] = ()  # beside 'after', 'to' and what is said of all metrics
     needs: str = ""  # an option without which it says nothing
@@ -47,6 +48,7 @@ class MetricOptions(TypedDict, total=False):
     unit: str
     to: str
     doc: str
+    label: str
 
 
 TAKES = {
