@@ -22,7 +22,6 @@ class Take:
 
     over: str
     doc: str
-    label: str
     of: str = "numbers"  # or "any" tokens, or "single" values: numbers and texts
     options: tuple[str, ...] = ()  # beside 'after', 'to' and what is said of all metrics
     needs: str = ""  # an option without which it says nothing
