@@ -5,10 +5,11 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
+DOCS := $(VENV)/installed-docs
 LINKED := $(VENV)/linked
 
 .NOTPARALLEL:
-.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference wheel clean
+.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference docs wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
@@ -24,6 +25,7 @@ help:
 	@echo "make mutants 200 small changes of our sources: do the quick tests notice 90 % of them or more?"
 	@echo "make robust 100,000 problems that no scenario poses: does the solver answer each within its limits?"
 	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
+	@echo "make docs   the site of the documents, into site/ (runs every packaged model; 2 min)"
 	@echo "make wheel  build dist/epicycle-*.whl"
 	@echo "make clean  remove all that these made, except results/"
 
@@ -73,18 +75,22 @@ lint: $(DEV)
 reference: $(DEV)
 	$(BIN)/python tests/test_reference.py .
 
+docs: $(DOCS)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --config-file website/mkdocs.yml
+	@echo "open site/index.html"
+
 wheel: $(DEV)
 	rm -rf build dist
 	$(BIN)/python -m build --wheel
 	rm -rf build
 
 clean:
-	rm -rf $(VENV) build dist epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -rf $(VENV) build dist site site-parts epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	rm -f actors/compiled.json
 	find actors aspects models runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
 	find actors aspects runner \( -name '*.so' -o -name '*.pyd' \) -exec rm -f {} +
 
-# Two stamps on one environment; both grow stale when pyproject.toml changes.
+# Three stamps on one environment; all grow stale when pyproject.toml changes.
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Epicycle needs Python 3.11 or newer: make PYTHON=python3.x")'
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
@@ -105,4 +111,9 @@ $(USE): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 $(DEV): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[dev] into $(VENV) (first time only, and when pyproject.toml changes)"
 	@$(PIP) install --editable '.[dev]'
+	@touch $(USE) $@
+
+$(DOCS): pyproject.toml setup.py | $(BIN)/python $(LINKED)
+	@echo "Installing epicycle[docs] into $(VENV) (first time only, and when pyproject.toml changes)"
+	@$(PIP) install --editable '.[docs]'
 	@touch $(USE) $@

@@ -81,9 +81,7 @@ def exhibits(folder: Path) -> list[Exhibit]:
 
 def index(shown: list[Exhibit]) -> str:
     """The gallery's first page, as Markdown."""
-    cards = (
-        _CARD.format(name=each.name, picture=each.picture, doc=html.escape(each.doc.split(":")[0])) for each in shown
-    )
+    cards = (_CARD.format(name=each.name, picture=each.picture, doc=html.escape(each.doc)) for each in shown)
     return _INDEX.format(cards="\n".join(cards))
 
 

@@ -1,4 +1,4 @@
-"""What MkDocs asks for while it builds the site: pages from files outside of docs/, and the gallery."""
+"""What MkDocs asks for while it builds the site: pages from files outside docs/, and the gallery."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from mkdocs.structure.files import File, Files
+from mkdocs.structure.files import File, Files, InclusionLevel
 
 from website.gallery import exhibits, index
 
@@ -17,25 +17,27 @@ PARTS = ROOT / "site-parts"  # what is made on the way; mkdocs.yml names it, too
 ABOVE = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 
 
-def on_pre_build(config: Any) -> None:
-    """Make the gallery, and the package as mkdocstrings looks for it: `epicycle` with our folders in it."""
+def on_startup(*, command: str, dirty: bool) -> None:
+    """Make the package as mkdocstrings looks for it: `epicycle`, with our folders in it and no namespace package."""
+    del command, dirty
     shutil.rmtree(PARTS, ignore_errors=True)
     package = PARTS / "epicycle"
     package.mkdir(parents=True)
-    (package / "__init__.py").touch()  # mkdocstrings does not look into namespace packages
+    (package / "__init__.py").touch()
     for folder in ("actors", "aspects", "runner"):
         (package / folder).symlink_to(ROOT / folder, target_is_directory=True)
-    config.extra["gallery"] = exhibits(PARTS / "gallery")
 
 
 def on_files(files: Files, *, config: Any) -> Files:
     """Add the documents above docs/, and the gallery."""
     for source, page in ABOVE.items():
         files.append(File.generated(config, page, content=as_page((ROOT / source).read_text(encoding="utf-8"))))
-    shown = config.extra["gallery"]
+    shown = exhibits(PARTS / "gallery")
     files.append(File.generated(config, "gallery/index.md", content=index(shown)))
     for each in shown:
-        files.append(File.generated(config, f"gallery/{each.name}.md", content=each.page))
+        page = File.generated(config, f"gallery/{each.name}.md", content=each.page)
+        page.inclusion = InclusionLevel.NOT_IN_NAV  # the gallery's first page leads there
+        files.append(page)
         for made in sorted((PARTS / "gallery" / each.name).iterdir()):
             place = f"gallery/{each.name}/{made.name}"
             files.append(File.generated(config, place, abs_src_path=os.fspath(made)))
