@@ -69,11 +69,11 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python -m tests.arithmetic
-	$(BIN)/lint-imports --no-logo --no-cache
+	$(BIN)/python -m tests.layers
 	$(BIN)/mypy
 
 reference: $(DEV)
-	$(BIN)/python tests/test_reference.py .
+	$(BIN)/python -m tests.test_reference .
 
 docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --config-file website/mkdocs.yml
@@ -97,9 +97,10 @@ $(BIN)/python:
 
 # mypy cannot follow an editable install to the folders at the root.  It looks into a package of stubs, which Python does
 # not: links there let it check the programs of users against the source.
-$(LINKED): | $(BIN)/python
+$(LINKED): pyproject.toml | $(BIN)/python
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') && \
 	mkdir -p "$$site/epicycle-stubs" && \
+	ln -sfn "$(CURDIR)/api/__init__.py" "$$site/epicycle-stubs/__init__.pyi" && \
 	for folder in actors aspects runner; do ln -sfn "$(CURDIR)/$$folder" "$$site/epicycle-stubs/$$folder"; done
 	@touch $@
 

@@ -7,67 +7,66 @@ from .compiled import CORE, CORE_MODULES, CORE_REASON
 
 # isort: split
 # What comes before decides what all imports behind find: compiled modules, or their sources.
-from .accumulation import Accumulator, Counter, Derivative, Difference, Integrator, TimeAverage
-from .arithmetic import AddSubtract, Extreme, MathFunction, MultiplyDivide, Scale
 from .core import *
-from .distributions import (
-    Bernoulli,
-    Binomial,
-    Cauchy,
-    ChiSquare,
-    Choice,
-    Constant,
-    Distribution,
-    Exponential,
-    Gamma,
-    LogNormal,
-    NegativeBinomial,
-    Normal,
-    Poisson,
-    RandomInteger,
-    StudentT,
-    Triangular,
-    Uniform,
-    VonMises,
-)
-from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
-from .functions import Expression, Function, LookupTable
-from .generators import DRand, Generator, JavaRandom
-from .logic import Comparator, Equals, LogicGate
-from .passing import (
-    BooleanSelect,
-    Changes,
-    Commutator,
-    Default,
-    Filter,
-    FirstOfInstant,
-    Inhibit,
-    IsPresent,
-    LatestOfAll,
-    Previous,
-    Register,
-    Sequencer,
-)
-from .queues import Queue, Server, SharedQueue
-from .replay import Replay, ReplayError
-from .sinks import Display, Histogram, Recorder, Stop, Test
-from .sources import Clock, PoissonClock, Random, SingleEvent
-from .statistics import MovingAverage, MovingStatistics
-from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
-from .triggered import Const, CurrentMicrostep, CurrentTime, Pulse, Ramp, Sequence
-from .variables import SetVariable, Variable
 
 if TYPE_CHECKING:
-    from .blocks import BlockExpression, HoldingExpression
-    from .continuous import ODE
-    from .control import *
-    from .entities import Batch, Collect, Match, RecordAssembler, RecordDisassembler, SetFields, Spread, Unbatch
-    from .links import ArqReceiver, ArqSender, Link, NetworkSwitch
-    from .modes import *
-    from .resources import Machine, Pool, Station, WaitingLine
-    from .robotics import *
-    from .texts import TextFunction
-    from .vehicles import *
+    from .constructors import *  # the same classes, each with a constructor that names its parameters
+    from .control import FilterDesign
+    from .distributions import Distribution
+    from .generators import Generator
+    from .modes import Mode, on_entry, on_exit, transition
+    from .replay import ReplayError
+    from .robotics import BodyState, ChannelError, Estimate, FilterError, Measurement, Objective, Plan, Solver
+    from .vehicles import Pose
+else:
+    from .accumulation import Accumulator, Counter, Derivative, Difference, Integrator, TimeAverage
+    from .arithmetic import AddSubtract, Extreme, MathFunction, MultiplyDivide, Scale
+    from .distributions import (
+        Bernoulli,
+        Binomial,
+        Cauchy,
+        ChiSquare,
+        Choice,
+        Constant,
+        Distribution,
+        Exponential,
+        Gamma,
+        LogNormal,
+        NegativeBinomial,
+        Normal,
+        Poisson,
+        RandomInteger,
+        StudentT,
+        Triangular,
+        Uniform,
+        VonMises,
+    )
+    from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
+    from .functions import Expression, Function, LookupTable
+    from .generators import DRand, Generator, JavaRandom
+    from .logic import Comparator, Equals, LogicGate
+    from .passing import (
+        BooleanSelect,
+        Changes,
+        Commutator,
+        Default,
+        Filter,
+        FirstOfInstant,
+        Inhibit,
+        IsPresent,
+        LatestOfAll,
+        Previous,
+        Register,
+        Sequencer,
+    )
+    from .queues import Queue, Server, SharedQueue
+    from .replay import Replay, ReplayError
+    from .sinks import Display, Histogram, Recorder, Stop, Test
+    from .sources import Clock, PoissonClock, Random, SingleEvent
+    from .statistics import MovingAverage, MovingStatistics
+    from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
+    from .triggered import Const, CurrentMicrostep, CurrentTime, Pulse, Ramp, Sequence
+    from .variables import SetVariable, Variable
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "ODE", "PID",

@@ -1,25 +1,36 @@
 """What can be woven around a model: aspects, and the join points that they act at."""
 
-from .clock import ClockAspect, ClockDrift, ClockOffset
-from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
+from typing import TYPE_CHECKING
+
 from .core import *
-from .execution import CrashRestart, ExecutionTime, Processor, SkipFiring
-from .measurement import (
-    Alteration,
-    Bias,
-    Drift,
-    MeasurementFailure,
-    Noise,
-    Outlier,
-    Quantise,
-    Replace,
-    Saturate,
-    StuckAt,
-    Transform,
-)
-from .media import Bus, Medium, RadioMedium
-from .observation import Assert, Count, InvariantError, Probe
-from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
+
+if TYPE_CHECKING:
+    from .clock import ClockAspect
+    from .constructors import *  # the same classes, each with a constructor that names its parameters
+    from .measurement import Alteration
+    from .media import Medium
+    from .observation import InvariantError
+    from .situation import SituationError
+else:
+    from .clock import ClockAspect, ClockDrift, ClockOffset
+    from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
+    from .execution import CrashRestart, ExecutionTime, Processor, SkipFiring
+    from .measurement import (
+        Alteration,
+        Bias,
+        Drift,
+        MeasurementFailure,
+        Noise,
+        Outlier,
+        Quantise,
+        Replace,
+        Saturate,
+        StuckAt,
+        Transform,
+    )
+    from .media import Bus, Medium, RadioMedium
+    from .observation import Assert, Count, InvariantError, Probe
+    from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
 
 __all__ = [
     "STAMP", "ActorPoint", "Alteration", "Aspect", "AspectContext", "Assert", "Bias", "Bus", "ByActorParameter",

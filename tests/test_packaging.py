@@ -1,4 +1,4 @@
-"""The four folders at the root install as one namespace, completely, once, and import one way."""
+"""The folders at the root install as one package, completely, once, and import one way."""
 
 import ast
 import json
@@ -20,10 +20,11 @@ import pytest
 import setuptools
 
 from epicycle.actors import CORE_MODULES
+from epicycle.runner.catalogue import TAKES
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("actors", "aspects", "models", "runner")
-CODE_FOLDERS = ("actors", "aspects", "runner")
+FOLDERS = ("actors", "aspects", "models", "runner", "api")  # the last is `epicycle` itself
+CODE_FOLDERS = ("actors", "aspects", "runner", "api")
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 PACKAGES = CONFIG["tool"]["setuptools"]["packages"]
 TYPINGS = ROOT / "tests" / "typings"
@@ -36,17 +37,22 @@ def shipped_files() -> list[Path]:
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
         if (
-            path.suffix in {".py", ".yaml", ".css", ".mplstyle", ".pxd", ".pyx"}
+            path.suffix in {".py", ".pyi", ".yaml", ".css", ".mplstyle", ".pxd", ".pyx"}
             or path.name in {"py.typed", "schema.json"}
         )
         and "__pycache__" not in path.parts
     )
 
 
+def place_of(file: Path) -> Path:
+    """Return where in the package epicycle a file of ours is."""
+    return file.relative_to("api") if file.parts[0] == "api" else file
+
+
 def module_name(file: Path) -> str:
     """Return the dotted name under which a file of ours is imported."""
-    parts = file.parts[:-1] if file.name == "__init__.py" else file.with_suffix("").parts
-    return ".".join(("epicycle", *parts))
+    parts = place_of(file).with_suffix("").parts
+    return ".".join(("epicycle", *(parts[:-1] if file.name == "__init__.py" else parts)))
 
 
 def imported_names(text: str, file: Path) -> Iterator[tuple[int, str]]:
@@ -77,15 +83,12 @@ def forbidden_imports(text: str, file: Path) -> list[str]:
 
 MODELS = sorted(file.as_posix() for file in shipped_files() if file.suffix == ".yaml")
 
-# importlib.resources.files("epicycle.models") fails in an editable install: setuptools adds a placeholder to
-# the path of a namespace package, which is no folder. So read the path, and leave out what is none.
 WHERE = """
     import importlib, json, sysconfig
     from pathlib import Path
     folders = []
     for name in ("actors", "aspects", "models", "runner"):
-        path = importlib.import_module(f"epicycle.{name}").__path__
-        folders += [Path(entry) for entry in path if Path(entry).is_dir()]
+        folders += map(Path, importlib.import_module(f"epicycle.{name}").__path__)
     home = folders[2]
     models = sorted(f"models/{file.relative_to(home).as_posix()}" for file in home.rglob("*.yaml"))
     site = sysconfig.get_path("purelib")
@@ -94,7 +97,7 @@ WHERE = """
 
 
 def test_packages_equal_the_tree() -> None:
-    on_disk = {".".join(("epicycle", *file.parent.parts)) for file in shipped_files()}
+    on_disk = {".".join(("epicycle", *place_of(file).parent.parts)) for file in shipped_files()}
     assert sorted(PACKAGES) == sorted(on_disk)
 
 
@@ -106,7 +109,10 @@ def test_every_folder_with_code_has_an_init() -> None:
 
 def test_models_hold_yaml_and_its_schema_only() -> None:
     models = [file for file in shipped_files() if file.parts[0] == "models"]
-    assert [file.as_posix() for file in models if file.suffix != ".yaml"] == ["models/schema.json"]
+    assert [file.as_posix() for file in models if file.suffix != ".yaml"] == [
+        "models/__init__.py",
+        "models/schema.json",
+    ]
 
 
 @pytest.mark.parametrize("folder", CODE_FOLDERS)
@@ -123,9 +129,9 @@ def test_folder_is_typed_and_says_what_it_offers(folder: str) -> None:
 
 
 def test_mypy_redirects_equal_the_tree() -> None:
-    code = {file.parent for file in shipped_files() if file.name == "__init__.py"}
+    code = {file.parent for file in shipped_files() if file.name == "__init__.py"} - {Path("api")}
     expected = {
-        "epicycle/__init__.pyi": "",
+        "epicycle/__init__.pyi": "from api import *\n",
         "epicycle/aspects/testing.pyi": "from aspects.testing import *\n",  # a module that the runner imports
     }
     for folder in code:
@@ -182,7 +188,7 @@ def test_nothing_is_imported_twice() -> None:
     """Look in a fresh interpreter started at the root, where a bare `import actors` would work too."""
     script = """
         import importlib, json, pkgutil, sys
-        for folder in ("epicycle.actors", "epicycle.aspects", "epicycle.runner"):
+        for folder in ("epicycle.actors", "epicycle.aspects", "epicycle.models", "epicycle.runner"):
             package = importlib.import_module(folder)
             for module in pkgutil.walk_packages(package.__path__, folder + "."):
                 if not module.name.endswith("__main__"):
@@ -260,8 +266,9 @@ def busy_folder(tmp_path: Path) -> Path:
 
 
 PROGRAM = """
-from epicycle.actors import Actor, InputPort, OutputPort, Parameter, PoissonClock
-from epicycle.aspects import JoinPoint, MeasurementAspect
+import epicycle
+from epicycle.actors import Actor, Clock, Exponential, InputPort, OutputPort, Parameter, PoissonClock, Random
+from epicycle.aspects import JoinPoint, MeasurementAspect, PacketLoss
 from epicycle.runner import Model, Results, Simulation
 
 
@@ -280,32 +287,64 @@ class Twice(MeasurementAspect):
         point.forward(2 * token)
 
 
-model = Model("gain", stop="1 min")
+model = Model("gain", stop="1 min", ties="posted")
 clock = model.add(PoissonClock("clock", mean_interval="1 s"))
-gain = model.add(Gain("gain"))
-model.connect(clock.output, gain.input)
+numbers = model.add(Random("numbers", distribution=Exponential(mean=2)))
+gain = model.add(Gain("gain", factor=2.0))
+model.connect(clock.output, numbers.trigger)
+model.connect(numbers.output, gain.input)
 model.weave("twice", Twice(), at=gain.output)
+model.weave("loss", PacketLoss(probability=0.1, from_="3 s"), at=gain.input)
+model.metric("greatest", of=gain.output, take="max", after=1.0)
 results: Results = Simulation(model).run()
+again: Results = epicycle.run("mm1", seed=3, set={"load": 0.9}, until="1 h")
+epicycle.plot(again, "wait").save("wait.svg")
+print(epicycle.compare("mm1", {"a": {}, "b": {"set": {"load": 0.5}}}).differences()[0].p)
+print(epicycle.study("waiting_time", replications=3).means("mean_wait"))
+"""
+REVEALED = """
 reveal_type(gain.factor)
 reveal_type(gain.input.value)
 gain.output.send("text")
+Clock("clock", perriod="1 s")
+PacketLoss(probabilty=0.1)
+Random("numbers", distribution=Exponential(mean=2, seed=1))
+model.metric("greatest", of=gain.output, take="maximum")
+model.metric("greatest", of=gain.output, take="max", afer=1.0)
+Model("gain", ties="postd")
+epicycle.run("mm1", sed=3)
 """
 
 
-def types_of_a_program(folder: Path, python: object) -> str:
+def types_of_a_program(folder: Path, python: object, program: str) -> str:
     """What mypy says of a user's program, written in a folder of its own."""
-    (folder / "program.py").write_text(PROGRAM, "utf-8")
+    (folder / "program.py").write_text(program, "utf-8")
     words = [sys.executable, "-m", "mypy", "--strict", "--python-executable", str(python), "program.py"]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     assert done.stderr == ""
     return done.stdout
 
 
-EXPECTED_TYPES = """\
-program.py:28: note: Revealed type is "float"
-program.py:29: note: Revealed type is "float"
-program.py:30: error: Argument 1 to "send" of "OutputPort" has incompatible type "str"; expected "float"  [arg-type]
-Found 1 error in 1 file (checked 1 source file)
+SUCCESS = "Success: no issues found in 1 source file\n"
+EXPECTED_TYPES = f"""\
+program.py:38: note: Revealed type is "float"
+program.py:39: note: Revealed type is "float"
+program.py:40: error: Argument 1 to "send" of "OutputPort" has incompatible type "str"; expected "float"  [arg-type]
+program.py:41: error: Unexpected keyword argument "perriod" for "Clock"; did you mean "period"?  [call-arg]
+program.py:41: note: "Clock" defined in "epicycle.actors.constructors"
+program.py:42: error: Unexpected keyword argument "probabilty" for "PacketLoss"; did you mean "probability"?  [call-arg]
+program.py:42: note: "PacketLoss" defined in "epicycle.aspects.constructors"
+program.py:43: error: Unexpected keyword argument "seed" for "Exponential"  [call-arg]
+program.py:43: note: "Exponential" defined in "epicycle.actors.constructors"
+program.py:44: error: Argument "take" to "metric" of "Model" has incompatible type "Literal['maximum']"; \
+expected "Literal[{", ".join(map(repr, TAKES))}]"  [arg-type]
+program.py:45: error: Unexpected keyword argument "afer" for "metric" of "Model"; did you mean "after"?  [call-arg]
+program.py:45: note: "metric" defined in "epicycle.runner.build.model"
+program.py:46: error: Argument "ties" to "Model" has incompatible type "Literal['postd']"; \
+expected "Literal['declared', 'posted'] | None"  [arg-type]
+program.py:47: error: Unexpected keyword argument "sed" for "run"; did you mean "seed"?  [call-arg]
+program.py:47: note: "run" defined in "epicycle.runner.calls.running"
+Found 8 errors in 1 file (checked 1 source file)
 """
 
 
@@ -313,7 +352,8 @@ Found 1 error in 1 file (checked 1 source file)
 def test_mypy_finds_the_types_of_what_make_installs(tmp_path: Path) -> None:
     if not Path(sys.prefix, "linked").exists():
         pytest.skip("this environment was not made by make")
-    assert types_of_a_program(tmp_path, sys.executable) == EXPECTED_TYPES
+    assert types_of_a_program(tmp_path, sys.executable, PROGRAM) == SUCCESS
+    assert types_of_a_program(tmp_path, sys.executable, PROGRAM + REVEALED) == EXPECTED_TYPES
 
 
 @pytest.mark.slow
@@ -322,7 +362,8 @@ def test_mypy_finds_the_types_of_the_wheel(wheel: Path, tmp_path: Path) -> None:
     at = {"base": str(tmp_path / "environment"), "platbase": str(tmp_path / "environment")}
     python = Path(sysconfig.get_path("scripts", "venv", at)) / "python"
     pip("--python", python, "install", "--no-deps", "--no-index", wheel)
-    assert types_of_a_program(tmp_path, python) == EXPECTED_TYPES
+    assert types_of_a_program(tmp_path, python, PROGRAM) == SUCCESS
+    assert types_of_a_program(tmp_path, python, PROGRAM + REVEALED) == EXPECTED_TYPES
 
 
 def pip(*arguments: object) -> None:
@@ -392,7 +433,7 @@ def test_wheel_holds_every_file_and_no_other(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         found = [name for name in archive.namelist() if ".dist-info/" not in name]
     core = {name for name in found if name.endswith((".so", ".pyd", "/compiled.json"))}
-    assert sorted(set(found) - core) == sorted(f"epicycle/{file.as_posix()}" for file in shipped_files())
+    assert sorted(set(found) - core) == sorted(f"epicycle/{place_of(file).as_posix()}" for file in shipped_files())
     # All of the compiled core or, where there is no compiler, nothing of it.
     modules = {name.partition(".")[0].replace("/", ".") for name in core if not name.endswith(".json")}
     assert modules in ({*CORE_MODULES}, set())
@@ -403,7 +444,7 @@ def test_wheel_holds_every_file_and_no_other(wheel: Path) -> None:
 def test_wheel_finds_its_own_modules_and_models(installed: Path, busy_folder: Path) -> None:
     found = json.loads(run_in(busy_folder, installed / "python", "-c", textwrap.dedent(WHERE)))
     home = Path(found["site"]) / "epicycle"
-    assert [Path(folder) for folder in found["folders"]] == [home / folder for folder in FOLDERS]
+    assert [Path(folder) for folder in found["folders"]] == [home / folder for folder in FOLDERS if folder != "api"]
     assert found["models"] == MODELS
 
 

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.constructors import stubs
+
 ROOT = Path(__file__).parents[1]
-FILES = ("models/schema.json", "docs/reference.md")
+FILES = ("models/schema.json", "docs/reference.md", "actors/constructors.pyi", "aspects/constructors.pyi")
 
 
 def texts() -> dict[str, str]:
@@ -22,7 +24,7 @@ def texts() -> dict[str, str]:
 
     own, figures, of_studies = built_in(), figure_types(), study_figure_types()
     schema = schema_text(json_schema(own, figures, of_studies))
-    return dict(zip(FILES, (schema, markdown(own, figures, of_studies)), strict=True))
+    return dict(zip(FILES, (schema, markdown(own, figures, of_studies), *stubs().values()), strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +32,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files, made in a process of its own: other tests define types."""
     folder = tmp_path_factory.mktemp("made")
     for name in FILES:
-        (folder / name).parent.mkdir()
-    subprocess.run([sys.executable, __file__, str(folder)], check=True, env={**os.environ, "PYTHONHASHSEED": "7"})
+        (folder / name).parent.mkdir(exist_ok=True)
+    environment = {**os.environ, "PYTHONHASHSEED": "7"}
+    subprocess.run([sys.executable, "-m", "tests.test_reference", str(folder)], check=True, cwd=ROOT, env=environment)
     return folder
 
 

@@ -6,6 +6,7 @@ import math
 import types
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, overload
 from weakref import WeakKeyDictionary
@@ -335,6 +336,8 @@ class Configurable:
 
     def _configure(self, values: Mapping[str, object]) -> None:
         declared = declared_parameters(type(self))
+        # `from_=3` in Python, where `from` is a keyword.
+        values = {name[:-1] if iskeyword(name[:-1]) else name: value for name, value in values.items()}
         if any(parameter.differs for parameter in declared.values()):
             self._configured = frozenset(values)
         for name in values:

@@ -122,7 +122,7 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()
         }
-        model.declared = {name: (text.unit, text.doc) for name, text in root.parameters.items()}
+        model.declared = dict(root.parameters)
         model.figures = _figures(text, values, names)
     try_classes(known, made.classes, values, limits, problems)
     return model

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from html import escape
+from importlib import import_module
 from pathlib import Path
+from typing import Unpack
 
-from epicycle.actors import Stop, Tag, counted, declared_parameters
+from epicycle.actors import EpicycleError, Stop, Tag, counted, declared_parameters, visible
 
-from ..catalogue import take_problem
+from ..catalogue import MetricOptions, TakeName, take_problem
 from ..collection import without_collection
 from ..graph import (
+    Like,
     Metric,
     ModelGraph,
     Postings,
     Rules,
+    Ties,
     Watched,
     WovenAspect,
     check_processors,
@@ -21,7 +26,7 @@ from ..graph import (
     is_within,
     postings,
 )
-from ..language import Values
+from ..language import ParameterText, Values
 from ..shown import short
 from ..tables import Table, Tabled
 from ..text import NAME, NAMES_HAVE, Position, Problem, Problems, Text, call_site, within
@@ -65,8 +70,8 @@ class Model(Scope, Tabled):
         stop: float | str | None = None,
         seed: int = 0,
         parameters: Mapping[str, object] | None = None,
-        ties: str | None = None,
-        like: str | None = None,
+        ties: Ties | None = None,
+        like: Like | None = None,
     ) -> None:
         super().__init__(self, "")
         self.name = name
@@ -76,7 +81,7 @@ class Model(Scope, Tabled):
             rules = director_of(name, {"ties": ties, "like": like}, call_site(), problems)
         self.draft.graph.rules[""] = Rules().inside(rules.get("ties"), rules.get("like"))
         self.parameters: dict[str, object] = dict(parameters or {})
-        self.declared: dict[str, tuple[str, str]] = {}  # unit and doc of the parameters
+        self.declared: dict[str, ParameterText] = {}  # what its file says of the parameters
         self.aspects: list[WovenAspect] = []
         self.stop_time: int | None = None  # ns
         self.stop_ports: list[str] = []
@@ -151,7 +156,7 @@ class Model(Scope, Tabled):
         """End the run, after the tag in question, when one of these output ports sends something true."""
         self._watch(ports, lambda watching, text: watching.stop_when(text))
 
-    def metric(self, name: str, *, of: str | Port, take: str = "last", **options: object) -> None:
+    def metric(self, name: str, *, of: str | Port, take: TakeName = "last", **options: Unpack[MetricOptions]) -> None:
         """A number in the results; what can be taken, and with which options, is in docs/language.md.
 
         >>> model.metric("in_queue", of="server.size", take="time_mean", initial=0, after="100 s", interval=0.95)
@@ -266,6 +271,15 @@ class Model(Scope, Tabled):
         graph = self.graph
         parts = [(len(graph.actors), "actor"), (graph.connections, "connection"), (len(self.aspects), "aspect")]
         return ", ".join(counted(number, noun) for number, noun in parts)
+
+    def _repr_html_(self) -> str:
+        """The drawing of the model, and all that is in it; drawing is looked up, as it stands above models."""
+        try:
+            picture = import_module("...calls", __name__).draw(self)._repr_html_()
+        except EpicycleError:  # it may be half built
+            return super()._repr_html_()
+        summary = f"<summary>{escape(visible(self._caption()))}</summary>"
+        return f"{picture}<details>{summary}{super()._repr_html_()}</details>"
 
     def _caption(self) -> str:
         return f"{self.name}: {self.extent}" + ("" if self.stop is None else f", stops at {self.stop:g} s")

@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar, overload
 from epicycle.actors import Actor, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
-from ..graph import ModelGraph, WovenAspect
+from ..graph import Like, ModelGraph, Ties, WovenAspect
 from ..language import Values
 from ..text import NAME, NAMES_HAVE, Position, Problems, call_site, did_you_mean
 from .composite_aspect import ModelWeaving, check_nesting
@@ -149,8 +149,8 @@ class Scope:
         director: bool = False,
         start: float | str | None = None,
         drift: float = 1.0,
-        ties: str | None = None,
-        like: str | None = None,
+        ties: Ties | None = None,
+        like: Like | None = None,
     ) -> Composite:
         """Add an empty composite, a scope for actors of its own, with ports through which it is connected.
 

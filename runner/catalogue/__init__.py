@@ -1,7 +1,17 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
 from .figure import Figure, Mark, Shape, figure_types
-from .measure import MSER5, TAKES, TIME, TOKENS, Measure, conversion_problem, take_problem
+from .measure import (
+    MSER5,
+    TAKES,
+    TIME,
+    TOKENS,
+    Measure,
+    MetricOptions,
+    TakeName,
+    conversion_problem,
+    take_problem,
+)
 from .packaged import (
     find,
     is_path,
@@ -39,10 +49,12 @@ __all__ = [
     "Figure",
     "Mark",
     "Measure",
+    "MetricOptions",
     "ParameterReference",
     "PortReference",
     "PortTypeError",
     "Shape",
+    "TakeName",
     "TypeReference",
     "Types",
     "as_written",

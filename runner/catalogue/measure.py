@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal, TypeAlias, TypedDict
 
 from epicycle.actors import Configurable, Parameter, ParameterError, Quantity, UnitError, did_you_mean, parse_unit
 from epicycle.actors.expression import Formula, FormulaParameter
@@ -26,6 +27,26 @@ class Take:
     needs: str = ""  # an option without which it says nothing
     unit: str = ""
     settles: bool = True  # whether MSER-5 can tell when it has settled
+
+
+# The keys of TAKES, and what a Measure declares beside 'take', as type checkers know them.
+TakeName: TypeAlias = Literal[
+    "last", "first", "count", "min", "max", "sum", "mean", "std", "quantile", "rate", "time_mean", "time_std",
+    "time_quantile", "share",
+]  # fmt: skip
+
+
+class MetricOptions(TypedDict, total=False):
+    """What may be said of a metric in Python beside its name, the port and what is taken."""
+
+    p: float | str
+    when: str | Formula
+    initial: object
+    after: float | str
+    interval: float | str
+    unit: str
+    to: str
+    doc: str
 
 
 TAKES = {

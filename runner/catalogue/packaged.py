@@ -12,12 +12,8 @@ from ..text import Position, Problems, did_you_mean
 
 
 def model_folders() -> list[Path]:
-    """The folders of packaged models.
-
-    A namespace package's ``__path__`` is read, because ``importlib.resources`` fails on it in an editable install.
-    """
-    package = import_module("epicycle.models")
-    return [Path(entry) for entry in package.__path__ if Path(entry).is_dir()]
+    """The folders of packaged models."""
+    return [Path(entry) for entry in import_module("epicycle.models").__path__]
 
 
 def packaged_files(kind: str) -> dict[str, Path]:

@@ -1,10 +1,11 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import describe, imports, run, studies, trace, view
+from . import compare, completion, describe, imports, new, run, show, studies, trace, view
 
 COMMANDS = (
     run.run,
     view.view,
+    compare.compare,
     studies.study,
     studies.resume,
     studies.status,
@@ -12,12 +13,15 @@ COMMANDS = (
     studies.report,
     trace.trace,
     describe.validate,
+    show.show,
     describe.graph,
     describe.models,
     describe.actors,
     describe.aspects,
     describe.schema,
     imports.import_,
+    new.new,
+    completion.completion,
 )
 
 __all__ = ["COMMANDS"]

@@ -77,18 +77,6 @@ def number(text: str) -> float:
         return math.nan
 
 
-def seconds(flag: str, text: str | None) -> float | None:
-    """A model time that an option gives, in seconds or with a unit."""
-    from epicycle.actors import EpicycleError, convert
-
-    if text is None:
-        return None
-    time = convert(text, "s")
-    if not 0.0 <= time < 1e9:
-        raise EpicycleError(f"{flag} {text}: expected a time from 0 s to 1e9 s")
-    return time
-
-
 # -- options ----------------------------------------------------------------------------------------------------------
 
 COUNT = whole(1, 10**9, "1e9")
@@ -98,6 +86,12 @@ TYPES = several(
     "--types",
     metavar="FILE",
     help="a Python file with actors and aspects of your own, whose code is run; may be repeated",
+)
+DISTURB = several(
+    "--disturb",
+    metavar="NAME or FILE",
+    help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
+    "--aspect and --without count after it",
 )
 CHANGES = (  # to a model
     several(
@@ -110,12 +104,7 @@ CHANGES = (  # to a model
         metavar="FILE",
         help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
     ),
-    several(
-        "--disturb",
-        metavar="NAME or FILE",
-        help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
-        "--aspect and --without count after it",
-    ),
+    DISTURB,
     several(
         "--aspect",
         metavar="NAME=TYPE,KEY=VALUE,...",

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..printing import console, notices, tell, tell_json_text
-from .options import DONE, MODEL, SEED, command, load, option, seconds, several
+from .options import DONE, MODEL, SEED, command, load, option, several
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Tag
@@ -32,12 +32,13 @@ WIDEST = 80  # characters of a token
     option("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'"),
     option("--to", metavar="TIME", help="end there (default: the end of the run)"),
     option("--json", action="store_true", help="print one JSON object a line"),
-    imports=("build", "engine"),
+    imports=("calls.running",),
 )
 def trace(options: argparse.Namespace) -> int:
     """Run a model and print the firings of its actors, with the tokens and wake-ups that caused them."""
     from epicycle.actors import to_nanoseconds
 
+    from ..calls import seconds
     from ..engine import Simulation, Tracer
 
     start = to_nanoseconds(seconds("--from", options.start) or 0.0)

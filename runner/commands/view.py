@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, tell
-from .options import CHANGES, DONE, SEED, command, load, option, seconds
-from .run import progress, run
+from .options import CHANGES, DONE, SEED, command, load, option
+from .run import run
 
 if TYPE_CHECKING:
     from ..show.view import Recording
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     option(
         "-o", "--out", metavar="FILE", type=Path, help="the page (default: results/MODEL/view.html, which is opened)"
     ),
-    imports=("build", "engine", "show"),
+    imports=("calls.running", "show"),
 )
 def view(options: argparse.Namespace) -> int:
     """Run a model and write a page that shows the run: it needs no network, and any browser opens it.
@@ -41,6 +41,7 @@ def view(options: argparse.Namespace) -> int:
     """
     from epicycle.actors import EpicycleError
 
+    from ..calls import seconds, watched
     from ..engine import ActorError, LoopError
     from ..show.view import write_page
 
@@ -49,6 +50,8 @@ def view(options: argparse.Namespace) -> int:
     path = options.out
     if path is not None and not path.parent.is_dir():
         raise EpicycleError(f"--out {path} cannot be written: there is no folder {path.parent}")
+    if path is not None and path.is_dir():
+        raise EpicycleError(f"--out {path} cannot be written: it is a folder")
     names = [Path(each).name.removesuffix(".yaml") for each in options.model]
     recordings: list[Recording] = []
     error: EpicycleError | None = None
@@ -56,17 +59,15 @@ def view(options: argparse.Namespace) -> int:
         one = copy(options)
         one.model = each
         digest = _as_before(one) if Path(each).is_dir() else ""
-        recordings.append(_recording(one))
+        recordings.append(_recording(one, is_compared=len(options.model) > 1))
         try:
-            with progress(recordings[-1].model, seconds("--until", one.until)) as report:
+            with watched(recordings[-1].model, seconds("--until", one.until)) as report:
                 results = recordings[-1].run(until=seconds("--until", one.until), progress=report)
         except (ActorError, LoopError) as failure:  # what led to it is just what one wants to see
             error = failure
             continue
         if digest and results.digest != digest:
-            complain(
-                f"{each} was made by another version of the model or of Epicycle: the run is not the same any more"
-            )
+            complain(f"{each} was made by another version of the model or of Epicycle: the run is no longer the same")
     if path is None:
         path = Path("results") / recordings[0].model.name / "view.html"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -79,7 +80,7 @@ def view(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _recording(options: argparse.Namespace) -> Recording:
+def _recording(options: argparse.Namespace, *, is_compared: bool) -> Recording:
     from ..build import figures_of
     from ..show.view import Recording
     from ..text import Problems
@@ -90,7 +91,7 @@ def _recording(options: argparse.Namespace) -> Recording:
     problems.raise_if_any()
     if options.until is None and model.endless:
         complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
-    return Recording(model, figures, seed=options.seed)
+    return Recording(model, figures, seed=options.seed, is_compared=is_compared)
 
 
 def _as_before(options: argparse.Namespace) -> str:

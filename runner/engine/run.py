@@ -192,6 +192,7 @@ class Run:
             wall_time=self._spent,
             units=dict(self._units),
             outcomes=outcomes,
+            figures=dict(self.model.figures),
         )
 
     def _call(self, actor: Actor, method: str) -> None:

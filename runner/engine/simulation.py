@@ -13,6 +13,7 @@ from ..build import Model
 from ..collection import without_collection
 from ..graph import WovenAspect
 from ..results import EventLog, Record, Results, Signal
+from ..tables import Table, Tabled
 from .copies import Copies
 from .director import Director
 from .log_filter import LogFilter
@@ -63,7 +64,7 @@ def _copy(run: Run) -> Run:
         return Copies(run.outside).of(run)
 
 
-class Simulation:
+class Simulation(Tabled):
     """One run of a model, which is checked first, and is not changed by any of its runs.
 
     It is compiled into actors, aspects and ways of this run alone: any number of simulations of a model can go on at
@@ -95,6 +96,17 @@ class Simulation:
         self._is_told_of = log_to is not None or tracer is not None
         self._parts = _parts(model.graph.actors, model.aspects)
         self._run = Run(model, seed, keep_log.keeps if keep_log else None, log_to, tracer)
+
+    def __repr__(self) -> str:
+        return f"<Simulation of {self._caption()}>"
+
+    def _caption(self) -> str:
+        end = "" if self.model.stop is None else f" of {self.model.stop:g} s"
+        state = "over" if self._run.is_over else "paused" if self._run.is_begun else "not started"
+        return f"{self.model.name}, seed {self.seed}: at {self.tag.seconds:g} s{end}, {state}"
+
+    def _tables(self) -> list[Table]:
+        return self.results("the program")._tables()
 
     # -- running --------------------------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from .clock import Clock
 from .digraph import find_loop, in_order
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, channel_of, is_within
 from .ranks import Postings, Region, dependencies, firing_order, postings
-from .rules import LIKE, PTOLEMY, TIES, Rules
+from .rules import LIKE, PTOLEMY, TIES, Like, Rules, Ties
 from .watched import Metric, Watched
 from .woven import AspectModel, WovenAspect, check_processors, extent
 
@@ -16,6 +16,7 @@ __all__ = [
     "Clock",
     "Detour",
     "Hop",
+    "Like",
     "Metric",
     "Modal",
     "ModelGraph",
@@ -23,6 +24,7 @@ __all__ = [
     "Postings",
     "Region",
     "Rules",
+    "Ties",
     "Watched",
     "Wire",
     "WovenAspect",

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
 
 from epicycle.actors import Parameter
 
+Ties: TypeAlias = Literal["declared", "posted"]
+Like: TypeAlias = Literal["epicycle", "ptolemy"]
 POSTED, PTOLEMY = "posted", "ptolemy"
 TIES: Parameter[str | None] = Parameter(
     str,
     None,
-    choices=("declared", POSTED),
+    choices=get_args(Ties),
     doc="in which order actors of one tag, depth and priority fire: as they are declared, or as what they fire for was "
     "posted",
 )
 LIKE: Parameter[str | None] = Parameter(
     str,
     None,
-    choices=("epicycle", PTOLEMY),
+    choices=get_args(Like),
     doc="whose rules and defaults count inside; ptolemy: ties are posted, the outputs of a composite with a director "
     "depend on all its inputs, and parameters and ports are as in Ptolemy II unless given",
 )

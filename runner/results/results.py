@@ -45,6 +45,7 @@ class Results(Tabled):
     wall_time: float  # s
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
     outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
+    figures: dict[str, Any] = field(default_factory=dict)  # that the model declares, as it declares them
 
     @property
     def intervals(self) -> dict[str, Interval]:
@@ -114,6 +115,7 @@ class Results(Tabled):
         return f"{self.model}, seed {self.seed}: {self.end:g} s of model time, ended by {self.stopped}"
 
     def _tables(self) -> list[Table]:
+        units = {name: unit for name, unit in self.units.items() if unit != "1"}
         figures = [
             (name, what, "-" if figure is None else f"{figure:,}" if isinstance(figure, int) else short(figure))
             for name, found in self.aspects.items()
@@ -129,7 +131,7 @@ class Results(Tabled):
             Table(
                 ("metric", "value", "unit", ""),
                 [
-                    (name, found.shown(short), self.units.get(name, ""), "; ".join(found.remarks))
+                    (name, found.shown(short), units.get(name, ""), "; ".join(found.remarks))
                     for name, found in self.outcomes.items()
                 ],
             ),

@@ -3,7 +3,7 @@
 ``plan`` says what is to be run, ``run`` makes the runs and keeps what came of them, ``judge`` says what that means.
 """
 
-from .inference import Estimate, half_width, mean
+from .inference import Estimate, half_width, holm, mean, paired_difference, with_interval
 from .judge.claims import CONFIRMED, NOT_REPRODUCED, REPRODUCED, REVERSED, UNDECIDED, Finding, Judgement, ranked
 from .judge.guideline import Recommendation
 from .judge.study_results import StudyResults, open_study
@@ -40,13 +40,16 @@ __all__ = [
     "available_cores",
     "check_size",
     "half_width",
+    "holm",
     "is_running",
     "mean",
     "open_study",
+    "paired_difference",
     "plan_of_folder",
     "progress",
     "ranked",
     "repeat",
     "replace_file",
     "run_study",
+    "with_interval",
 ]

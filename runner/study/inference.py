@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from epicycle.actors import normal_quantile, normal_share, random_stream
 
+from ..shown import rounded
 from ..student import student_quantile, student_tail
 
 if TYPE_CHECKING:
@@ -58,6 +59,13 @@ def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
         return Estimate(math.nan, math.nan, -math.inf, math.inf, 0)
     value, half = math.fsum(values) / count, half_width(values, level)
     return Estimate(value, _standard_error(values), value - half, value + half, count)
+
+
+def with_interval(estimate: Estimate) -> str:
+    """A mean with half of its 95 % interval."""
+    width = estimate.high - estimate.low
+    value = rounded(estimate.value, width)
+    return f"{value} ± {rounded(width / 2, width)}" if math.isfinite(width) and width > 0 else value
 
 
 def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: int = 9_999) -> Estimate:

@@ -76,16 +76,23 @@ class Recording:
     """One run of a model, recorded while it goes on; ``results`` are what came of it, too.
 
     ``most`` is how many firings are kept.  The bits are those of any other run of the model and seed; signals that the
-    model's ``figures`` show in space are recorded as well.  ``hashes`` are of all records, to find the first one in
-    which two runs differ.
+    model's ``figures`` show in space are recorded as well.  With ``is_compared`` there are ``hashes`` of all
+    records, to find the first one in which two runs differ.
     """
 
     def __init__(
-        self, model: Model, figures: Mapping[str, Figure], *, seed: int | None = None, most: int = MOST
+        self,
+        model: Model,
+        figures: Mapping[str, Figure],
+        *,
+        seed: int | None = None,
+        most: int = MOST,
+        is_compared: bool = False,
     ) -> None:
         self.model = model
         self.figures = figures
         self.hashes = array("q")
+        self._is_compared = is_compared
         self.results: Results | None = None
         self.firings = self.records = 0  # that there were
         self.events, self.aspects = Names(), Names()
@@ -137,7 +144,8 @@ class Recording:
             kept.texts[_text(record.value)],
             NOTHING if about == self.records else about,
         )
-        self.hashes.append(hash(record.encoded()))
+        if self._is_compared:
+            self.hashes.append(hash(record.encoded()))
         self.records += 1
 
     def _stretch(self) -> Stretch:

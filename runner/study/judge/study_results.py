@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import EpicycleError, counted, read_regular
 
 from ...language import Factor
-from ...tables import pandas_module
+from ...shown import in_words
+from ...tables import Table, Tabled, pandas_module
 from ...text import did_you_mean
-from ..inference import LEVEL, holm, mean, paired_difference
+from ..inference import LEVEL, holm, mean, paired_difference, with_interval
 from ..plan.plan import Plan
 from ..run.backlog import OK
 from ..run.manifest import StoreError
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 TIMES = ("wall_time",)  # what is not the same each time
 
 
-class StudyResults:
+class StudyResults(Tabled):
     """The results folder of a study, finished or not.
 
     >>> results = open_study("results/mm1_load")
@@ -241,6 +242,26 @@ class StudyResults:
         frame = self.to_pandas().set_index([*self.factors, "replication"])[self.metrics]
         found: xarray.Dataset = xarray.Dataset.from_dataframe(frame)
         return found
+
+    def __repr__(self) -> str:
+        return f"<StudyResults {self._caption()}>"
+
+    def _caption(self) -> str:
+        counts, plan = self.counts(), self.plan
+        told = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"
+        most = "at most " if plan.study.until else ""
+        return f"{plan.study.name}: {counts.total():,} of {most}{counted(plan.size, 'run')} ({told}), in {self.folder}"
+
+    def _tables(self) -> list[Table]:
+        samples, columns = self._samples(), self.plan.columns
+        rows = []
+        for condition, runs in samples.runs.items():
+            levels = (in_words(each) for each in self.plan.condition(condition).values.values())
+            found = (mean(list(samples.numbers(condition, name).values())) for name in self.metrics)
+            rows.append((*levels, *map(with_interval, found), str(len(runs))))
+        units = {name: columns[name].unit for name in (*self.factors, *self.metrics)}
+        names = (f"{name} ({unit})" if unit not in ("", "1") else name for name, unit in units.items())
+        return [Table((*names, "runs"), rows)]
 
     @property
     def path(self) -> Path:

@@ -119,8 +119,8 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
 
 def _declared(path: str, model: Model) -> Column:
     """Unit and doc of a parameter of the model, or of those actors' that a pattern selects."""
-    if path in model.declared:
-        return Column(*model.declared[path])
+    if (declared := model.declared.get(path)) is not None:
+        return Column(declared.unit, declared.doc)
     owner, _, name = path.rpartition(".")
     for actor in select(owner, model.graph.actors) if owner else ():
         if (parameter := declared_parameters(type(model.graph.actors[actor])).get(name)) is not None:

@@ -1,4 +1,4 @@
-"""How far a study is: a bar on a terminal, a line a minute elsewhere."""
+"""How far a study is: a bar where there is somebody to see it, a line a minute elsewhere."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ...printing import complain, console
+from ...bars import bar
+from ...printing import complain
 from .backlog import Backlog
 
-EVERY = 60.0  # s between two lines where there is no terminal
+EVERY = 60.0  # s between two lines where there is no bar
 
 
 class Pulse:
@@ -33,24 +34,20 @@ class Pulse:
 def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
     """What a session calls now and then."""
     pulse = Pulse()
-    terminal = console(stderr=True)
-    if not terminal.is_terminal:
+    with bar(name) as show:
         last = pulse.started
+        if show is not None:
+            show(0.0, None, "")
 
         def tell(backlog: Backlog) -> None:
             nonlocal last
-            if time.monotonic() - last >= EVERY:
+            if show is not None:
+                show(backlog.over, backlog.total, pulse.line(backlog))
+            elif time.monotonic() - last >= EVERY:
                 last = time.monotonic()
                 complain(f"{time.strftime('%H:%M:%S')} {name}: {pulse.line(backlog)}")
 
         yield tell
-        return
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    texts = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[line]}"))
-    with Progress(next(texts), BarColumn(), next(texts), console=terminal, transient=True) as bar:
-        task = bar.add_task(name, total=None, line="")
-        yield lambda now: bar.update(task, total=now.total, completed=now.over, line=pulse.line(now))
 
 
 def duration(seconds: float) -> str:

@@ -93,7 +93,7 @@ def written(
     recordings = []
     for model, given in runs:
         loaded = load_model(model, **given)
-        recordings.append(Recording(loaded, figures_of(loaded, Problems())))
+        recordings.append(Recording(loaded, figures_of(loaded, Problems()), is_compared=len(runs) > 1))
         recordings[-1].run(until=until)
     write_page(recordings, path, names=names)
     return path

@@ -1,0 +1,609 @@
+# What constructors take, as the declarations say: for type checkers only.  Written by `make reference`.
+# fmt: off
+# ruff: noqa
+
+from collections import abc
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .accumulation import Accumulator as _Accumulator, Counter as _Counter, Derivative as _Derivative, Difference as _Difference, Integrator as _Integrator, TimeAverage as _TimeAverage
+from .arithmetic import AddSubtract as _AddSubtract, Extreme as _Extreme, MathFunction as _MathFunction, MultiplyDivide as _MultiplyDivide, Scale as _Scale
+from .blocks import BlockExpression as _BlockExpression, HoldingExpression as _HoldingExpression
+from .continuous import ODE as _ODE
+from .control.filters import Butterworth as _Butterworth, DiscreteFilter as _DiscreteFilter, FilterDesign, FirstOrder as _FirstOrder
+from .control.limits import DeadZone as _DeadZone, Hysteresis as _Hysteresis, Limiter as _Limiter, Quantizer as _Quantizer
+from .control.linear import StateSpace as _StateSpace, TransferFunction as _TransferFunction
+from .control.pid import PID as _PID
+from .distributions import Bernoulli as _Bernoulli, Binomial as _Binomial, Cauchy as _Cauchy, ChiSquare as _ChiSquare, Choice as _Choice, Constant as _Constant, Distribution, Exponential as _Exponential, Gamma as _Gamma, LogNormal as _LogNormal, NegativeBinomial as _NegativeBinomial, Normal as _Normal, Poisson as _Poisson, RandomInteger as _RandomInteger, StudentT as _StudentT, Triangular as _Triangular, Uniform as _Uniform, VonMises as _VonMises
+from .entities import Batch as _Batch, Collect as _Collect, Match as _Match, RecordAssembler as _RecordAssembler, RecordDisassembler as _RecordDisassembler, SetFields as _SetFields, Spread as _Spread, Unbatch as _Unbatch
+from .flow import BooleanSwitch as _BooleanSwitch, Merge as _Merge, MostRecent as _MostRecent, Repeat as _Repeat, Router as _Router, Sampler as _Sampler, Select as _Select, Switch as _Switch, Synchronizer as _Synchronizer
+from .functions import Expression as _Expression, Function as _Function, LookupTable as _LookupTable
+from .generators import DRand as _DRand, Generator, JavaRandom as _JavaRandom
+from .links import ArqReceiver as _ArqReceiver, ArqSender as _ArqSender, Link as _Link, NetworkSwitch as _NetworkSwitch
+from .logic import Comparator as _Comparator, Equals as _Equals, LogicGate as _LogicGate
+from .modes.machine import StateMachine as _StateMachine
+from .modes.modal import ModalActor as _ModalActor
+from .passing import BooleanSelect as _BooleanSelect, Changes as _Changes, Commutator as _Commutator, Default as _Default, Filter as _Filter, FirstOfInstant as _FirstOfInstant, Inhibit as _Inhibit, IsPresent as _IsPresent, LatestOfAll as _LatestOfAll, Previous as _Previous, Register as _Register, Sequencer as _Sequencer
+from .queues import Queue as _Queue, Server as _Server, SharedQueue as _SharedQueue
+from .replay import Replay as _Replay
+from .resources.line import WaitingLine as _WaitingLine
+from .resources.pool import Pool as _Pool
+from .resources.stations import Machine as _Machine, Station as _Station
+from .robotics.controller import RobustController as _RobustController
+from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
+from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
+from .robotics.monitors import DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
+from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver
+from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Sensor as _Sensor, Vehicle as _Vehicle
+from .sinks import Display as _Display, Histogram as _Histogram, Recorder as _Recorder, Stop as _Stop, Test as _Test
+from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent
+from .statistics import MovingAverage as _MovingAverage, MovingStatistics as _MovingStatistics
+from .texts import TextFunction as _TextFunction
+from .timing import ResettableTimer as _ResettableTimer, TimeCompare as _TimeCompare, TimeDelay as _TimeDelay, TimeGap as _TimeGap, Timer as _Timer, WaitingTime as _WaitingTime
+from .triggered import Const as _Const, CurrentMicrostep as _CurrentMicrostep, CurrentTime as _CurrentTime, Pulse as _Pulse, Ramp as _Ramp, Sequence as _Sequence
+from .variables import SetVariable as _SetVariable, Variable as _Variable
+from .vehicles.following import WaypointFollower as _WaypointFollower
+from .vehicles.motion import Ackermann as _Ackermann, Unicycle as _Unicycle
+from .vehicles.sensing import InertialSensor as _InertialSensor, RangeBearingSensor as _RangeBearingSensor, RangeScanner as _RangeScanner
+from epicycle.actors.expression import Formula
+
+_Number: TypeAlias = float | np.floating[Any] | np.integer[Any] | str  # a text has a unit
+_Whole: TypeAlias = int | np.integer[Any] | str
+_Row: TypeAlias = abc.Sequence[_Number] | NDArray[Any]
+_Rows: TypeAlias = abc.Sequence[_Row] | NDArray[Any]
+_Texts: TypeAlias = str | abc.Sequence[str]
+
+class Accumulator(_Accumulator):
+    """The sum of all tokens so far, those of this tag included."""
+    def __init__(self, path: str, *, initial: _Number = ..., reset_by: Literal['any', 'true'] = ..., low: _Number | None = ..., high: _Number | None = ...) -> None: ...
+
+class Ackermann(_Ackermann):
+    """A car: it is told how fast to go and how far to steer."""
+    def __init__(self, path: str, *, steering: _Number = ..., wheelbase: _Number = ..., max_steering: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
+
+class AddSubtract(_AddSubtract):
+    """The sum of what comes at `plus` minus the sum of what comes at `minus`."""
+    def __init__(self, path: str) -> None: ...
+
+class ArqReceiver(_ArqReceiver):
+    """The receiving end of an automatic repeat request: hands on what comes by an `ArqSender`, once and in order."""
+    def __init__(self, path: str, *, repeat: Literal['all', 'one'] = ...) -> None: ...
+
+class ArqSender(_ArqSender):
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them anew."""
+    def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ...) -> None: ...
+
+class Barrier(_Barrier):
+    """The paper's choice: an interior-point barrier method with Newton steps, compiled."""
+    def __init__(self, *, gap: _Number = ..., last_parameter: _Number = ..., free_controls: _Whole = ..., infeasible: Literal['progress', 'least_violation', 'brake'] = ...) -> None: ...
+
+class Batch(_Batch):
+    """Collects tokens into lists: as many as `number`, or as fit into `size`, or what has come after `after`."""
+    def __init__(self, path: str, *, number: _Whole | None = ..., size: _Number | None = ..., weight: str | float | Formula = ..., after: _Number | None = ..., key: str | float | Formula | None = ...) -> None: ...
+
+class Bernoulli(_Bernoulli):
+    """True with a probability, otherwise false."""
+    def __init__(self, *, probability: _Number = ...) -> None: ...
+
+class Binomial(_Binomial):
+    """The binomial distribution: how many of several trials succeed."""
+    def __init__(self, *, trials: _Whole = ..., probability: _Number = ...) -> None: ...
+
+class BlockExpression(_BlockExpression):
+    """Evaluates an expression over blocks of `number` tokens each, as soon as a block is full."""
+    def __init__(self, path: str, *, expression: str | float | Formula, number: _Whole = ..., past: abc.Sequence[object] = ..., items: bool = ...) -> None: ...
+
+class BooleanSelect(_BooleanSelect):
+    """Each `control` token lets the next token of `true_input` or of `false_input` pass, as it says."""
+    def __init__(self, path: str, *, unread: Literal['kept', 'lost'] = ...) -> None: ...
+
+class BooleanSwitch(_BooleanSwitch):
+    """Sends each token to `true_output` or `false_output`, as the latest `control` token says."""
+    def __init__(self, path: str, *, control: bool = ...) -> None: ...
+
+class BroadcastChannel(_BroadcastChannel):
+    """Hands what one participant says to all the others."""
+    def __init__(self, path: str) -> None: ...
+
+class Butterworth(_Butterworth):
+    """The flattest low pass or high pass: half the power passes at the cutoff frequency, at 20 dB a decade and order."""
+    def __init__(self, *, cutoff: _Number, period: _Number, order: _Whole = ..., passes: Literal['low', 'high'] = ...) -> None: ...
+
+class Casadi(_Casadi):
+    """CasADi's IPOPT on the same problem, warm-started: thousands of times slower, an independent check."""
+    def __init__(self, *, max_iterations: _Whole = ...) -> None: ...
+
+class Cauchy(_Cauchy):
+    """The Cauchy distribution, which has no mean; in physics that of Breit and Wigner."""
+    def __init__(self, *, median: _Number = ..., scale: _Number = ..., cut: _Number | None = ...) -> None: ...
+
+class Changes(_Changes):
+    """Hands on the first number, and then each that differs by more than `by` from the one handed on before."""
+    def __init__(self, path: str, *, by: _Number = ...) -> None: ...
+
+class ChiSquare(_ChiSquare):
+    """The chi-square distribution: the sum of squares of standard normal numbers."""
+    def __init__(self, *, freedom: _Number) -> None: ...
+
+class Choice(_Choice):
+    """One of several values of any kind, all alike or by weight."""
+    def __init__(self, *, values: abc.Sequence[object], weights: _Row | None = ...) -> None: ...
+
+class CircularMotion(_CircularMotion):
+    """A body on a circle of radius `speed / turn_rate` (Table III), computed from the time alone."""
+    def __init__(self, path: str, *, start: _Row = ..., speed: _Number = ..., turn_rate: _Number = ..., heading: _Number = ...) -> None: ...
+
+class Clock(_Clock):
+    """Ticks at fixed times without drift: in cycle k at `offset + k * period` plus each of `offsets`."""
+    def __init__(self, path: str, *, period: _Number, offset: _Number = ..., offsets: _Row = ..., cycles: _Whole | None = ..., new_period: Literal['next cycle', 'at once'] = ..., reset_period: bool = ..., late_trigger: bool = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
+
+class Collect(_Collect):
+    """Makes a list of a token of each channel, as soon as there is one on each; others wait in the order of arrival."""
+    def __init__(self, path: str, *, joined: bool = ...) -> None: ...
+
+class Commutator(_Commutator):
+    """Hands on what comes at the channels of its input in turn, `block` tokens of each; tokens wait for their turn."""
+    def __init__(self, path: str, *, block: _Whole = ...) -> None: ...
+
+class Comparator(_Comparator):
+    """Compares `left` with `right`, or with `value` if nothing is connected to `right`."""
+    def __init__(self, path: str, *, comparison: Literal['==', '!=', '<', '<=', '>', '>='], value: object = ..., tolerance: _Number = ..., hold: bool = ...) -> None: ...
+
+class Const(_Const):
+    """Sends the same value for each trigger; once at the start if `trigger` is not connected."""
+    def __init__(self, path: str, *, value: object = ..., limit: _Whole | None = ...) -> None: ...
+
+class Constant(_Constant):
+    """Always the same value; the actor that sends one is `Const`."""
+    def __init__(self, *, value: _Number) -> None: ...
+
+class Counter(_Counter):
+    """Counts tokens of any kind: up for each at `increment`, down for each at `decrement`."""
+    def __init__(self, path: str, *, initial: _Whole = ...) -> None: ...
+
+class CurrentMicrostep(_CurrentMicrostep):
+    """Sends the present microstep for each trigger."""
+    def __init__(self, path: str) -> None: ...
+
+class CurrentTime(_CurrentTime):
+    """Sends the present time for each trigger, those that come together included."""
+    def __init__(self, path: str) -> None: ...
+
+class DRand(_DRand):
+    """The generator of the Colt library, of which the actors of Ptolemy II that are called Colt take their numbers."""
+    def __init__(self, *, seed: _Whole) -> None: ...
+
+class DeadZone(_DeadZone):
+    """Lets nothing through between two values, and beyond them what exceeds them: play, or a valve that overlaps."""
+    def __init__(self, path: str, *, low: _Number, high: _Number) -> None: ...
+
+class Default(_Default):
+    """Hands on what comes at `preferred`, and otherwise, if nothing does, what comes at `alternate`."""
+    def __init__(self, path: str, *, both: bool = ...) -> None: ...
+
+class Derivative(_Derivative):
+    """How fast a signal changes from token to token."""
+    def __init__(self, path: str) -> None: ...
+
+class Difference(_Difference):
+    """Each token minus the one before."""
+    def __init__(self, path: str, *, initial: _Number | None = ...) -> None: ...
+
+class DiscreteFilter(_DiscreteFilter):
+    """A linear filter of a sampled signal: each token in gives one token out, whatever the time between."""
+    def __init__(self, path: str, *, numerator: _Row | None = ..., denominator: _Row | None = ..., design: FilterDesign | abc.Mapping[str, object] | None = ..., start: Literal['zero', 'settled'] = ...) -> None: ...
+
+class Display(_Display):
+    """Writes a line for each token: time, own path, and the token."""
+    def __init__(self, path: str, *, title: str = ...) -> None: ...
+
+class DistanceMonitor(_DistanceMonitor):
+    """The distance between two bodies, whenever a state of one comes and both are known."""
+    def __init__(self, path: str) -> None: ...
+
+class Equals(_Equals):
+    """Tells whether the tokens that come together are all equal; channels without a token do not count."""
+    def __init__(self, path: str, *, tolerance: _Number = ...) -> None: ...
+
+class Exponential(_Exponential):
+    """The exponential distribution: waiting times without memory."""
+    def __init__(self, *, mean: _Number = ...) -> None: ...
+
+class Expression(_Expression):
+    """Evaluates an expression whenever one of its inputs gets a token."""
+    def __init__(self, path: str, *, expression: str | float | Formula, gives: Literal['number', 'truth value', 'text', 'any value'] | None = ..., hold: bool = ..., iteration: bool = ...) -> None: ...
+
+class Extreme(_Extreme):
+    """The greatest or the least of what comes together, and the channel on which it came; of equals, the first."""
+    def __init__(self, path: str, *, take: Literal['greatest', 'least']) -> None: ...
+
+class Filter(_Filter):
+    """Hands on the tokens for which a condition holds; the others are lost."""
+    def __init__(self, path: str, *, condition: str | float | Formula = ...) -> None: ...
+
+class FilterPyEstimator(_FilterPyEstimator):
+    """A filter of FilterPy with the model of `UnscentedEstimator`; fuses one measurement after another."""
+    def __init__(self, path: str, *, filter: Literal['ExtendedKalmanFilter', 'UnscentedKalmanFilter', 'CubatureKalmanFilter', 'KalmanFilter', 'SquareRootKalmanFilter'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+
+class FirstOfInstant(_FirstOfInstant):
+    """Hands on the first token of each instant; those that come at the same time, also at later microsteps, are lost."""
+    def __init__(self, path: str) -> None: ...
+
+class FirstOrder(_FirstOrder):
+    """A lag of first order, `1 / (T s + 1)`, for an input that is held from sample to sample: exponential smoothing."""
+    def __init__(self, *, time_constant: _Number, period: _Number) -> None: ...
+
+class Function(_Function):
+    """Calls a Python function whenever one of its inputs gets a token, and sends what it returns."""
+    def __init__(self, path: str, *, function: str | abc.Callable[..., object], hold: bool = ...) -> None: ...
+
+class Gamma(_Gamma):
+    """The gamma distribution; with a whole `shape` the Erlang distribution."""
+    def __init__(self, *, shape: _Number = ..., mean: _Number = ...) -> None: ...
+
+class GoalMonitor(_GoalMonitor):
+    """Tells when a body first comes within `tolerance` of the goal, and how far it has travelled."""
+    def __init__(self, path: str, *, goal: _Row = ..., tolerance: _Number = ...) -> None: ...
+
+class Histogram(_Histogram):
+    """Counts how many tokens fall into each of `bins` equal intervals from `low` to `high`."""
+    def __init__(self, path: str, *, low: _Number, high: _Number, bins: _Whole = ...) -> None: ...
+
+class HoldingExpression(_HoldingExpression):
+    """Evaluates an expression, some of whose inputs hold a value from the start."""
+    def __init__(self, path: str, *, expression: str | float | Formula, held: abc.Mapping[str, object]) -> None: ...
+
+class Hysteresis(_Hysteresis):
+    """Switches on when a signal reaches one value, and off when it falls to another: a relay, a Schmitt trigger."""
+    def __init__(self, path: str, *, upper: _Number, lower: _Number, on: _Number = ..., off: _Number = ..., initial: bool = ...) -> None: ...
+
+class InertialSensor(_InertialSensor):
+    """An inertial measurement unit in the plane: turn rate and acceleration, with noise and biases that wander."""
+    def __init__(self, path: str, *, turn_rate_noise: _Number = ..., turn_rate_walk: _Number = ..., turn_rate_bias: _Number = ..., acceleration_noise: _Number = ..., acceleration_walk: _Number = ..., acceleration_bias: _Row = ...) -> None: ...
+
+class Inform(_Inform):
+    """Eq. (5): what range measurements at the end of the horizon tell, less a penalty for distance."""
+    def __init__(self, *, range: _Number = ..., penalty: _Number = ..., variance: _Number = ..., unit: Literal['nat', 'bit'] = ..., joint: bool = ...) -> None: ...
+
+class Inhibit(_Inhibit):
+    """Hands on what comes unless an `inhibit` token comes with it; the opposite of a `Sampler`."""
+    def __init__(self, path: str) -> None: ...
+
+class Integrator(_Integrator):
+    """The integral over time of a signal that comes as tokens."""
+    def __init__(self, path: str, *, method: Literal['hold', 'trapezoid'] = ..., initial: _Number = ...) -> None: ...
+
+class IsPresent(_IsPresent):
+    """Tells for each channel whether a token has come on it, whenever one has on any of them."""
+    def __init__(self, path: str) -> None: ...
+
+class JavaRandom(_JavaRandom):
+    """`java.util.Random`, of which most random actors of Ptolemy II take their numbers."""
+    def __init__(self, *, seed: _Whole) -> None: ...
+
+class LatestOfAll(_LatestOfAll):
+    """Sends the latest token of every channel whenever one comes on any of them."""
+    def __init__(self, path: str, *, initial: object = ...) -> None: ...
+
+class Limiter(_Limiter):
+    """Cuts a signal off at its limits, and lets it change no faster than its rates: an actuator's saturation and slew."""
+    def __init__(self, path: str, *, low: _Number = ..., high: _Number = ..., rising: _Number | None = ..., falling: _Number | None = ..., initial: _Number | None = ...) -> None: ...
+
+class Link(_Link):
+    """A link in one direction: frames wait, are sent one by one at `rate`, and arrive after `delay`."""
+    def __init__(self, path: str, *, delay: _Number = ..., loss: _Number = ..., rate: _Number | None = ..., size: str | float | Formula = ..., order: str | float | Formula = ..., buffer: _Number | None = ...) -> None: ...
+
+class LogNormal(_LogNormal):
+    """A positive number whose logarithm is normally distributed."""
+    def __init__(self, *, median: _Number = ..., sigma: _Number = ...) -> None: ...
+
+class LogicGate(_LogicGate):
+    """Combines truth values: and, or, xor (an odd number is true), and their negations nand, nor, xnor."""
+    def __init__(self, path: str, *, function: Literal['and', 'or', 'xor', 'nand', 'nor', 'xnor', 'not'], hold: bool = ...) -> None: ...
+
+class LookupTable(_LookupTable):
+    """Looks a number up in a table."""
+    def __init__(self, path: str, *, values: abc.Sequence[object], at: _Row | None = ..., outside: Literal['error', 'nearest', 'nothing'] = ...) -> None: ...
+
+class Machine(_Machine):
+    """A machine that makes one part after the other, breaks down now and then, and waits to be repaired."""
+    def __init__(self, path: str, *, number: _Whole = ..., work_time: Distribution | abc.Mapping[str, object], time_to_failure: Distribution | abc.Mapping[str, object]) -> None: ...
+
+class Match(_Match):
+    """Waits until there is a token with an equal `key` on every channel, and sends them as a list: a join."""
+    def __init__(self, path: str, *, key: str | float | Formula | None = ...) -> None: ...
+
+class MathFunction(_MathFunction):
+    """One of the usual functions of one number; angles in rad."""
+    def __init__(self, path: str, *, function: Literal['abs', 'negate', 'sign', 'square', 'sqrt', 'exp', 'log', 'log10', 'sin', 'cos', 'tan', 'asin', 'acos', 'atan', 'floor', 'ceil', 'round']) -> None: ...
+
+class Merge(_Merge):
+    """Joins the tokens of all its channels into one stream, one token per microstep."""
+    def __init__(self, path: str, *, discard: bool = ..., whole_channel: bool = ...) -> None: ...
+
+class ModalActor(_ModalActor):
+    """Base of actors with modes, whose transitions are methods."""
+    def __init__(self, path: str) -> None: ...
+
+class MostRecent(_MostRecent):
+    """Sends the latest token of each channel whenever it is triggered, as often as that happens: a zero-order hold."""
+    def __init__(self, path: str, *, initial: object = ...) -> None: ...
+
+class MovingAverage(_MovingAverage):
+    """The mean of the latest tokens, correctly rounded."""
+    def __init__(self, path: str, *, whole: bool = ..., size: _Whole | None = ..., span: _Number | None = ...) -> None: ...
+
+class MovingStatistics(_MovingStatistics):
+    """Mean, standard deviation, least and greatest of the latest tokens; sent for each token."""
+    def __init__(self, path: str, *, size: _Whole | None = ..., span: _Number | None = ...) -> None: ...
+
+class MultiplyDivide(_MultiplyDivide):
+    """The product of what comes at `multiply`, divided by all that comes at `divide`."""
+    def __init__(self, path: str, *, whole: bool = ...) -> None: ...
+
+class NegativeBinomial(_NegativeBinomial):
+    """The negative binomial distribution: how many trials fail before some have succeeded."""
+    def __init__(self, *, successes: _Number = ..., probability: _Number = ...) -> None: ...
+
+class NetworkSwitch(_NetworkSwitch):
+    """A store-and-forward switch: each frame goes to the channel of the output that `port` says, and waits there."""
+    def __init__(self, path: str, *, port: str | float | Formula, latency: _Number = ..., rate: _Number | None = ..., size: str | float | Formula = ..., order: str | float | Formula = ..., buffer: _Number | None = ...) -> None: ...
+
+class Normal(_Normal):
+    """The normal (Gaussian) distribution."""
+    def __init__(self, *, mean: _Number = ..., standard_deviation: _Number = ...) -> None: ...
+
+class ODE(_ODE):
+    """A system of ordinary differential equations `dx/dt = f(x, u, t)` that is solved between events."""
+    def __init__(self, path: str, *, initial: abc.Mapping[str, _Number], derivatives: abc.Mapping[str, str | float | Formula], crossings: abc.Mapping[str, str | float | Formula] = ..., directions: abc.Mapping[str, Literal['rising', 'falling', 'both']] = ..., resets: abc.Mapping[str, abc.Mapping[str, str | float | Formula]] = ..., held: abc.Mapping[str, _Number] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ..., min_interval: _Number = ...) -> None: ...
+
+class PID(_PID):
+    """A controller with a proportional, an integral and a derivative part, which acts at each measurement."""
+    def __init__(self, path: str, *, setpoint: _Number = ..., proportional: _Number = ..., integral: _Number = ..., derivative: _Number = ..., integration: Literal['hold', 'trapezoid'] = ..., filter_time: _Number = ..., setpoint_weight: _Number = ..., derivative_weight: _Number = ..., low: _Number = ..., high: _Number = ..., anti_windup: Literal['clamping', 'back_calculation', 'none'] = ..., tracking_time: _Number | None = ..., initial: _Number = ..., late_reset: bool = ...) -> None: ...
+
+class Poisson(_Poisson):
+    """The Poisson distribution: how many of many rare things happen."""
+    def __init__(self, *, mean: _Number = ...) -> None: ...
+
+class PoissonClock(_PoissonClock):
+    """Ticks at random: the times between ticks are independent and exponentially distributed."""
+    def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., generator: Generator | abc.Mapping[str, object] | None = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
+
+class Pool(_Pool):
+    """Units of a resource: a token at `acquire` asks for some, comes back by `granted` when it has them, and one at `release` returns them."""
+    def __init__(self, path: str, *, capacity: _Whole = ..., amount: str | float | Formula = ..., preemptive: bool = ..., key: str | float | Formula | None = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
+
+class Previous(_Previous):
+    """Sends for each token the one that came before it; for the first `initial`, or nothing if that is not given."""
+    def __init__(self, path: str, *, initial: object = ...) -> None: ...
+
+class Pulse(_Pulse):
+    """Sends a value at certain triggers, counted from 0, and a zero like it at all others."""
+    def __init__(self, path: str, *, values: abc.Sequence[object] = ..., indexes: abc.Sequence[object] = ..., repeat: bool = ..., limit: _Whole | None = ...) -> None: ...
+
+class Quantizer(_Quantizer):
+    """Rounds a signal to steps, as a converter from analog to digital does."""
+    def __init__(self, path: str, *, step: _Number, offset: _Number = ..., rounding: Literal['nearest', 'down', 'up'] = ...) -> None: ...
+
+class Queue(_Queue):
+    """Keeps tokens, first in, first out, and lets one go for each trigger."""
+    def __init__(self, path: str, *, capacity: _Whole | None = ..., persistent_trigger: bool = ..., one_at_a_time: bool = ...) -> None: ...
+
+class Ramp(_Ramp):
+    """Counts triggers: sends `init` for the first, and for each further one the last number plus `step`."""
+    def __init__(self, path: str, *, init: _Number = ..., step: _Number = ..., late_step: bool = ..., limit: _Whole | None = ...) -> None: ...
+
+class Random(_Random):
+    """Sends a token drawn from `distribution` for each trigger, independent of all others."""
+    def __init__(self, path: str, *, distribution: Distribution | abc.Mapping[str, object], generator: Generator | abc.Mapping[str, object] | None = ...) -> None: ...
+
+class RandomInteger(_RandomInteger):
+    """All integers from `low` to `high` alike, both included."""
+    def __init__(self, *, low: _Whole = ..., high: _Whole = ...) -> None: ...
+
+class RangeBearingSensor(_RangeBearingSensor):
+    """Measures how far away a target is, and in which direction as seen from the vehicle, with normal noise."""
+    def __init__(self, path: str, *, landmark: _Row | None = ..., bearing_deviation: _Number = ..., range_deviation: _Number = ..., max_range: _Number = ..., field_of_view: _Number = ...) -> None: ...
+
+class RangeScanner(_RangeScanner):
+    """A lidar in the plane: how far it is to what stands around, along beams from the vehicle's position, with noise."""
+    def __init__(self, path: str, *, beams: _Whole = ..., field_of_view: _Number = ..., max_range: _Number = ..., deviation: _Number = ..., walls: _Rows = ..., discs: _Rows = ..., body_radius: _Number = ...) -> None: ...
+
+class ReachGoal(_ReachGoal):
+    """Eq. (2): the sum of the squared distances to a goal over the horizon."""
+    def __init__(self, *, goal: _Row = ...) -> None: ...
+
+class RecordAssembler(_RecordAssembler):
+    """Makes one token with fields of the tokens of several inputs, which are called like the fields."""
+    def __init__(self, path: str, *, fields: _Texts, onto: str | None = ...) -> None: ...
+
+class RecordDisassembler(_RecordDisassembler):
+    """Sends fields of each token by outputs that are called like the fields."""
+    def __init__(self, path: str, *, fields: _Texts) -> None: ...
+
+class Recorder(_Recorder):
+    """Keeps what comes, for Python to read after the run."""
+    def __init__(self, path: str, *, capacity: _Whole | None = ...) -> None: ...
+
+class Register(_Register):
+    """Sends the latest token of each channel from before this tag whenever it is triggered, as often as that happens."""
+    def __init__(self, path: str, *, initial: object = ...) -> None: ...
+
+class Repeat(_Repeat):
+    """Sends each token several times."""
+    def __init__(self, path: str, *, times: _Whole = ...) -> None: ...
+
+class Replay(_Replay):
+    """Sends the rows of a CSV or Parquet table, each at its time."""
+    def __init__(self, path: str, *, file: str | Path, time: str = ..., columns: _Texts | None = ...) -> None: ...
+
+class ResettableTimer(_ResettableTimer):
+    """Sends a value after as many seconds as the latest token says."""
+    def __init__(self, path: str, *, preemptive: bool = ..., value: object = ...) -> None: ...
+
+class RobustController(_RobustController):
+    """Solves the horizon problem at every trigger and sends the acceleration for the *next* period."""
+    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+
+class Router(_Router):
+    """Sends each token to one channel of its output: in turn, at random, to the least loaded, or as the token says."""
+    def __init__(self, path: str, *, policy: Literal['round robin', 'random', 'shortest queue', 'expression'] = ..., weights: _Row | None = ..., channel: str | float | Formula | None = ...) -> None: ...
+
+class Sampler(_Sampler):
+    """Hands on what comes at the same tag as a trigger; all other tokens are lost."""
+    def __init__(self, path: str) -> None: ...
+
+class Scale(_Scale):
+    """Multiplies each token."""
+    def __init__(self, path: str, *, factor: _Number = ..., offset: _Number = ...) -> None: ...
+
+class Select(_Select):
+    """Hands on the tokens of the channel that the latest `control` token names; those of the others are lost."""
+    def __init__(self, path: str, *, unread: Literal['lost', 'kept'] = ..., initial: _Whole | None = ...) -> None: ...
+
+class Sensor(_Sensor):
+    """Measures the target's relative position, or its distance, with normal noise (Table II)."""
+    def __init__(self, path: str, *, kind: Literal['relative_position', 'range'] = ..., along: _Number = ..., across: _Number = ..., max_range: _Number | None = ..., robot_name: str = ...) -> None: ...
+
+class SeparationMonitor(_SeparationMonitor):
+    """The smallest distance between any two of several bodies, whenever a state comes and two or more are known."""
+    def __init__(self, path: str) -> None: ...
+
+class Sequence(_Sequence):
+    """Sends the next of its values for each trigger, and nothing when they are used up."""
+    def __init__(self, path: str, *, values: abc.Sequence[object], repeat: bool = ..., hold: bool = ...) -> None: ...
+
+class Sequencer(_Sequencer):
+    """Hands tokens on in the order of their numbers, which count up from `first`; each waits until it is its turn."""
+    def __init__(self, path: str, *, first: _Whole = ...) -> None: ...
+
+class Server(_Server):
+    """Serves tokens in the order of their arrival, `servers` of them at a time, and sends each when it is done."""
+    def __init__(self, path: str, *, service_time: _Number = ..., distribution: Distribution | abc.Mapping[str, object] | None = ..., servers: _Whole | None = ..., capacity: _Whole | None = ..., one_at_a_time: bool = ...) -> None: ...
+
+class SetFields(_SetFields):
+    """Sets fields of tokens: a token with fields is a mapping, as YAML writes it and expressions read it."""
+    def __init__(self, path: str, *, draw: abc.Mapping[str, Distribution | abc.Mapping[str, object]] = ..., set: abc.Mapping[str, str | float | Formula] = ..., remove: _Texts = ...) -> None: ...
+
+class SetVariable(_SetVariable):
+    """Hands what comes to a `Variable`, and tells what this is worth at the tag of the setting."""
+    def __init__(self, path: str, *, value: object = ..., delayed: bool = ...) -> None: ...
+
+class SharedQueue(_SharedQueue):
+    """One line for several: a channel of `trigger` asks for a token, and gets it by the channel of `output`."""
+    def __init__(self, path: str, *, capacity: _Whole | None = ...) -> None: ...
+
+class SingleEvent(_SingleEvent):
+    """Sends one token at one time."""
+    def __init__(self, path: str, *, time: _Number = ..., value: object = ...) -> None: ...
+
+class Spread(_Spread):
+    """Sends what is in a list by the channels of its output, in their order; what is left over is lost."""
+    def __init__(self, path: str) -> None: ...
+
+class StateMachine(_StateMachine):
+    """A state machine, with a transition a line and variables that may flow."""
+    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
+
+class StateSpace(_StateSpace):
+    """A linear system in state space, `dx/dt = A x + B u`, `y = C x + D u`."""
+    def __init__(self, path: str, *, a: _Rows, b: _Rows, c: _Rows | None = ..., d: _Rows | None = ..., initial: _Row | None = ..., held: _Row | None = ..., sampled: bool = ...) -> None: ...
+
+class Station(_Station):
+    """A station with `places`, at which tokens are served one to a place; those that are urgent go first."""
+    def __init__(self, path: str, *, places: _Whole = ..., service_time: Distribution | abc.Mapping[str, object]) -> None: ...
+
+class Stop(_Stop):
+    """Ends the run with the tag at which a true token comes; what belongs to that tag is still done."""
+    def __init__(self, path: str) -> None: ...
+
+class StudentT(_StudentT):
+    """Student's t distribution."""
+    def __init__(self, *, freedom: _Number) -> None: ...
+
+class Switch(_Switch):
+    """Sends each token to the channel of its output that the latest `control` token names."""
+    def __init__(self, path: str, *, outside: Literal['error', 'nothing'] = ...) -> None: ...
+
+class Synchronizer(_Synchronizer):
+    """Waits until there is a token on every channel, and then sends one of each at the same tag."""
+    def __init__(self, path: str) -> None: ...
+
+class Test(_Test):
+    """Compares what comes with what is expected, in order, and ends the run with an error where they differ."""
+    def __init__(self, path: str, *, values: abc.Sequence[object], times: _Row | None = ..., tolerance: _Number = ..., complete: bool = ..., together: bool = ..., follow: bool = ..., lenient: bool = ...) -> None: ...
+
+class TextFunction(_TextFunction):
+    """Does something with a text whenever a token comes at one of its inputs, each of which keeps its latest one."""
+    def __init__(self, path: str, *, function: Literal['lower', 'upper', 'trim', 'equals', 'contains', 'starts with', 'ends with', 'find', 'find last', 'replace', 'replace first', 'split'], ignore_case: bool = ..., text: str = ..., other: str = ..., new: str = ...) -> None: ...
+
+class TimeAverage(_TimeAverage):
+    """The mean over time of a signal that keeps the value of a token until the next one comes, from 0 s up to now."""
+    def __init__(self, path: str) -> None: ...
+
+class TimeCompare(_TimeCompare):
+    """Sends by how much a token of `second` comes after one of `first`: the one after its first, and so on."""
+    def __init__(self, path: str, *, nonnegative: bool = ...) -> None: ...
+
+class TimeDelay(_TimeDelay):
+    """Sends each token on after a delay; with delay 0 at the next microstep."""
+    def __init__(self, path: str, *, delay: _Number = ..., steps: bool = ...) -> None: ...
+
+class TimeGap(_TimeGap):
+    """Sends how much time has passed since the token before; nothing for the first one."""
+    def __init__(self, path: str) -> None: ...
+
+class Timer(_Timer):
+    """Sends a value after as many seconds as a token says; any number of tokens may be waiting at once."""
+    def __init__(self, path: str, *, one_at_a_time: bool = ..., value: object = ...) -> None: ...
+
+class TransferFunction(_TransferFunction):
+    """A linear system of one input and one output by its transfer function, such as `2 / (s^2 + 0.4 s + 4)`."""
+    def __init__(self, path: str, *, numerator: _Row = ..., denominator: _Row, initial: _Row = ..., held: _Number = ..., sampled: bool = ...) -> None: ...
+
+class Triangular(_Triangular):
+    """The triangular distribution: a least, a likeliest and a greatest number."""
+    def __init__(self, *, low: _Number = ..., mode: _Number = ..., high: _Number = ...) -> None: ...
+
+class Unbatch(_Unbatch):
+    """Sends what is in a list, one by one, at the same tag."""
+    def __init__(self, path: str) -> None: ...
+
+class Unicycle(_Unicycle):
+    """A vehicle that is told how fast to go and how fast to turn: one wheel, or two that are driven apart."""
+    def __init__(self, path: str, *, turn_rate: _Number = ..., max_turn_rate: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
+
+class Uniform(_Uniform):
+    """All numbers of an interval alike."""
+    def __init__(self, *, low: _Number = ..., high: _Number = ...) -> None: ...
+
+class UnscentedEstimator(_UnscentedEstimator):
+    """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once."""
+    def __init__(self, path: str, *, period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+
+class Variable(_Variable):
+    """A value that may change: the latest token is its value from the next microstep on, and is sent then."""
+    def __init__(self, path: str, *, delayed: bool = ...) -> None: ...
+
+class Vehicle(_Vehicle):
+    """A double integrator in the paper's discrete form."""
+    def __init__(self, path: str, *, start: _Row, start_velocity: _Row = ..., max_speed: _Number = ..., max_acceleration: _Number = ...) -> None: ...
+
+class VonMises(_VonMises):
+    """The von Mises distribution of angles, in rad."""
+    def __init__(self, *, mean: _Number = ..., concentration: _Number = ...) -> None: ...
+
+class WaitingLine(_WaitingLine):
+    """A queue in any order from which each trigger takes a token: on the channel of the output that it came by."""
+    def __init__(self, path: str, *, size: str | float | Formula = ..., credits: _Whole = ..., persistent_trigger: bool = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
+
+class WaitingTime(_WaitingTime):
+    """Sends how long each token of `waiter` has waited for a token of `waited_for`; tokens of one tag wait for 0 s."""
+    def __init__(self, path: str) -> None: ...
+
+class WaypointFollower(_WaypointFollower):
+    """Drives a vehicle along straight lines from waypoint to waypoint, by pure pursuit."""
+    def __init__(self, path: str, *, waypoints: _Rows, cruise: _Number = ..., lookahead: _Number = ..., tolerance: _Number = ..., deceleration: _Number | None = ..., wheelbase: _Number | None = ..., closed: bool = ...) -> None: ...

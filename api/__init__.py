@@ -1,0 +1,62 @@
+"""Epicycle from Python: load, run, study and compare models, draw and save what comes of them.
+
+>>> import epicycle
+>>> results = epicycle.run("mm1", seed=3, set={"load": 0.9})
+>>> results.metrics["mean_wait"]
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from epicycle.actors import EpicycleError
+    from epicycle.runner import Model, ModelError, Results, Simulation, StudyResults, open_study
+    from epicycle.runner.calls import Comparison, Picture, compare, draw, load, plot, run, save, study
+
+    __version__: str
+
+__all__ = [
+    "Comparison",
+    "EpicycleError",
+    "Model",
+    "ModelError",
+    "Picture",
+    "Results",
+    "Simulation",
+    "StudyResults",
+    "compare",
+    "draw",
+    "load",
+    "open_study",
+    "plot",
+    "run",
+    "save",
+    "study",
+]
+
+# Where each name is found on first use: `import epicycle` must not wait for NumPy and networkx.  A new call, such as
+# one that shows a run, is a line here and above.
+_HOMES = {
+    "EpicycleError": "actors",
+    **dict.fromkeys(("Model", "ModelError", "Results", "Simulation", "StudyResults", "open_study"), "runner"),
+    **dict.fromkeys(
+        ("Comparison", "Picture", "compare", "draw", "load", "plot", "run", "save", "study"), "runner.calls"
+    ),
+}
+_FOLDERS = ("actors", "aspects", "runner")
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    if name in _FOLDERS:  # `epicycle.actors.Clock` without an import of its own
+        return import_module(f"{__name__}.{name}")
+    if name == "__version__":
+        return import_module(f"{__name__}.runner.provenance").version_of("epicycle")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_FOLDERS})

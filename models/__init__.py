@@ -1,0 +1,1 @@
+"""The models, disturbances and studies that come with Epicycle, in YAML."""

@@ -1,0 +1,49 @@
+"""What a program calls: load, run, study, compare, plot, draw and save.  Commands go the same way.
+
+``epicycle`` itself offers all of these.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .comparing import Comparison, Difference, compare
+    from .picturing import Picture, Pictures, draw, plot, save
+    from .running import Changes, Done, load, perform, run, seconds, watched
+    from .studying import study
+
+__all__ = [
+    "Changes",
+    "Comparison",
+    "Difference",
+    "Done",
+    "Picture",
+    "Pictures",
+    "compare",
+    "draw",
+    "load",
+    "perform",
+    "plot",
+    "run",
+    "save",
+    "seconds",
+    "study",
+    "watched",
+]
+
+_HOMES = {
+    "comparing": ("Comparison", "Difference", "compare"),
+    "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
+    "running": ("Changes", "Done", "load", "perform", "run", "seconds", "watched"),
+    "studying": ("study",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    # On first use: a run needs neither studies nor what draws.
+    home = next((home for home, names in _HOMES.items() if name in names), None)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{home}", __name__), name)

@@ -1,0 +1,221 @@
+"""One run from a model to what it leaves: what ``epicycle.run`` and the command do."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypedDict, Unpack, cast
+
+from epicycle.actors import EpicycleError, convert
+
+from ..bars import SOON, bar
+from ..build import Model, figures_of, load_model
+from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
+from ..language import Setting
+from ..printing import complain, console, notices
+from ..results import LogFile, Results
+from ..text import Problems, call_site, node_of, plain
+
+PATIENCE = 5.0  # s after which a run can be judged
+LONG = 600.0  # s that are worth a word
+NOTICEABLE = 0.05  # s by which a run may be late without our saying so: the operating system alone takes as much
+
+load = load_model
+
+
+class Changes(TypedDict, total=False):
+    """What ``load`` changes in a model."""
+
+    set: Iterable[str | Setting] | Mapping[str, object]
+    overrides: str | Path | Iterable[str | Path]
+    aspects: Iterable[str]
+    without_aspects: Iterable[str]
+    disturb: str | Path | Iterable[str | Path]
+    types: Iterable[type]
+    max_actors: int
+
+
+def loaded(model: Model | str | Path, changes: Changes) -> Model:
+    """The model of that name or file with the changes; one that is made already takes none."""
+    if not isinstance(model, Model):
+        return load_model(model, **changes)
+    if changes:
+        raise EpicycleError(
+            f"the model {model.name} is made already and takes no {', '.join(changes)}\n"
+            "   help: give the name or file of a model with these, or load it with them"
+        )
+    return model
+
+
+def run(
+    model: Model | str | Path,
+    *,
+    seed: int | None = None,
+    until: float | str | None = None,
+    realtime: float | None = None,
+    keep_log: bool = False,
+    log: str | Path | None = None,
+    out: str | Path | None = None,
+    progress: bool = True,
+    **changes: Unpack[Changes],
+) -> Results:
+    """Run a model once: a packaged one, a file, or one that was loaded or built.
+
+    ``set``, ``disturb`` and the other options of ``load`` change it first.  ``until`` is the stop time (s, or a text
+    with a unit), ``realtime`` how many seconds of it pass in a second.  ``keep_log`` keeps the event log in
+    ``results.log``, ``log`` writes it to a file (.parquet, .csv, .jsonl), ``out`` writes manifest, signals and figures
+    into a folder.  A long run shows a bar in a notebook or on a terminal, unless ``progress`` is false.
+
+    >>> epicycle.run("mm1", seed=3, set={"load": 0.9}).metrics["mean_wait"]
+    """
+    made = loaded(model, changes)
+    done = perform(
+        made,
+        seed=seed,
+        until=seconds("until", until),
+        pace=None if realtime is None else Pace(realtime),
+        keep_log=keep_log or log is not None,
+        log=None if log is None else LogFile(Path(log)),
+        folder=None if out is None else Path(out),
+        given=("epicycle.run", made.name) if isinstance(model, Model) else as_command(model, seed, until, changes),
+        progress=progress,
+    )
+    for error in done.failed:
+        raise error
+    return done.results
+
+
+FLAGS = {"overrides": "--overrides", "disturb": "--disturb", "aspects": "--aspect", "without_aspects": "--without"}
+
+
+def as_command(model: str | Path, seed: int | None, until: float | str | None, changes: Changes) -> list[str]:
+    """The command that makes the same run; classes that a program defines it cannot name."""
+    words: list[object] = ["epicycle", "run", model]
+    for key, value in changes.items():
+        if key == "set" and isinstance(value, Mapping):
+            for path, each in value.items():
+                words += ["--set", f"{path}={json.dumps(plain(node_of(each, call_site())))}"]
+        elif key in FLAGS or key == "set":
+            each_of = [value] if isinstance(value, (str, Path)) else cast(Iterable[object], value)
+            words += [word for each in each_of for word in (FLAGS.get(key, "--set"), each)]
+    words += [] if seed is None else ["--seed", seed]
+    words += [] if until is None else ["--until", until]
+    return list(map(str, words))
+
+
+@dataclass
+class Done:
+    """What came of a run, what was written of it, and which figures could not be drawn."""
+
+    results: Results
+    written: list[Path] = field(default_factory=list)
+    failed: Sequence[EpicycleError] = ()
+
+
+def perform(
+    model: Model,
+    *,
+    seed: int | None = None,
+    until: float | None = None,
+    pace: Pace | None = None,
+    keep_log: bool | LogFilter = False,
+    log: LogFile | None = None,
+    folder: Path | None = None,
+    given: Sequence[str] = (),
+    progress: bool = True,
+    after: float = SOON,
+) -> Done:
+    """Run a model and write what is asked for; ``given`` is by what it was, for the manifest.
+
+    What is recorded until a run fails is written, too.  ``keep_log`` filters what goes to the ``log``, if there is one.
+    """
+    figures = figures_of(model, Problems())
+    if folder is not None and folder.exists() and not folder.is_dir():
+        raise EpicycleError(f"--out {folder} is a file, not a folder")
+    if folder is not None:
+        from ..show import check_folder, draw_figures, write_folder
+
+    replaced = "" if folder is None else check_folder(folder, model.name, list(given))
+    simulation = Simulation(model, seed=seed, keep_log=keep_log, log_to=None if log is None else log.add)
+    if replaced:  # and nothing is wrong with what was asked for
+        complain(replaced)
+    if until is None and model.endless:
+        complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
+    with log or nullcontext(), watched(model, until, after) if progress else nullcontext() as report:
+        try:
+            results = simulation.run(until=until, progress=report, pace=pace)
+        except (ActorError, LoopError, KeyboardInterrupt) as error:
+            interrupted = isinstance(error, KeyboardInterrupt)
+            results = simulation.results("interrupted" if interrupted else "failed")
+            if folder is not None:
+                write_folder(folder, results, given, "interrupted" if interrupted else str(error))
+                complain(f"what was recorded until then is in {folder}")
+            raise
+        # Before the log is closed, which may fail.
+        saved = [] if folder is None else write_folder(folder, results, given)
+    if pace is not None and pace.worst > NOTICEABLE:
+        complain(
+            f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
+            f"{pace.behind:.3g} s at the end"
+        )
+    if folder is None:
+        return Done(results)
+    drawn, failed = draw_figures(folder, results, figures)
+    return Done(results, [*drawn, *saved], failed)
+
+
+def seconds(what: str, given: float | str | None) -> float | None:
+    """A model time in seconds or with a unit."""
+    if given is None:
+        return None
+    time = convert(given, "s") if isinstance(given, str) else given
+    if not 0.0 <= time < 1e9:
+        raise EpicycleError(f"{what} {given}: expected a time from 0 s to 1e9 s")
+    return time
+
+
+def outlook(elapsed: float, now: float, end: float) -> str:
+    """What to say of a run that has gone on for a while and will take long: a clock of 1 ns is easily written."""
+    if now <= 0.0:  # for all we know, one step does not end
+        state = f"still at 0 s of {end:g} s"
+    elif (left := elapsed * (end - now) / now) > LONG:
+        state = f"at {now:.3g} s of {end:g} s: at this pace it takes {left / 3_600:,.1f} h more"
+    else:
+        return ""
+    return f"after {elapsed:.0f} s the run is {state}; Ctrl-C ends it, and what was recorded is kept"
+
+
+@contextmanager
+def watched(model: Model, until: float | None, after: float = 0.0) -> Iterator[Callable[[float], None]]:
+    """What a run tells how far it is: a bar, and notices of what takes long."""
+    end = until if until is not None else model.stop
+    latest = -math.inf
+
+    def look(now: float) -> None:
+        nonlocal latest
+        if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing of the run
+            watch.start()
+        latest = now
+        if show is not None:
+            show(now, end, f"{now:.1f} s of model time" if now >= 1.0 else f"{now:.3g} s of model time")
+
+    def judge() -> None:
+        if end is not None and (text := outlook(PATIENCE, latest, end)):
+            complain(text)
+
+    # One step of the run may take for ever, so it is looked at from outside.
+    watch = threading.Timer(PATIENCE, judge)
+    watch.daemon = True
+    terminal = console(stderr=True)
+    try:
+        with notices(terminal), bar(model.name, after=after, terminal=terminal) as show:
+            if show is not None:
+                show(0.0, end, "0 s of model time")
+            yield look
+    finally:
+        watch.cancel()

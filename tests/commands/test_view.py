@@ -1,0 +1,115 @@
+"""`epicycle view`: of a model, of results, of two; and what it says when something is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from epicycle.runner.cli import main
+
+MODEL = """
+model: line
+actors:
+  clock: {type: Clock, period: 0.5 s}
+  sink: {type: Recorder}
+connections: [clock.output -> sink.input]
+run: {stop: 3 s, record: clock.output}
+"""
+
+FAILING = """
+model: failing
+actors:
+  clock: {type: Clock, period: 0.5 s}
+  inverse: {type: Expression, expression: "1 / (2 - x)"}
+connections: [clock.output -> inverse.x]
+run: {stop: 3 s}
+"""
+
+
+@pytest.fixture(autouse=True)
+def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    Path("line.yaml").write_text(MODEL, encoding="utf-8")
+    return "line.yaml"
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> str:
+    assert main(["view", *arguments]) == code
+    captured = capsys.readouterr()
+    return captured.out + captured.err
+
+
+def test_a_page_of_a_model(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert said(capsys, line, "-o", "page.html") == "wrote page.html\n"
+    text = Path("page.html").read_text(encoding="utf-8")
+    assert text.startswith('<!DOCTYPE html>\n<html lang="en">')
+    assert "http:" not in text.replace("http-equiv", "")
+    assert "https:" not in text
+
+
+def test_without_a_file_the_page_stands_beside_the_results_and_is_opened(
+    line: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    assert said(capsys, line) == "wrote results/line/view.html\n"
+    assert opened == [Path("results/line/view.html").resolve().as_uri()]
+
+
+def test_results_are_made_again_as_their_manifest_says(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", line, "--set", "clock.period=0.25", "--until", "2", "--out", "made"]) == 0
+    capsys.readouterr()
+    assert said(capsys, "made", "-o", "page.html") == "wrote page.html\n"
+    # Other settings make another run, of which nothing is said; another model gives itself away.
+    assert said(capsys, "made", "--set", "clock.period=1", "-o", "page.html") == "wrote page.html\n"
+    Path(line).write_text(MODEL.replace("Clock, period", "Clock, offset: 0.1, period"), encoding="utf-8")
+    assert said(capsys, "made", "-o", "page.html") == (
+        "wrote page.html\nmade was made by another version of the model or of Epicycle: the run is no longer the same\n"
+    )
+
+
+def test_two_runs_in_one_page(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", line, "--set", "clock.period=0.25", "--out", "made"]) == 0
+    capsys.readouterr()
+    assert said(capsys, line, "made", "-o", "page.html") == "wrote page.html\n"
+    message = "error: a page shows one run or two, not 3: line.yaml, made, line.yaml\n"
+    assert said(capsys, line, "made", line, "-o", "page.html", code=2) == message
+
+
+def test_a_run_that_fails_is_shown_up_to_there(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("failing.yaml").write_text(FAILING, encoding="utf-8")
+    told = said(capsys, "failing.yaml", "-o", "page.html", code=1)
+    assert told.startswith("wrote page.html\nerror: inverse failed in fire() at (1 s, 1)")
+    assert Path("page.html").stat().st_size > 30_000
+
+
+def test_what_is_no_result_of_a_run(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("empty").mkdir()
+    message = "error: empty holds no results of a run: there is no manifest.json in it\n"
+    assert said(capsys, "empty", code=2) == message
+    (Path("empty") / "manifest.json").write_text("{", encoding="utf-8")
+    broken = said(capsys, "empty", code=2)
+    assert broken.startswith("error: empty/manifest.json is no manifest of a run: Expecting property name")
+    told = {"command": ["epicycle", "study", "table_1"], "digest": ""}
+    (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
+    assert said(capsys, "empty", code=2) == "error: empty holds results of 'epicycle study', not of a run\n"
+    told = {"command": ["epicycle", "run", line, "--types", "own.py"], "digest": ""}
+    (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
+    assert said(capsys, "empty", code=2) == (
+        "error: the run in empty used types of its own\n   help: add --types own.py\n"
+    )
+    told = {"command": ["epicycle", "run", line, "--unheard", "--seed"], "digest": ""}
+    (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
+    assert said(capsys, "empty", code=2) == (
+        "error: empty/manifest.json names a command that this version does not know: "
+        "epicycle run line.yaml --unheard --seed\n"
+    )
+
+
+def test_a_page_that_cannot_be_written(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    message = "error: --out none/page.html cannot be written: there is no folder none\n"
+    assert said(capsys, line, "-o", "none/page.html", code=2) == message
+    Path("taken").mkdir()
+    assert said(capsys, line, "-o", "taken", code=2) == "error: --out taken cannot be written: it is a folder\n"
