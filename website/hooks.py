@@ -11,6 +11,7 @@ from typing import Any
 from mkdocs.structure.files import File, Files, InclusionLevel
 
 from website.gallery import exhibits, index
+from website.notebook import page as notebook_page
 
 ROOT = Path(__file__).parents[1]
 PARTS = ROOT / "site-parts"  # what is made on the way; mkdocs.yml names it, too
@@ -18,12 +19,12 @@ ABOVE = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGEL
 
 
 def on_startup(*, command: str, dirty: bool) -> None:
-    """Make the package as mkdocstrings looks for it: `epicycle`, with our folders in it and no namespace package."""
+    """Make the package as mkdocstrings looks for it: `epicycle`, with our folders in it."""
     del command, dirty
     shutil.rmtree(PARTS, ignore_errors=True)
     package = PARTS / "epicycle"
     package.mkdir(parents=True)
-    (package / "__init__.py").touch()
+    (package / "__init__.py").symlink_to(ROOT / "api" / "__init__.py")
     for folder in ("actors", "aspects", "runner"):
         (package / folder).symlink_to(ROOT / folder, target_is_directory=True)
 
@@ -32,6 +33,11 @@ def on_files(files: Files, *, config: Any) -> Files:
     """Add the documents above docs/, and the gallery."""
     for source, page in ABOVE.items():
         files.append(File.generated(config, page, content=as_page((ROOT / source).read_text(encoding="utf-8"))))
+    for notebook in sorted((ROOT / "docs").rglob("*.ipynb")):
+        place = notebook.relative_to(ROOT / "docs").as_posix()
+        files.remove(files.src_uris[place])
+        content = notebook_page(notebook)
+        files.append(File.generated(config, place.replace(".ipynb", ".md"), content=content))
     shown = exhibits(PARTS / "gallery")
     files.append(File.generated(config, "gallery/index.md", content=index(shown)))
     for each in shown:
@@ -53,4 +59,14 @@ def as_page(document: str) -> str:
     """A document of the root with the links that it has as a page of the site."""
     for source, page in ABOVE.items():
         document = document.replace(f"]({source}", f"]({page}")
-    return re.sub(r"(\]\(|src=\")docs/", r"\1", document)
+    return linked(re.sub(r"\]\(docs/", "](", document))
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """A notebook is a page like all others."""
+    return linked(markdown)
+
+
+def linked(document: str) -> str:
+    """The document with links to the pages that notebooks become."""
+    return re.sub(r"(\]\([\w./-]+)\.ipynb\)", r"\1.md)", document)
