@@ -18,7 +18,7 @@ help:
 	@echo "make portable  every digest under settings that stand for other machines (10 min)"
 	@echo "make core   compile the core anew, after a change of its sources"
 	@echo "make cores  100,000 random networks: does each core make the same runs? (20 min)"
-	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, the order of imports, and types"
+	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, prose, the order of imports, and types"
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
@@ -69,6 +69,7 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python -m tests.arithmetic
+	$(BIN)/python -m tests.prose
 	$(BIN)/python -m tests.layers
 	$(BIN)/mypy
 

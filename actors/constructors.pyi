@@ -61,7 +61,7 @@ class Accumulator(_Accumulator):
     def __init__(self, path: str, *, initial: _Number = ..., reset_by: Literal['any', 'true'] = ..., low: _Number | None = ..., high: _Number | None = ...) -> None: ...
 
 class Ackermann(_Ackermann):
-    """A car: it is told how fast to go and how far to steer."""
+    """A car, driven by speed and steering angle."""
     def __init__(self, path: str, *, steering: _Number = ..., wheelbase: _Number = ..., max_steering: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
 
 class AddSubtract(_AddSubtract):
@@ -73,7 +73,7 @@ class ArqReceiver(_ArqReceiver):
     def __init__(self, path: str, *, repeat: Literal['all', 'one'] = ...) -> None: ...
 
 class ArqSender(_ArqSender):
-    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them anew."""
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them again."""
     def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ...) -> None: ...
 
 class Barrier(_Barrier):
@@ -573,7 +573,7 @@ class Unbatch(_Unbatch):
     def __init__(self, path: str) -> None: ...
 
 class Unicycle(_Unicycle):
-    """A vehicle that is told how fast to go and how fast to turn: one wheel, or two that are driven apart."""
+    """A vehicle driven by speed and turn rate: one wheel, or two with separate drives."""
     def __init__(self, path: str, *, turn_rate: _Number = ..., max_turn_rate: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
 
 class Uniform(_Uniform):

@@ -65,9 +65,9 @@ class Merge(Actor):
 class Router(Actor):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or as the token says.
 
-    For ``shortest queue``, ``load`` takes what each channel leads to tells of itself, such as the ``size`` of a
+    For ``shortest queue``, ``load`` takes the load of what each channel leads to, such as the ``size`` of a
     ``Server``, in the order of the output's channels; it counts as 0 until then, and one more for each token that is
-    sent there before it tells anew.  Among equals one is drawn.  ``channel: number % 3`` is what ``expression`` goes
+    sent there before the next value.  Among equals one is drawn.  ``channel: number % 3`` is what ``expression`` goes
     by, over the token's fields.  Ptolemy: ``Distributor``.
     """
 

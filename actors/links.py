@@ -188,14 +188,14 @@ class NetworkSwitch(_Transmitting):
 
 
 class ArqSender(Actor):
-    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them anew.
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them again.
 
     A frame is ``{number, data}``, with the token that came as its data.  ``window: 1`` is stop-and-wait.  Otherwise,
-    when the oldest frame has not been acknowledged for ``timeout``, ``repeat: all`` sends all that are out anew (go
-    back N), and ``repeat: one`` each whose own time is over (selective repeat).  An acknowledgement is the number of a
-    frame: with ``all`` it acknowledges all up to this one, with ``one`` this one alone.  Frames go through a ``Link``
-    with loss to an ``ArqReceiver``, whose acknowledgements come back by another.  The output does not depend on ``ack``
-    at once.
+    when the oldest frame has not been acknowledged for ``timeout``, ``repeat: all`` sends all outstanding frames again
+    (go back N), and ``repeat: one`` each frame whose own timeout has elapsed (selective repeat).  An acknowledgement is
+    the number of a frame: with ``all`` it acknowledges all up to this one, with ``one`` this one alone.  Frames go
+    through a ``Link`` with loss to an ``ArqReceiver``, whose acknowledgements come back by another.  The output does
+    not depend on ``ack`` at once.
 
     Sources: Bertsekas and Gallager, Data Networks, 2.4; Tanenbaum, Computer Networks, 3.4.
     """

@@ -183,7 +183,7 @@ class Clock(_Ticking):
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    A trigger lets one come at once, from which the time to the next is drawn anew.  Ptolemy: ``PoissonClock``.
+    A trigger lets one come at once, from which the time to the next one is drawn.  Ptolemy: ``PoissonClock``.
     """
 
     is_source: ClassVar[bool] = True

@@ -40,7 +40,7 @@ class TextFunction(Actor):
     texts.
     """
 
-    output: OutputPort[Any] = OutputPort(str, doc="what comes of it")
+    output: OutputPort[Any] = OutputPort(str, doc="the result")
 
     function = Parameter(str, choices=tuple(FUNCTIONS), doc="what is done")
     ignore_case = Parameter(bool, False, doc="whether capital letters count as small ones, in both texts")

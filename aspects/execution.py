@@ -295,7 +295,7 @@ class CrashRestart(ExecutionAspect):
     not active does not happen.  Times are those of the model.
 
     With the state ``lost`` everything is gone that the actors knew and had begun, their wake-ups included, and after
-    the repair they begin anew, as in ``initialize`` before the first tag; their random streams go on.  Actors that
+    the repair they begin again, as in ``initialize`` before the first tag; their random streams go on.  Actors that
     stand for physics, which does not crash with the software, are better left out (``!robot.vehicle``).  With the state
     ``kept`` they go on where they were: what had begun, and wake-ups that fell due meanwhile, are executed at once.
     A process that waits for an event of SimPy's own, such as a resource, is not held up by a crash that keeps the

@@ -22,8 +22,8 @@ UNTIL = {"mg1": 1000.0, "mm1": 1000.0, "switched_network": 0.2}  # s; of long ru
 
 _INDEX = """# Gallery
 
-Every model that comes with Epicycle, run when this site was built. Each has a page with its figures and numbers, and the
-[live page](../view.md) of its run: play it, scrub through it, click on anything.
+Every model that comes with Epicycle, run when this site was built. Each has a page with its figures and numbers, and
+the [live page](../view.md) of its run: play it, scrub through it, click on anything.
 
 <div class="gallery">
 {cards}

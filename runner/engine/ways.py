@@ -174,7 +174,7 @@ class Ways:
         return refinement is not None and refinement.conductor.machine.catches
 
     def _begin_anew(self, refinement: str) -> None:
-        """Let all that is in a refinement begin anew."""
+        """Let all that is in a refinement begin again."""
         for path, passage in self._passages.items():
             if is_within(path, refinement):
                 passage.clear()
@@ -383,7 +383,7 @@ class Ways:
     def _guarded(
         self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
     ) -> Guarded:
-        """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
+        """What an aspect does with all that comes to a join point; an error in it is reported with its ``name``."""
         holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
         return Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
 
