@@ -288,7 +288,7 @@ class ArqSender(Actor):
 
 
 class ArqReceiver(Actor):
-    """The receiving end of an automatic repeat request: hands on what comes by an ``ArqSender``, once and in order.
+    """The receiving end of an automatic repeat request: passes on what comes by an ``ArqSender``, once and in order.
 
     With ``repeat: all`` a frame that is not the next one is thrown away, and the last one in order is acknowledged;
     with ``one`` it is kept until its turn, and each frame is acknowledged by itself.  Sources: see ``ArqSender``.

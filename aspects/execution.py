@@ -38,7 +38,7 @@ LOST, KEPT = "lost", "kept"
 
 
 class ExecutionTime(ExecutionAspect):
-    """Lets the firings of an actor take time: it fires when that is over, with the tokens that came at the beginning.
+    """Makes the firings of an actor take time: it fires at the end, with the tokens from the beginning.
 
     A firing takes ``scale`` * (``time`` + the next of the measured ``times``), if there is something to do in it: at
     ports that do not trigger an actor it only takes note of tokens, which costs nothing.  With a ``time`` for each port
@@ -176,7 +176,7 @@ class SkipFiring(ExecutionAspect):
 
 
 class Processor(ExecutionAspect):
-    """One processor for all the actors at which it stands: each of their firings needs it for some time.
+    """One processor for all its actors: each of their firings needs it for some time.
 
     An actor fires when the time that its firing needs has been worked off, with the tokens that came at the beginning.
     As in ``ExecutionTime``, tokens of which it only takes note cost nothing, and times may be given by input port.

@@ -29,7 +29,7 @@ class Pool(WaitingActor):
     granted again.  So do those who hold more than there is, when ``capacity`` falls; else they keep it until they are
     done. Shifts are a ``Clock`` at ``capacity``: ``{period: 24 h, offsets: [8 h, 16 h], values: [3, 1]}``.
 
-    At one tag those that renege go first, then comes the capacity, then releases, then requests; all is reported at the
+    At one tag those that renege go first, then comes the capacity, then releases, then requests; outputs leave at the
     next microstep, so the actor may stand in a loop.  Sources: SimPy's ``PreemptiveResource``; Pegden and others,
     Introduction to Simulation Using SIMAN (seize and release); Ptolemy: ``ResourcePool``.
     """

@@ -49,7 +49,7 @@ class Machine(Process):
     """A machine that makes one part after the other, breaks down now and then, and waits to be repaired.
 
     A breakdown interrupts the work on a part, which resumes where it was when the machine runs again.  The machine
-    tells its ``number`` when it breaks, and runs again when this number comes back.
+    sends its ``number`` when it breaks down, and runs again when this number comes back.
     """
 
     repaired = InputPort(int, doc="numbers of machines that are repaired; others' are ignored")
