@@ -62,7 +62,7 @@ else:
     from .queues import Queue, Server, SharedQueue
     from .replay import Replay, ReplayError
     from .sinks import Display, Histogram, Recorder, Stop, Test
-    from .sources import Clock, PoissonClock, Random, SingleEvent
+    from .sources import Clock, PoissonClock, Random, SingleEvent, VaryingRandom
     from .statistics import MovingAverage, MovingStatistics
     from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
     from .triggered import Const, CurrentMicrostep, CurrentTime, Pulse, Ramp, Sequence
@@ -90,14 +90,14 @@ __all__ = [
     "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread", "StateMachine",
     "StateSpace", "Station", "Stop", "Stream", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TextFunction",
     "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction", "Triangular", "Unbatch",
-    "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "Vehicle", "VonMises", "WaitingLine",
-    "WaitingTime", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter", "bounds_text",
-    "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean",
-    "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
-    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",
-    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
-    "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
-    "visible_character", "visible_lines",
+    "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "VaryingRandom", "Vehicle", "VonMises",
+    "WaitingLine", "WaitingTime", "Wake", "Way", "WaypointFollower", "When", "abridged", "accepts", "array_parameter",
+    "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
+    "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest",
+    "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit",
+    "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
+    "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
+    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip
 
 

@@ -3,7 +3,11 @@ Difference."""
 
 from __future__ import annotations
 
+from functools import reduce
+from typing import Any
+
 from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
+from .items import added
 from .matching import taken
 
 
@@ -16,33 +20,46 @@ class Counter(Actor):
 
     increment = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one up")
     decrement = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one down")
-    reset = InputPort(required=False, doc="sets the number back, before the tag is counted")
+    reset = InputPort(required=False, ptolemy={"keep": True}, doc="sets the number back, before the tag is counted")
     output = OutputPort(int, doc="the number")
 
     initial = Parameter(int, 0, doc="the number at the start and after a reset")
+    reset_by = Parameter(
+        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset it: any, or those that are true"
+    )
+    reset_last = Parameter(
+        bool, False, ptolemy=True, doc="whether a reset counts behind what is counted at its tag, not before it"
+    )
 
     def initialize(self) -> None:
         self._number = self.initial
 
     def fire(self) -> None:
-        if self.reset.present:
+        resets = [self.reset.get()] if self.reset.keep and self.reset.waiting() else self.reset.tokens
+        is_reset = any(token is True or self.reset_by == "any" for token in resets)
+        if is_reset and not self.reset_last:
             self._number = self.initial
-        if self.increment.keep:
-            self._number += taken(self.increment) - taken(self.decrement)
-        else:
-            self._number += len(self.increment.tokens) - len(self.decrement.tokens)
-        self.output.send(self._number)
+        up, down = self._counted(self.increment), self._counted(self.decrement)
+        self._number += up - down
+        if is_reset and self.reset_last:
+            self._number = self.initial
+        if is_reset or up or down:
+            self.output.send(self._number)
+
+    @staticmethod
+    def _counted(port: InputPort[Any]) -> int:
+        return taken(port) if port.keep else len(port.tokens)
 
 
 class Accumulator(Actor):
     """The sum of all tokens so far, those of this tag included.
 
-    Ptolemy: ``Accumulator``.
+    Under ``like: ptolemy`` lists are added up item by item, too.  Ptolemy: ``Accumulator``.
     """
 
-    input = InputPort(float, multi=True, doc="what is added up")
+    input = InputPort(float, multi=True, ptolemy={"type": Any}, doc="what is added up")
     reset = InputPort(multi=True, required=False, doc="sets the sum back, before the tag is added")
-    output = OutputPort(float, doc="the sum; sent for each round of tokens, and at a reset")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="the sum; sent for each round of tokens, and at a reset")
 
     initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
     reset_by = Parameter(
@@ -52,7 +69,7 @@ class Accumulator(Actor):
     high: Parameter[float | None] = Parameter(int | float, None, doc="the greatest that the sum can be")
 
     def initialize(self) -> None:
-        self._sum = self.initial
+        self._sum: Any = self.initial
 
     def fire(self) -> None:
         if self.reset.present:
@@ -61,7 +78,11 @@ class Accumulator(Actor):
             if not self.input.present:
                 self._send()
         for (tokens,) in rounds(self.input):
-            self._sum += elementary.total(present(tokens))
+            there = present(tokens)
+            if all(isinstance(each, (int, float)) for each in there) and isinstance(self._sum, (int, float)):
+                self._sum += elementary.total(there)
+            else:
+                self._sum = reduce(added, there, self._sum)
             self._send()
 
     def _send(self) -> None:
@@ -177,7 +198,7 @@ class Difference(Actor):
     """
 
     input = InputPort(float, doc="the numbers")
-    output = OutputPort(float, doc="x[k] - x[k-1]")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="x[k] - x[k-1]")
 
     initial: Parameter[float | None] = Parameter(int | float, None, doc="what counts as the token before the first")
 

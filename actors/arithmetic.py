@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import reduce
 from typing import Any, Final
 
@@ -24,7 +24,9 @@ from .core import (
     present,
     rounds,
 )
-from .expression import operand, text_of
+from .items import added as _added
+from .items import item_by_item as _item_by_item
+from .items import less as _less
 
 
 class AddSubtract(Actor):
@@ -47,58 +49,41 @@ class AddSubtract(Actor):
                 self.output.send(reduce(_less, below, reduce(_added, above[1:], above[0] if above else 0)))
 
 
-def _added(left: Any, right: Any) -> Any:
-    if isinstance(left, str) or isinstance(right, str):
-        return text_of(left) + text_of(right)
-    return _item_by_item(left, right, operator.add)
-
-
-def _less(left: Any, right: Any) -> Any:
-    return _item_by_item(left, right, operator.sub)
-
-
-def _item_by_item(left: Any, right: Any, compute: Callable[[Any, Any], Any]) -> Any:
-    """A sum or the like of numbers, of lists of them, or of fields that both have; a number goes with all of a list."""
-    left, right = operand(left), operand(right)
-    if isinstance(left, Mapping) and isinstance(right, Mapping):
-        return {name: _item_by_item(left[name], right[name], compute) for name in left if name in right}
-    lists = [isinstance(each, (list, tuple)) for each in (left, right)]
-    if any(lists) and not any(isinstance(each, (str, Mapping)) for each in (left, right)):
-        if all(lists) and len(left) != len(right):
-            raise EpicycleError(f"{left!r} has {len(left)} items and {right!r} has {len(right)}")
-        count = len(left if lists[0] else right)
-        pairs = zip(left if lists[0] else [left] * count, right if lists[1] else [right] * count, strict=True)
-        return [_item_by_item(one, other, compute) for one, other in pairs]
-    if not isinstance(left, (int, float)) or not isinstance(right, (int, float)):
-        raise EpicycleError(f"{left!r} and {right!r} do not go together")
-    return compute(left, right)
-
-
 class MultiplyDivide(Actor):
     """The product of what comes at ``multiply``, divided by all that comes at ``divide``.
 
     Channels without a token at this tag do not count.  With ``whole``, as in Ptolemy, whole numbers are divided without
-    remainder, towards zero.  Ptolemy: ``MultiplyDivide``.
+    remainder, towards zero, and lists are multiplied item by item.  Ptolemy: ``MultiplyDivide``.
     """
 
-    multiply = InputPort(float, multi=True, required=False, doc="the factors; their product is 1 if there are none")
-    divide = InputPort(float, multi=True, required=False, doc="the divisors")
-    output = OutputPort(float, doc="prod(multiply) / prod(divide)")
+    multiply = InputPort(
+        float,
+        multi=True,
+        required=False,
+        ptolemy={"type": Any},
+        doc="the factors; their product is 1 if there are none",
+    )
+    divide = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="the divisors")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="prod(multiply) / prod(divide)")
 
     whole = Parameter(bool, False, ptolemy=True, doc="whether a quotient of whole numbers is one, too")
 
     def fire(self) -> None:
         for multiply, divide in rounds(self.multiply, self.divide):
-            product = math.prod(present(multiply))
-            for divisor in present(divide):
-                if divisor == 0:
-                    raise EpicycleError(f"{product!r} is to be divided by {divisor!r}")
-                if self.whole and isinstance(product, int) and isinstance(divisor, int):
-                    sign = 1 if (product < 0) == (divisor < 0) else -1
-                    product = sign * (abs(product) // abs(divisor))
-                else:
-                    product /= divisor
-            self.output.send(product)
+            factors, divisors = present(multiply), present(divide)
+            if all(isinstance(each, (int, float)) for each in factors + divisors):
+                self.output.send(reduce(self._divided, divisors, math.prod(factors)))
+            else:
+                product = reduce(lambda one, other: _item_by_item(one, other, operator.mul), factors) if factors else 1
+                self.output.send(reduce(lambda one, other: _item_by_item(one, other, self._divided), divisors, product))
+
+    def _divided(self, product: Any, divisor: Any) -> Any:
+        if divisor == 0:
+            raise EpicycleError(f"{product!r} is to be divided by {divisor!r}")
+        if self.whole and isinstance(product, int) and isinstance(divisor, int):
+            sign = 1 if (product < 0) == (divisor < 0) else -1
+            return sign * (abs(product) // abs(divisor))
+        return product / divisor
 
 
 class Extreme(Actor):
@@ -109,7 +94,7 @@ class Extreme(Actor):
     """
 
     input = InputPort(float, multi=True, doc="what is compared")
-    value = OutputPort(float, doc="the greatest or the least")
+    value = OutputPort(float, ptolemy={"type": Any}, doc="the greatest or the least")
     channel = OutputPort(int, doc="where it came, from 0")
 
     take = Parameter(str, choices=("greatest", "least"), doc="which of them")
@@ -176,7 +161,7 @@ class MathFunction(Actor):
     """
 
     input = InputPort(float, doc="the argument")
-    output = OutputPort(float, doc="the value of the function")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="the value of the function")
 
     function = Parameter(str, choices=tuple(FUNCTIONS), doc="which function")
 

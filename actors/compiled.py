@@ -49,6 +49,7 @@ CORE_MODULES = (
     "epicycle.runner.engine.computing",
     "epicycle.runner.engine.forms",
     "epicycle.runner.engine.director",
+    "epicycle.runner.engine.loop",
     "epicycle.runner.engine.way",
     "epicycle.runner.engine.batches",
     "epicycle.runner.engine.statistic",

@@ -39,7 +39,7 @@ from .robotics.monitors import DistanceMonitor as _DistanceMonitor, GoalMonitor 
 from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver
 from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Sensor as _Sensor, Vehicle as _Vehicle
 from .sinks import Display as _Display, Histogram as _Histogram, Recorder as _Recorder, Stop as _Stop, Test as _Test
-from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent
+from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent, VaryingRandom as _VaryingRandom
 from .statistics import MovingAverage as _MovingAverage, MovingStatistics as _MovingStatistics
 from .texts import TextFunction as _TextFunction
 from .timing import ResettableTimer as _ResettableTimer, TimeCompare as _TimeCompare, TimeDelay as _TimeDelay, TimeGap as _TimeGap, Timer as _Timer, WaitingTime as _WaitingTime
@@ -146,7 +146,7 @@ class Collect(_Collect):
 
 class Commutator(_Commutator):
     """Passes on what comes at the channels of its input in turn, `block` tokens of each; tokens wait for their turn."""
-    def __init__(self, path: str, *, block: _Whole = ...) -> None: ...
+    def __init__(self, path: str, *, block: _Whole = ..., waits: bool = ...) -> None: ...
 
 class Comparator(_Comparator):
     """Compares `left` with `right`, or with `value` if nothing is connected to `right`."""
@@ -162,7 +162,7 @@ class Constant(_Constant):
 
 class Counter(_Counter):
     """Counts tokens of any kind: up for each at `increment`, down for each at `decrement`."""
-    def __init__(self, path: str, *, initial: _Whole = ...) -> None: ...
+    def __init__(self, path: str, *, initial: _Whole = ..., reset_by: Literal['any', 'true'] = ..., reset_last: bool = ...) -> None: ...
 
 class CurrentMicrostep(_CurrentMicrostep):
     """Sends the present microstep for each trigger."""
@@ -370,7 +370,7 @@ class Poisson(_Poisson):
 
 class PoissonClock(_PoissonClock):
     """Ticks at random: the times between ticks are independent and exponentially distributed."""
-    def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., generator: Generator | abc.Mapping[str, object] | None = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
+    def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., generator: Generator | abc.Mapping[str, object] | None = ..., one_at_a_time: bool = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
 
 class Pool(_Pool):
     """Units of a resource: a token at `acquire` asks for some, comes back by `granted` when it has them, and one at `release` returns them."""
@@ -418,11 +418,11 @@ class ReachGoal(_ReachGoal):
 
 class RecordAssembler(_RecordAssembler):
     """Makes one token with fields of the tokens of several inputs, which are called like the fields."""
-    def __init__(self, path: str, *, fields: _Texts, onto: str | None = ...) -> None: ...
+    def __init__(self, path: str, *, fields: _Texts, onto: str | None = ..., apart: bool = ...) -> None: ...
 
 class RecordDisassembler(_RecordDisassembler):
     """Sends fields of each token by outputs that are called like the fields."""
-    def __init__(self, path: str, *, fields: _Texts) -> None: ...
+    def __init__(self, path: str, *, fields: _Texts, partial: bool = ...) -> None: ...
 
 class Recorder(_Recorder):
     """Keeps what comes, for Python to read after the run."""
@@ -506,7 +506,7 @@ class Spread(_Spread):
 
 class StateMachine(_StateMachine):
     """A state machine, with a transition a line and variables that may flow."""
-    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
+    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., one_at_a_time: bool = ..., set_last: bool = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
 
 class StateSpace(_StateSpace):
     """A linear system in state space, `dx/dt = A x + B u`, `y = C x + D u`."""
@@ -587,6 +587,10 @@ class UnscentedEstimator(_UnscentedEstimator):
 class Variable(_Variable):
     """A value that may change: the latest token is its value from the next microstep on, and is sent then."""
     def __init__(self, path: str, *, delayed: bool = ...) -> None: ...
+
+class VaryingRandom(_VaryingRandom):
+    """A `Random` whose distribution changes in the run: some of its parameters have inputs of their names."""
+    def __init__(self, path: str, *, varying: _Texts, distribution: Distribution | abc.Mapping[str, object], generator: Generator | abc.Mapping[str, object] | None = ...) -> None: ...
 
 class Vehicle(_Vehicle):
     """A double integrator in the paper's discrete form."""

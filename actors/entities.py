@@ -58,20 +58,24 @@ class RecordAssembler(Actor):
     """Makes one token with fields of the tokens of several inputs, which are called like the fields.
 
     It waits until there is one at each input; others wait in the order of their arrival.  ``onto`` is the name of one
-    more input: its tokens have fields of their own, which stay as they are unless they are set here.
-    Ptolemy: ``RecordAssembler``, ``RecordUpdater`` (``onto: input``).
+    more input: its tokens have fields of their own, which stay as they are unless they are set here.  With ``apart`` a
+    token makes one by itself, which has a single field.
+    Ptolemy: ``RecordAssembler``, ``RecordUpdater`` (``onto: input``), ``UnionMerge`` (``apart``).
     """
 
     output: OutputPort[Any] = OutputPort(dict, doc="a token with these fields")
 
     fields = texts_parameter(doc="names of the fields, which are the inputs")
     onto: Parameter[str | None] = Parameter(str, None, doc="name of the input whose tokens are given these fields")
+    apart = Parameter(bool, False, doc="whether each token makes one by itself, those of the first fields first")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         _check_names(self.fields)
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {name: InputPort(doc="a field") for name in self.fields}
         if self.onto in ports:
             raise ParameterError(f"onto: {self.onto!r} is one of the fields")
+        if self.onto is not None and self.apart:
+            raise ParameterError("onto and apart: a token by itself has nothing onto which it could be set")
         return ports if self.onto is None else {self.onto: InputPort(doc="tokens with fields"), **ports}
 
     def initialize(self) -> None:
@@ -79,7 +83,11 @@ class RecordAssembler(Actor):
 
     def fire(self) -> None:
         for name, queue in self._waiting.items():
-            queue.extend(self.inputs[name].tokens)
+            if self.apart:
+                for token in self.inputs[name].tokens:
+                    self.output.send({name: token})
+            else:
+                queue.extend(self.inputs[name].tokens)
         while all(self._waiting.values()):
             found = {name: queue.popleft() for name, queue in self._waiting.items()}
             base = {} if self.onto is None else operand(found.pop(self.onto))
@@ -91,12 +99,13 @@ class RecordAssembler(Actor):
 class RecordDisassembler(Actor):
     """Sends fields of each token by outputs that are called like the fields.
 
-    Ptolemy: ``RecordDisassembler``.
+    Ptolemy: ``RecordDisassembler``, ``UnionDisassembler`` (``partial``).
     """
 
     input = InputPort(doc="tokens with fields")
 
     fields = texts_parameter(doc="names of the fields, which are the outputs")
+    partial = Parameter(bool, False, doc="whether a token may lack some of the fields")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         _check_names(self.fields)
@@ -105,7 +114,8 @@ class RecordDisassembler(Actor):
     def fire(self) -> None:
         for token in self.input.tokens:
             for name in self.fields:
-                self.outputs[name].send(field_of(token, name))
+                if not self.partial or (isinstance(token, Mapping) and name in token):
+                    self.outputs[name].send(field_of(token, name))
 
 
 def _check_names(fields: tuple[str, ...]) -> None:

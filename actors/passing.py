@@ -190,13 +190,14 @@ class BooleanSelect(Actor):
 class Commutator(Actor):
     """Passes on what comes at the channels of its input in turn, ``block`` tokens of each; tokens wait for their turn.
 
-    Ptolemy: ``Commutator``.
+    Ptolemy: ``Commutator``, ``SingleTokenCommutator`` (``waits: false``).
     """
 
     input = InputPort(multi=True, doc="a channel for each connection, in their order")
     output = OutputPort(doc="the tokens in turn")
 
     block = Parameter(int, 1, min=1, doc="how many tokens a channel sends in its turn, as soon as it has them")
+    waits = Parameter(bool, True, doc="whether the others wait while a channel in its turn has too few tokens")
 
     def initialize(self) -> None:
         self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
@@ -205,9 +206,12 @@ class Commutator(Actor):
     def fire(self) -> None:
         for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
             queue.extend(tokens)
-        while len(queue := self._waiting[self._next]) >= self.block:
-            for _ in range(self.block):
-                self.output.send(queue.popleft())
+        while any(len(each) >= self.block for each in self._waiting):
+            if len(queue := self._waiting[self._next]) >= self.block:
+                for _ in range(self.block):
+                    self.output.send(queue.popleft())
+            elif self.waits:
+                break
             self._next = (self._next + 1) % len(self._waiting)
 
 

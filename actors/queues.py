@@ -20,6 +20,7 @@ from .core import (
     to_seconds,
 )
 from .distributions import Distribution
+from .matching import taken
 
 
 class Queue(Actor):
@@ -28,7 +29,8 @@ class Queue(Actor):
     At one tag tokens come in before triggers let them out.  With ``one_at_a_time``, as in Ptolemy, a firing takes one
     token and one trigger, of which all channels together are one, and tells ``size`` at its end, changed or not; one
     trigger waits at most; ``output`` does not depend on ``input`` at once, though a token may pass at once.  What comes
-    together with a trigger to a full queue counts in ``size`` there, and is lost.  Ptolemy: ``Queue``.
+    together with a trigger to a full queue counts in ``size`` there, and is lost; what comes on another channel of
+    ``trigger`` than the first alone waits for the next firing.  Ptolemy: ``Queue``.
     """
 
     input = InputPort(doc="what comes in")
@@ -45,14 +47,18 @@ class Queue(Actor):
         bool, False, ptolemy=True, doc="whether a firing takes one token and one trigger, and tells size once"
     )
 
+    def check(self) -> None:
+        self.input.keep = self.trigger.keep = self.one_at_a_time
+
     def initialize(self) -> None:
         self._tokens: deque[Any] = deque()
         self._triggers = 0
 
     def fire(self) -> None:
         if self.one_at_a_time:
-            for tokens, triggers in rounds(self.input, self.trigger):
-                self._take(present(tokens), bool(present(triggers)))
+            if self.input.waiting() or self.trigger.waiting():
+                tokens = [self.input.get()] if self.input.waiting() else []
+                self._take(tokens, taken(self.trigger) > 0)
             return
         for token in self.input.tokens:
             if self.capacity is not None and len(self._tokens) >= self.capacity:

@@ -15,6 +15,10 @@ from .core import (
     PortParameter,
     Wake,
     array_parameter,
+    declared_parameters,
+    did_you_mean,
+    rounds,
+    texts_parameter,
     to_nanoseconds,
     to_seconds,
     token_type,
@@ -34,6 +38,8 @@ class _Ticking(Actor):
         float, None, unit="s", min=0, doc="the time after which there are no more ticks"
     )
 
+    _ends_late = False  # whether its last tick is the first behind stop_time
+
     def check(self) -> None:
         if self.values is not None and not self.values:
             raise ParameterError("values: the list is empty, there is nothing to send")
@@ -48,7 +54,7 @@ class _Ticking(Actor):
 
     def _wake_at(self, time: int) -> Wake | None:
         """The wake-up for the next tick at ``time`` ns, if there still is one."""
-        if self.stop_time is not None and time > to_nanoseconds(self.stop_time):
+        if self.stop_time is not None and time > to_nanoseconds(self.stop_time) and not self._ends_late:
             return None
         return self.context.wake(self, time)
 
@@ -183,7 +189,9 @@ class Clock(_Ticking):
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    A trigger lets one come at once, from which the time to the next one is drawn.  Ptolemy: ``PoissonClock``.
+    A trigger lets one come at once, from which the time to the next one is drawn.  With ``one_at_a_time``, as in
+    Ptolemy, triggers that come together let a tick come each, and the last tick of all is the first at ``stop_time`` or
+    behind it.  Ptolemy: ``PoissonClock``.
     """
 
     is_source: ClassVar[bool] = True
@@ -195,6 +203,9 @@ class PoissonClock(_Ticking):
     generator: Parameter[Generator | None] = Parameter(
         Generator, None, doc="another program's generator, if it is to give the numbers"
     )
+    one_at_a_time = Parameter(
+        bool, False, ptolemy=True, doc="whether a tick comes for each trigger, and a last one at stop_time or behind it"
+    )
 
     def check(self) -> None:
         super().check()
@@ -203,6 +214,9 @@ class PoissonClock(_Ticking):
     def initialize(self) -> None:
         self._tick = 0
         self._rest = 0.0
+        self._is_over = False
+        self._is_plain = not self.trigger.width and (self.stop_time is None or not self.one_at_a_time)
+        self._ends_late = self.one_at_a_time
         self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
 
     def _interval(self) -> int:
@@ -214,11 +228,36 @@ class PoissonClock(_Ticking):
         return to_nanoseconds(interval)
 
     def fire(self) -> None:
+        if not self._is_plain:
+            self._fire_for_triggers()
+            return
         if self._wake is not None and not self._wake.due:
             self._wake.cancel()
         self._send(self._tick)
         self._tick += 1
         self._wake = self._wake_at(self.tag.time + self._interval())
+
+    def _fire_for_triggers(self) -> None:
+        """What it does where triggers let ticks come, or the last one comes late."""
+        ticks = self._ticks() if self.trigger.width else 1
+        if self._is_over or not ticks:
+            return
+        if self._wake is not None and not self._wake.due:
+            self._wake.cancel()
+        for _ in range(ticks):
+            self._send(self._tick)
+            self._tick += 1
+            interval = self._interval()
+            if self.stop_time is not None and self._ends_late and self.tag.time >= to_nanoseconds(self.stop_time):
+                self._is_over, self._wake = True, None
+                return
+        self._wake = self._wake_at(self.tag.time + interval)
+
+    def _ticks(self) -> int:
+        """How many ticks come now, where triggers let them come."""
+        if self.one_at_a_time:
+            return max(1, len(list(rounds(self.trigger))))
+        return int(self.stop_time is None or self.tag.time <= to_nanoseconds(self.stop_time))
 
 
 class SingleEvent(Actor):
@@ -268,3 +307,33 @@ class Random(Actor):
         numbers: Any = self.random if self._numbers is None else self._numbers
         for _ in range(_times(self.trigger)):
             self.output.send(self.distribution.draw(numbers))
+
+
+class VaryingRandom(Random):
+    """A ``Random`` whose distribution changes in the run: some of its parameters have inputs of their names.
+
+    What came there last counts; before, what the distribution says.  Ptolemy: the ports of ``Gaussian`` and the others.
+    """
+
+    varying = texts_parameter(doc="parameters of the distribution that have inputs")
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        known = declared_parameters(type(self.distribution))
+        for name in self.varying:
+            if name not in known:
+                raise ParameterError(
+                    f"varying: {type(self.distribution).__name__} has no parameter {name!r}{did_you_mean(name, known)}"
+                )
+        return {name: InputPort(doc="a parameter of the distribution") for name in dict.fromkeys(self.varying)}
+
+    def initialize(self) -> None:
+        self._law = self.distribution
+
+    def fire(self) -> None:
+        came = {name: port.value for name in self.varying if (port := self.inputs[name]).present}
+        if came:
+            said = {name: getattr(self._law, name) for name in declared_parameters(type(self._law))}
+            self._law = type(self._law)(**{**said, **came})
+        numbers: Any = self.random if self._numbers is None else self._numbers
+        for _ in range(_times(self.trigger)):
+            self.output.send(self._law.draw(numbers))

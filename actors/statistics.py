@@ -10,6 +10,7 @@ import math
 import operator
 from collections import deque
 from fractions import Fraction
+from typing import Any
 
 from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
 
@@ -64,7 +65,7 @@ class MovingAverage(_Window):
     """
 
     reset = InputPort(required=False, doc="a token that is true empties the window, before the tag is counted")
-    output = OutputPort(float, doc="the mean")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="the mean")
 
     whole = Parameter(bool, False, doc="whether the mean of whole numbers is one, too, cut off towards zero")
 
@@ -85,8 +86,8 @@ class MovingStatistics(_Window):
 
     mean = OutputPort(float, doc="the mean")
     std = OutputPort(float, doc="the sample standard deviation; nothing while there is one token only")
-    min = OutputPort(float, doc="the least")
-    max = OutputPort(float, doc="the greatest")
+    min = OutputPort(float, ptolemy={"type": Any}, doc="the least")
+    max = OutputPort(float, ptolemy={"type": Any}, doc="the greatest")
     number = OutputPort(int, doc="how many tokens are in the window")
 
     def initialize(self) -> None:

@@ -75,12 +75,13 @@ class Const(_Answering):
 class Ramp(_Answering):
     """Counts triggers: sends ``init`` for the first, and then ``step`` more for each.
 
-    The numbers are integers if ``init`` and ``step`` are; then a step that comes must be one, too.  Ptolemy: ``Ramp``.
+    The numbers are integers if ``init`` and ``step`` are; then what comes for them must be one, too.
+    Ptolemy: ``Ramp``.
     """
 
     output = OutputPort(float, doc="the number")
 
-    init: Parameter[float] = Parameter(int | float, 0, doc="the first number")
+    init: PortParameter[float] = PortParameter(int | float, 0, doc="the first number, and the next one if it comes")
     step: PortParameter[float] = PortParameter(int | float, 1, doc="what is added from one to the next")
     late_step = Parameter(bool, False, ptolemy=True, doc="whether a step counts behind the next number, not before it")
 
@@ -89,10 +90,12 @@ class Ramp(_Answering):
 
     def initialize(self) -> None:
         super().initialize()
-        self._last: float | None = None
+        self._last: float | None = None  # before the first, and when another one has come for it
         self._step: float = 0  # behind the last number
 
     def fire(self) -> None:
+        if self.inputs["init"].present:
+            self._last = None
         for _ in range(self.answers()):
             step = self._step if self.late_step else self.step
             self._last, self._step = self.init if self._last is None else self._last + step, self.step

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
     from epicycle.runner import Model, ModelError, Results, Simulation, StudyResults, open_study
-    from epicycle.runner.calls import Comparison, Picture, compare, draw, load, plot, run, save, study
+    from epicycle.runner.calls import Comparison, Page, Picture, compare, draw, load, plot, run, save, study, view
 
     __version__: str
 
@@ -22,6 +22,7 @@ __all__ = [
     "EpicycleError",
     "Model",
     "ModelError",
+    "Page",
     "Picture",
     "Results",
     "Simulation",
@@ -34,15 +35,17 @@ __all__ = [
     "run",
     "save",
     "study",
+    "view",
 ]
 
-# Where each name is found on first use: `import epicycle` must not wait for NumPy and networkx.  A new call, such as
-# one that shows a run, is a line here and above.
+# Where each name is found on first use: `import epicycle` must not wait for NumPy and networkx.  A new call
+# is a line here and above.
 _HOMES = {
     "EpicycleError": "actors",
     **dict.fromkeys(("Model", "ModelError", "Results", "Simulation", "StudyResults", "open_study"), "runner"),
     **dict.fromkeys(
-        ("Comparison", "Picture", "compare", "draw", "load", "plot", "run", "save", "study"), "runner.calls"
+        ("Comparison", "Page", "Picture", "compare", "draw", "load", "plot", "run", "save", "study", "view"),
+        "runner.calls",
     ),
 }
 _FOLDERS = ("actors", "aspects", "runner")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from collections.abc import Iterable
 from html import escape
 from typing import TypeAlias
@@ -32,8 +34,9 @@ def html(content: Content) -> Html:
 
 
 def tag(element: str, /, *content: Content, **attributes: str | None) -> Html:
-    """An element; ``class_`` is the attribute 'class', and an attribute that is None is left out."""
-    said = "".join(f' {key.rstrip("_")}="{escape(value)}"' for key, value in attributes.items() if value is not None)
+    """An element; ``class_`` is the attribute 'class', ``aria_label`` 'aria-label'; one that is None is left out."""
+    given = {key.rstrip("_").replace("_", "-"): value for key, value in attributes.items() if value is not None}
+    said = "".join(f' {key}="{escape(value)}"' for key, value in given.items())
     inner = html(content)
     return Html(f"<{element}{said}>" if element in _VOID else f"<{element}{said}>{inner}</{element}>")
 
@@ -63,7 +66,7 @@ def wide_table(
     head: Iterable[Content], rows: Iterable[Iterable[Content]], *, names: int = 1, class_: str | None = None
 ) -> Html:
     """A table that is scrolled by itself where the page is narrower."""
-    return tag("div", table(head, rows, names=names, class_=class_), class_="scroll")
+    return tag("div", table(head, rows, names=names, class_=class_), class_="scroll", tabindex="0")
 
 
 def note(text: str) -> Html:
@@ -71,13 +74,23 @@ def note(text: str) -> Html:
     return tag("p", text, class_="note")
 
 
-def page(title: str, style: str, *content: Content) -> str:
-    """A whole document, which loads nothing from anywhere."""
+def page(title: str, style: str, *content: Content, script: str = "") -> str:
+    """A whole document, which loads nothing from anywhere: a browser runs this script and no other."""
+    may = {"default-src": "'none'", "img-src": "data:", "style-src": _hashed(style), "base-uri": "'none'"}
+    may |= {"script-src": _hashed(script)} if script else {}
+    policy = "; ".join(f"{what} {where}" for what, where in may.items())
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=policy),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", title),
         tag("style", Html(style)),
     )
-    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', content), lang='en')}\n"
+    run = tag("script", Html(script)) if script else None
+    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', content, run), lang='en')}\n"
+
+
+def _hashed(text: str) -> str:
+    """How a policy says that this text may stand in a page."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

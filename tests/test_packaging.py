@@ -37,7 +37,7 @@ def shipped_files() -> list[Path]:
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
         if (
-            path.suffix in {".py", ".pyi", ".yaml", ".css", ".mplstyle", ".pxd", ".pyx"}
+            path.suffix in {".py", ".pyi", ".yaml", ".css", ".js", ".mplstyle", ".pxd", ".pyx"}
             or path.name in {"py.typed", "schema.json"}
         )
         and "__pycache__" not in path.parts

@@ -17,12 +17,12 @@ FILES = ("models/schema.json", "docs/reference.md", "actors/constructors.pyi", "
 
 def texts() -> dict[str, str]:
     """What the files should hold: Epicycle's own types, whatever else is installed."""
-    from epicycle.runner.catalogue import built_in, figure_types
+    from epicycle.runner.catalogue import built_in, own_figures
     from epicycle.runner.language import json_schema, schema_text
     from epicycle.runner.show import markdown
-    from epicycle.runner.show.report import study_figure_types
+    from epicycle.runner.show.report import own_study_figures
 
-    own, figures, of_studies = built_in(), figure_types(), study_figure_types()
+    own, figures, of_studies = built_in(), own_figures(), own_study_figures()
     schema = schema_text(json_schema(own, figures, of_studies))
     return dict(zip(FILES, (schema, markdown(own, figures, of_studies), *stubs().values()), strict=True))
 

@@ -25,14 +25,23 @@ cdef class Port:
     cpdef tell(self, bound)
 
 
+cdef class Kept:
+    cdef public list lines
+    cdef public Py_ssize_t count, number
+    cpdef put(self, token, channel)
+    cpdef get(self, channel)
+    cpdef list in_order(self)
+
+
 cdef class InputPort(Port):
     cdef public list arrived, channels, shown
     cdef public bint keep, required, triggers
-    cdef public Py_ssize_t kept
+    cdef public Kept kept
     cpdef tell(self, bound)
     cpdef receive(self, token, channel)
     cpdef prepare(self)
     cpdef clear(self)
+    cpdef put_in_line(self)
     cpdef take(self)
     cpdef give(self, taken)
 

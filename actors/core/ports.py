@@ -8,6 +8,7 @@ An output port hands a token on at once; who gets it, and through which delays a
 from __future__ import annotations
 
 import types
+from collections import deque
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Generic
 
@@ -113,6 +114,38 @@ class Port(Generic[T]):
         return f"<{self.direction} port {self.path or self.name}: {type_name(self.type)}>"
 
 
+class Kept:
+    """Tokens that stay in a port: a line for each channel."""
+
+    __slots__ = ("count", "lines", "number")
+
+    def __init__(self, width: int) -> None:
+        self.lines: list[deque[tuple[int, Any]]] = [deque() for _ in range(max(width, 1))]
+        self.count = 0
+        self.number = 0  # of the next one: they keep the order of their arrival
+
+    def put(self, token: Any, channel: int) -> None:
+        """Put one in."""
+        self.lines[channel].append((self.number, token))
+        self.number += 1
+        self.count += 1
+
+    def get(self, channel: int) -> Any:
+        """Take the first of a channel out."""
+        self.count -= 1
+        return self.lines[channel].popleft()[1]
+
+    def in_order(self) -> list[tuple[int, Any, int]]:
+        """All in the order of their arrival: the number, the token, the channel."""
+        found = [(number, token, channel) for channel, line in enumerate(self.lines) for number, token in line]
+        found.sort(key=_number)
+        return found
+
+
+def _number(entry: tuple[int, Any, int]) -> int:
+    return entry[0]
+
+
 class InputPort(Port[T]):
     """Where tokens arrive: of any type if none is given.
 
@@ -129,8 +162,9 @@ class InputPort(Port[T]):
     direction = "input"
 
     if TYPE_CHECKING:
-        arrived: list[Any]
+        arrived: list[Any]  # since the actor fired last
         channels: list[int] | None  # of these tokens, where there are several connections
+        kept: Kept | None  # what has come before them and stays, or was put in line to be taken out
         shown: list[Any]  # the same as arrived, or nothing while they are hidden
 
     def __init__(
@@ -159,46 +193,53 @@ class InputPort(Port[T]):
     @property
     def present(self) -> bool:
         """Whether a token has arrived at the present tag, or waits if the port keeps tokens."""
-        return bool(self.shown)
+        return bool(self.shown) or (self.kept is not None and self.kept.count > 0 and self.shown is self.arrived)
 
     @property
     def value(self) -> T:
         """The token of the present tag, the latest if there are several; raises ``PortError`` if there is none."""
-        if not self.shown:
+        if not self.present:
             raise PortError(f"{self.path} has no token at this tag; ask 'present' before 'value'")
-        token: T = self.shown[-1]
+        token: T = self.shown[-1] if self.shown else self.tokens[-1]
         return token
 
     @property
     def tokens(self) -> tuple[T, ...]:
         """All tokens of the present tag in the order of their arrival."""
-        return tuple(self.shown)
+        if self.kept is None or self.shown is not self.arrived:
+            return tuple(self.shown)
+        return (*(token for _, token, _ in self.kept.in_order()), *self.shown)
 
     def by_channel(self) -> list[list[T]]:
         """The tokens of the present tag, a list for each channel."""
         if self.width == 1:
-            return [list(self.shown)]
+            return [list(self.tokens)]
         result: list[list[T]] = [[] for _ in range(self.width)]
+        if self.kept is not None and self.shown is self.arrived:
+            for _, token, channel in self.kept.in_order():
+                result[channel].append(token)
         for token, channel in zip(self.shown, self.channels or (), strict=False):
             result[channel].append(token)
         return result
 
     def waiting(self, channel: int = 0) -> int:
         """How many tokens of a channel have not been taken out yet."""
-        if self.width <= 1:
-            return 0 if channel else len(self.shown)
-        return (self.channels or []).count(channel) if self.shown else 0
+        if self.shown is not self.arrived:
+            return 0
+        if self.kept is None and self.width <= 1:
+            return 0 if channel else len(self.arrived)
+        self.put_in_line()
+        return 0 if self.kept is None or channel >= len(self.kept.lines) else len(self.kept.lines[channel])
 
     def get(self, channel: int = 0) -> T:
         """Take out the first token of a channel, of a port that keeps them; raises ``PortError`` if there is none."""
         if not self.waiting(channel):
             raise PortError(f"{self.path} has no token on channel {channel}; ask 'waiting' before 'get'")
-        place = 0
-        if self.channels is not None:
-            place = self.channels.index(channel)
-            del self.channels[place]
-        self.kept -= place < self.kept
-        token: T = self.arrived.pop(place)
+        if self.kept is None and len(self.arrived) == 1:
+            return self.arrived.pop()  # type: ignore[no-any-return]
+        self.put_in_line()
+        assert self.kept is not None
+        token: T = self.kept.get(channel)
         return token
 
     def receive(self, token: Any, channel: int) -> None:
@@ -213,34 +254,47 @@ class InputPort(Port[T]):
         """Make room: no token has come yet."""
         self.arrived = self.shown = []
         self.channels = None
-        self.kept = 0
+        self.kept = None
 
     def clear(self) -> None:
         """Engine: forget what has come."""
         empty(self.arrived)
         if self.channels is not None:
             empty(self.channels)
+        self.kept = None
         self.shown = self.arrived
+
+    def put_in_line(self) -> None:
+        """Engine: what has come stays."""
+        if not self.arrived:
+            return
+        if self.kept is None:
+            self.kept = Kept(self.width)  # for good: a port at which tokens have waited is likely to have more
+        if self.channels is None:
+            for token in self.arrived:
+                self.kept.put(token, 0)
+        else:
+            for token, channel in zip(self.arrived, self.channels, strict=True):
+                self.kept.put(token, channel)
+            empty(self.channels)
+        empty(self.arrived)
 
     @property
     def has_new(self) -> bool:
         """Engine: whether something has come since the actor fired last."""
-        return len(self.arrived) > self.kept
+        return bool(self.arrived)
 
     def take(self) -> tuple[list[Any], list[int]]:
         """Engine: take out the tokens that have come since the actor fired last, as if they had not come yet."""
-        taken = self.arrived[self.kept :], [] if self.channels is None else self.channels[self.kept :]
-        del self.arrived[self.kept :]
-        if self.channels is not None:
-            del self.channels[self.kept :]
-        self.shown = self.arrived
+        taken = self.arrived, self.channels or []
+        self.arrived = self.shown = []
+        self.channels = None
         return taken
 
     def give(self, taken: tuple[list[Any], list[int]]) -> None:
         """Engine: show tokens that were taken out, behind those that the port keeps."""
-        self.arrived = self.arrived[: self.kept] + taken[0]
-        self.channels = (self.channels or [])[: self.kept] + taken[1] or None
-        self.shown = self.arrived
+        self.arrived = self.shown = list(taken[0])
+        self.channels = list(taken[1]) or None
 
 
 class OutputPort(Port[T]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any, ClassVar, Final, Protocol
 
 from ..core import (
@@ -19,11 +19,12 @@ from ..core import (
     did_you_mean,
     to_seconds,
 )
-from ..expression import ExpressionError, Formula, evaluate, operand
+from ..expression import Formula, operand
 from ..integration import STEPPERS
 from ..trajectory import number_of
 from .borders import Borders
 from .condition import TIMES, Condition, condition_of, type_of
+from .guard import is_true
 from .modal import Chart, ModalActor, Rule
 from .text import Action, ModesParameter, TransitionsParameter
 
@@ -58,17 +59,22 @@ class StateMachine(ModalActor):
             - heating -> idle when temperature >= 22 do heater = false
             - idle -> heating when temperature <= 18 do heater = true
 
-    A transition is ``a, b -> c``, then ``else``, ``immediate``, ``nondeterministic`` or ``priority 2``, then ``on``
-    inputs of which one must have a token, ``after`` a time since the entry, ``when`` a guard, ``do`` actions; or a
-    mapping with these keys.  Expressions are in the language of ``${...}``.  Names in them are variables, ``time`` (s),
-    ``mode_time`` (s since the mode was entered), or else input ports.  A guard that asks for an input without a token
-    does not hold; ``x_is_present`` says whether ``x`` has one, and inputs in ``held`` keep their latest.  An action
-    sets a variable, or sends from an output port of that name.  Tokens that come together at one input are for one
-    reaction each, at the next microsteps.
+    A transition is ``a, b -> c``, then ``else``, ``immediate``, ``nondeterministic``, ``priority 2`` or ``probability
+    0.1``, then ``on`` inputs of which one must have a token, ``after`` a time since the entry, ``when`` a guard, ``do``
+    actions; or a mapping with these keys.  Expressions are in the language of ``${...}``.  Names in them are variables,
+    ``time`` (s), ``mode_time`` (s since the mode was entered), or else input ports.  A guard that asks for an input
+    without a token does not hold; ``x_is_present`` says whether ``x`` has one, and inputs in ``held`` keep their
+    latest.  An action sets a variable, or sends from an output port of that name.  Tokens that come together at one
+    input are for one reaction each, at the next microsteps.
 
     In a mode with ``flow``, variables follow differential equations, as in an ``ODE``.  A comparison over them, or over
     times, in a guard is an event at the nanosecond at which it changes; one whose transition has moved a variable off
     its border holds again only after it has not held.  ``trigger`` asks for all variables: each has an output port.
+
+    As in Ptolemy, with ``one_at_a_time``, the machine fires again at the same tag for tokens that are left, taking one
+    of each channel; it reacts again one microstep behind each transition, to be taken by ``else``; and immediate
+    transitions of its first mode come before all others.  With ``set_last``, guards and outputs go by what variables
+    were before the reaction.
 
     Ptolemy: ``FSMActor``, ``ModalModel``.
     """
@@ -86,6 +92,12 @@ class StateMachine(ModalActor):
     held = MappingParameter(
         Parameter(object, None), {}, doc="inputs that keep their latest token, with a value before the first, or null"
     )
+    one_at_a_time = Parameter(
+        bool, False, ptolemy=True, doc="whether tokens that come together are for one firing each, at the same tag"
+    )
+    set_last = Parameter(
+        bool, False, ptolemy=True, doc="whether variables are set when all transitions of a reaction have sent"
+    )
 
     method = Parameter(str, "DOP853", choices=tuple(STEPPERS), doc="the solver of flows; see ODE")
     relative_tolerance = Parameter(float, 1e-10, unit="1", min=1e-13, max=0.1, doc="error per step, see ODE")
@@ -96,7 +108,7 @@ class StateMachine(ModalActor):
         actions = [*(each for one in self.transitions for each in one.do), *self._at_borders()]
         read = [formula for _, formula in actions]
         for one in self.transitions:
-            read += [each for each in (one.when, one.after) if each is not None]
+            read += [each for each in (one.when, one.after, one.probability) if each is not None]
         read += [formula for mode in self.modes.values() for formula in mode.flow.values()]
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for name in self.variables:
@@ -144,7 +156,7 @@ class StateMachine(ModalActor):
     def check(self) -> None:
         rules = [
             Rule(
-                each.from_, each.to, each.on, each.when, each.after, each.do or None,
+                each.from_, each.to, each.on, each.when, each.after, each.probability, each.do or None,
                 each.priority, each.else_, each.immediate, each.nondeterministic,
                 each.preemptive, each.history, each.error, place,
             )
@@ -155,6 +167,8 @@ class StateMachine(ModalActor):
         self._inputs = [name for name in self.inputs if name != "trigger"]
         for name in self.held:
             _check_name(("held", name), name, "input", self._inputs)
+        for name in self._inputs:
+            self.inputs[name].keep = self.one_at_a_time
         for name, mode in self.modes.items():
             for variable in mode.flow:
                 _check_name(("modes", name, "flow", variable), variable, "variable", self.variables)
@@ -189,6 +203,7 @@ class StateMachine(ModalActor):
             max_step=self.max_step,
         )
         self._has_changed = False  # whether a comparison changes now
+        self._unset: list[Action] = []  # that set variables, when all transitions of the reaction have been taken
         self._prepared: Tag | None = None
         self._wake: Wake | None = None
 
@@ -226,7 +241,9 @@ class StateMachine(ModalActor):
         if self.trigger.present:
             self._tell()
         self._tokens = {}
-        if any(self._queues.values()):
+        if self.one_at_a_time:
+            self._reacted, self._has_changed = None, False
+        elif any(self._queues.values()):
             self.wake_in(0)
         if self._wake is not None and not self.is_due(self._wake):
             self._wake.cancel()
@@ -240,10 +257,17 @@ class StateMachine(ModalActor):
         return min((wake.time for wake in wakes if wake is not None and not self.is_due(wake)), default=None)
 
     def _take_tokens(self) -> None:
-        """The first token that waits at each input."""
+        """The first token that waits at each input; with ``one_at_a_time``, of each of its channels."""
         for name in self._inputs:
-            queue = self._queues[name]
-            queue.extend(self.inputs[name].tokens)
+            if name in self._tokens:  # before the refinement fired
+                continue
+            port, queue = self.inputs[name], self._queues[name]
+            if port.keep:
+                for channel in range(port.width):
+                    if port.waiting(channel):
+                        self._tokens[name] = port.get(channel)
+                continue
+            queue.extend(port.tokens)
             if queue:
                 self._tokens[name] = queue.popleft()
 
@@ -272,6 +296,9 @@ class StateMachine(ModalActor):
     def enters(self, mode: str) -> None:
         self._act(self.modes[mode].entry)
         self._entered = self.context.time
+        self._enter_borders(mode)
+
+    def _enter_borders(self, mode: str) -> None:
         comparisons = [each for one in self._conditions[mode].values() for each in one.comparisons]
         self._borders.enter(mode, self.modes[mode].flow, comparisons, self._entered)
 
@@ -283,14 +310,46 @@ class StateMachine(ModalActor):
 
     def _act(self, actions: tuple[Action, ...]) -> None:
         for name, formula in actions:
-            if formula.source in self._tokens and name not in self.variables:
-                value = self._tokens[formula.source]  # as it came
+            if name not in self.variables:
+                self.outputs[name].send(self._result(name, formula))
+            elif self.set_last:
+                self._unset.append((name, formula))
             else:
-                value = formula(self._values(formula))
-            if name in self.variables:
-                self._known[name] = value
-            else:
-                self.outputs[name].send(value)
+                self._known[name] = self._result(name, formula)
+
+    def _result(self, name: str, formula: Formula) -> Any:
+        if formula.source in self._tokens and name not in self.variables:
+            return self._tokens[formula.source]  # as it came
+        return formula(self._values(formula))
+
+    def begins(self) -> None:
+        self._set()
+        if self.one_at_a_time:
+            self.follow(self._choose(self._chart.immediate[self._current]))
+            self._reacted = None
+        super().begins()
+
+    def commits(self) -> None:
+        self._set()
+
+    def _set(self) -> None:
+        """Set the variables that wait for it."""
+        if self._unset:
+            for name, formula in self._unset:
+                self._known[name] = self._result(name, formula)
+            self._unset = []
+            self._enter_borders(self._current)
+
+    def goes_on(self) -> bool:
+        if self.one_at_a_time:
+            return self._reacted is not None and self._current not in self._chart.final
+        return super().goes_on()
+
+    def probability_of(self, rule: Rule) -> float:
+        found = number_of(rule.probability, self._values(rule.probability), f"{rule} probability")
+        if not 0.0 <= found <= 1.0:
+            raise EpicycleError(f"{rule}: {found:g} is no probability, which is from 0 to 1")
+        return found
 
     def delay_of(self, rule: Rule) -> float:
         return number_of(rule.delay, self._values(rule.delay), f"{rule} after")
@@ -298,10 +357,11 @@ class StateMachine(ModalActor):
     def holds(self, rule: Rule) -> bool:
         if rule.guard is None:
             return True
+        condition = self._conditions[self._current][rule].formula
         try:
-            return self._is_true(self._conditions[self._current][rule].formula)
+            return is_true(condition, self._values(condition))
         except EpicycleError:
-            return self._is_true(rule.guard)  # which tells what is wrong in the words of the model
+            return is_true(rule.guard, self._values(rule.guard))  # which tells what is wrong in the words of the model
 
     def holds_alone(self, rule: Rule) -> bool:
         tokens, self._tokens = self._tokens, {}
@@ -309,21 +369,6 @@ class StateMachine(ModalActor):
             return super().holds_alone(rule)
         finally:
             self._tokens = tokens
-
-    def _is_true(self, guard: Formula) -> bool:
-        values = self._values(guard)
-        if len(values) == len(guard.names):
-            found = guard(values)
-        else:
-            try:
-                found = evaluate(guard.source, _Silent(values, set(guard.names) - values.keys()))
-            except _SilentError:
-                return False
-            except ExpressionError as error:
-                raise EpicycleError(f"{guard.source!r}: {error}") from None
-        if not isinstance(found, (bool, int, float)):
-            raise EpicycleError(f"the guard {guard} gives {found!r}, which is neither true nor false")
-        return bool(found)
 
     def _values(self, formula: Formula) -> dict[str, Any]:
         """What the names of an expression stand for now; those of inputs without a token are left out."""
@@ -346,23 +391,6 @@ class StateMachine(ModalActor):
         if name.endswith(_PRESENT):
             return name.removesuffix(_PRESENT) in self._tokens
         return ABSENT
-
-
-class _SilentError(Exception):
-    """A guard asks for an input that has no token."""
-
-
-class _Silent(dict[str, Any]):
-    """Values, where asking for one of the ``silent`` names says so."""
-
-    def __init__(self, values: Mapping[str, Any], silent: Collection[str]) -> None:
-        super().__init__(values)
-        self._silent = silent
-
-    def __contains__(self, name: object) -> bool:
-        if name in self._silent:
-            raise _SilentError
-        return super().__contains__(name)
 
 
 def _check_name(keys: tuple[str, ...], name: str, kind: str, known: Collection[str]) -> None:

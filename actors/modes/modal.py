@@ -6,6 +6,7 @@ A machine is in one mode.  It reacts once per tag at which it fires:
 
 1. Of the transitions that leave the mode, those are *enabled* whose delay is over, one of whose trigger ports has a
    token, and whose guard holds.  An ``otherwise`` transition is enabled if no other one is.
+   Of those with a ``probability`` one is drawn: each is enabled in a share of its own, one behind the other.
 2. Of the enabled ones, those of the lowest ``priority`` count.  If they are several, each must be nondeterministic, and
    one is drawn; else the run ends with an error.
 3. The transition is taken: the exit actions of the mode, its own actions, the entry actions of its target.
@@ -29,6 +30,7 @@ from typing import Any, Final, TypeVar
 from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
 
 MOST_IMMEDIATE: Final = 1_000
+_ROUNDING: Final = 1e-9  # of probabilities that add up to 1
 ALL: Final = "*"
 
 Method = Callable[[Any], None]
@@ -37,13 +39,17 @@ M = TypeVar("M", bound=Method)
 
 @dataclass(frozen=True, eq=False)
 class Rule:
-    """One transition.  ``guard``, ``delay`` and ``act`` are whatever the modal actor makes use of; None for none."""
+    """One transition.
+
+    ``guard``, ``delay``, ``probability`` and ``act`` are whatever the modal actor makes use of; None for none.
+    """
 
     sources: tuple[str, ...]
     target: str
     on: tuple[str, ...] = ()
     guard: Any = None
     delay: Any = None
+    probability: Any = None
     act: Any = None
     priority: int = 0
     otherwise: bool = False
@@ -113,6 +119,8 @@ class Chart:
         """Refuse transitions that are certain to be enabled together, and of which none is to be preferred."""
         seen: dict[object, Rule] = {}
         for rule in leaving:
+            if rule.probability is not None:  # they share what is drawn
+                continue
             same = (
                 rule.priority, rule.otherwise, rule.on, rule.guard, rule.delay, rule.preemptive, rule.error
             )  # fmt: skip
@@ -179,6 +187,10 @@ class ModalActor(Actor):
         delay = rule.delay(self) if callable(rule.delay) else rule.delay
         return float(delay)
 
+    def probability_of(self, rule: Rule) -> float:
+        """How likely a transition is that is enabled otherwise."""
+        return float(rule.probability(self) if callable(rule.probability) else rule.probability)
+
     def act(self, rule: Rule) -> None:
         """The actions of a transition."""
         getattr(self, rule.act)()
@@ -193,6 +205,13 @@ class ModalActor(Actor):
     def leaves(self, mode: str) -> None:
         """The exit actions of a mode."""
         self._call("_exit_of", mode)
+
+    def commits(self) -> None:
+        """What is done when all transitions of a reaction have been taken."""
+
+    def goes_on(self) -> bool:
+        """Whether it is to react again at the next microstep, though no token comes."""
+        return any(self.holds_alone(each) for each in self._chart.leaving[self._current])
 
     def _call(self, mark: str, mode: str) -> None:
         for name, method in _methods(type(self)).items():
@@ -213,6 +232,9 @@ class ModalActor(Actor):
         self._reacted: Tag | None = None  # when it has taken a transition
         self._timers: dict[Rule, Wake | None] = {}  # of delays; None when one is over
         self._again: Wake | None = self.wake_in(0)  # a firing that is for a reaction
+        self._drawn: dict[Rule, bool] = {}  # in this firing, of those that have a probability
+        self._number: float | None = None  # by which they are, and how much of it is used up
+        self._used = 0.0
         self.error: str | None = None  # with which the refinement of the mode has failed
 
     def is_due(self, wake: Wake | None) -> bool:
@@ -230,15 +252,25 @@ class ModalActor(Actor):
 
     def react(self, phases: Sequence[Mapping[str, Sequence[Rule]]]) -> None:
         """One reaction, unless there was one at this tag; of the phases the first in which a transition is enabled."""
-        chart, taken = self._chart, list[Rule]()
+        chart = self._chart
         if not self._is_begun:
             self._is_begun = True
             self._enter(chart.initial)
-        if self._reacted == self.tag:
+            self.begins()
+        elif self._reacted == self.tag:
             return
         rule = None
         for phase in phases:
             rule = rule or self._choose(phase[self._current])
+        self.follow(rule)
+
+    def begins(self) -> None:
+        """What is done when its first mode has been entered."""
+        self._begin_delays()
+
+    def follow(self, rule: Rule | None) -> None:
+        """Take a transition, if there is one, and immediate ones behind it."""
+        taken = list[Rule]()
         while rule is not None:
             taken.append(rule)
             if len(taken) > MOST_IMMEDIATE:
@@ -246,17 +278,21 @@ class ModalActor(Actor):
                 raise EpicycleError(f"{MOST_IMMEDIATE:,} immediate transitions in one reaction: {way} -> ...")
             self._reacted = self.tag
             self._take(rule)
-            rule = self._choose(chart.immediate[self._current])
+            rule = self._choose(self._chart.immediate[self._current])
+        if taken:
+            self.commits()
+            self._begin_delays()
 
     def finish(self) -> None:
         """Tell the mode that it has come to, and react again if it can go on from there without any token."""
         self._timers = {rule: None if self.is_due(wake) else wake for rule, wake in self._timers.items()}
         if self.is_due(self._again):
             self._again = None
+        self._drawn, self._number = {}, None
         if self._is_new:
             self._is_new = False
             self.mode.send(self._current)
-            if any(self.holds_alone(each) for each in self._chart.leaving[self._current]):
+            if self.goes_on() and self._again is None:
                 self._again = self.wake_in(0)
 
     def holds_alone(self, rule: Rule) -> bool:
@@ -273,7 +309,25 @@ class ModalActor(Actor):
     def _is_enabled(self, rule: Rule) -> bool:
         if rule.error != (self.error is not None):
             return False
-        return self._is_open(rule) and (not rule.on or any(map(self.is_present, rule.on))) and self.holds(rule)
+        is_asked = not rule.on or any(map(self.is_present, rule.on))
+        return self._is_open(rule) and is_asked and self.holds(rule) and self._is_drawn(rule)
+
+    def _is_drawn(self, rule: Rule) -> bool:
+        """Whether what is drawn in this firing is in the share of a transition, if it has one."""
+        if rule.probability is None:
+            return True
+        if rule not in self._drawn:
+            if self._number is None:
+                self._number, self._used = self.random_stream("probability").random(), 0.0
+            low, self._used = self._used, self._used + self.probability_of(rule)
+            if self._used > 1.0 + _ROUNDING:
+                raise EpicycleError(
+                    f"in mode {self._current!r}, the probabilities of transitions that are enabled at once add up to "
+                    f"{self._used:g}, more than 1"
+                )
+            high = self._used if self._used < 1.0 - _ROUNDING else 1.0
+            self._drawn[rule] = low <= self._number < high
+        return self._drawn[rule]
 
     def _choose(self, rules: Sequence[Rule]) -> Rule | None:
         enabled = [rule for rule in rules if not rule.otherwise and self._is_enabled(rule)]
@@ -303,11 +357,14 @@ class ModalActor(Actor):
         for wake in self._timers.values():
             if wake is not None:
                 wake.cancel()
+        self._timers = {}
+        self._drawn, self._number = {}, None
         self._current, self._is_new = mode, True
         self.enters(mode)
-        self._timers = {
-            rule: self.wake_in(self.delay_of(rule)) for rule in self._chart.leaving[mode] if rule.delay is not None
-        }
+
+    def _begin_delays(self) -> None:
+        leaving = self._chart.leaving[self._current]
+        self._timers = {rule: self.wake_in(self.delay_of(rule)) for rule in leaving if rule.delay is not None}
 
 
 # -- transitions as methods ---------------------------------------------------------------------------------------
@@ -325,16 +382,18 @@ def transition(
     immediate: bool = False,
     nondeterministic: bool = False,
     preemptive: bool = False,
+    probability: float | Callable[[Any], float] | None = None,
 ) -> Callable[[M], M]:
     """A method of a ``ModalActor`` that is what a transition does.
 
     ``source`` is a mode, several, or ``"*"`` for all but the target; ``on`` are inputs of which one must have a token;
     ``when`` is given the actor and says whether the transition can be taken; ``after`` is the time since the entry: s,
-    a text with a unit, or a function of the actor.  A method may be several transitions.
+    a text with a unit, or a function of the actor.  ``probability`` is a number, or a function of the actor.  A method
+    may be several transitions.
     """
     delay = Parameter(float, unit="s", min=0).convert(after) if isinstance(after, (str, int, float)) else after
     rule = Rule(
-        _texts(source), target, _texts(on), when, delay, None,
+        _texts(source), target, _texts(on), when, delay, probability, None,
         priority, otherwise, immediate, nondeterministic, preemptive,
     )  # fmt: skip
 

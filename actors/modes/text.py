@@ -13,7 +13,8 @@ from ..expression import Formula, FormulaParameter
 _QUOTED: Final = re.compile(r"'[^']*'|\"[^\"]*\"")
 _ARROW: Final = re.compile(r"\s*(?P<sources>[^>]+?)\s*->\s*(?P<target>[^\s;]+)(?P<rest>(\s.*)?)", re.DOTALL)
 _FLAG: Final = re.compile(
-    r"\s*(?:(?P<flag>else|immediate|nondeterministic|preemptive|history|error)|priority\s+(?P<priority>-?\d+))(?=\s|$)"
+    r"\s*(?:(?P<flag>else|immediate|nondeterministic|preemptive|history|error)|priority\s+(?P<priority>-?\d+)"
+    r"|probability\s+(?P<probability>\S+))(?=\s|$)"
 )
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
 _ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
@@ -99,6 +100,7 @@ class Transition(Configurable):
     on = texts_parameter((), doc="inputs of which one must have a token")
     after = _DelayParameter(None, doc="how long after the entry it may be taken, in s")
     when = FormulaParameter(None, doc="the guard")
+    probability = FormulaParameter(None, doc="how likely it is to be enabled, where it would be without this")
     do = _ActionsParameter("what is done when it is taken: outputs are sent, variables are set, one after the other")
     priority = Parameter(int, 0, doc="of several that are enabled, the lower one is taken")
     else_ = Parameter(bool, False, doc="whether it is enabled only if no other is")
@@ -170,8 +172,12 @@ def read_transition(text: str) -> dict[str, object]:
     said: dict[str, object] = {"to": arrow["target"], "from": [each.strip() for each in arrow["sources"].split(",")]}
     rest = arrow["rest"]
     while (flag := _FLAG.match(rest)) is not None:
-        key = flag["flag"] or "priority"
-        said[key] = int(flag["priority"]) if key == "priority" else True
+        if flag["probability"] is not None:
+            said["probability"] = flag["probability"]
+        elif flag["priority"] is not None:
+            said["priority"] = int(flag["priority"])
+        else:
+            said[flag["flag"]] = True
         rest = rest[flag.end() :]
     masked = _masked(rest)
     clauses = list(_CLAUSE.finditer(masked))

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from epicycle.actors import Configurable, ParameterError, declared_parameters, unknown_parameter
 
-from ..catalogue import Figure, figure_types
+from ..catalogue import CatalogueError, Figure, figure_types
 from ..text import Mapping, PatternError, Position, Problems, Sequence, describe, did_you_mean, plain, raised_at, select
 from .model import DeclaredFigure, Model
 from .settle import place_of
@@ -51,7 +51,12 @@ def made_figure(
 ) -> T | None:
     """The figure that is declared by a type, values, and the same as written; None, and problems, if it cannot be."""
     type_name, values, written = declared
-    cls, before = known.get(type_name), len(problems)
+    before = len(problems)
+    try:
+        cls = known.get(type_name)
+    except CatalogueError as error:
+        problems.add(f"figure {name}: {error.message}", written.position, *error.help)
+        return None
     if cls is None:
         kind = f"figure {'of a study of type' if of_study else 'type'} {type_name!r}"
         message = f"figure {name}: there is no {kind}{did_you_mean(type_name, list(known))}"

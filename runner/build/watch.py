@@ -69,7 +69,7 @@ class Watching:
         values: dict[str, object] = {}
         for key, entry in text.values.items():
             # What is only read by people holds no expressions.
-            if key in ("take", "unit", "to", "doc"):
+            if key in ("take", "unit", "to", "doc", "label"):
                 values[key] = _words(entry.value)
             else:
                 values[key] = self.values.of(entry.value, names, f"metric {text.name}, {key}")

@@ -1,4 +1,4 @@
-"""What a program calls: load, run, study, compare, plot, draw and save.  Commands go the same way.
+"""What a program calls: load, run, study, compare, view, plot, draw and save.  Commands go the same way.
 
 ``epicycle`` itself offers all of these.
 """
@@ -13,12 +13,14 @@ if TYPE_CHECKING:
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, load, perform, run, seconds, watched
     from .studying import study
+    from .viewing import Page, recorded, view
 
 __all__ = [
     "Changes",
     "Comparison",
     "Difference",
     "Done",
+    "Page",
     "Picture",
     "Pictures",
     "compare",
@@ -26,10 +28,12 @@ __all__ = [
     "load",
     "perform",
     "plot",
+    "recorded",
     "run",
     "save",
     "seconds",
     "study",
+    "view",
     "watched",
 ]
 
@@ -38,6 +42,7 @@ _HOMES = {
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),
+    "viewing": ("Page", "recorded", "view"),
 }
 
 

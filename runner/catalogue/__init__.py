@@ -1,6 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
-from .figure import Figure, Mark, Shape, figure_types
+from .figure import Figure, Mark, Shape, own_figures
 from .measure import (
     MSER5,
     TAKES,
@@ -37,7 +37,17 @@ from .reference import (
     shown,
     topic_order,
 )
-from .types import Catalogue, CatalogueError, Types, built_in, installed, load_all, types_of_file
+from .types import (
+    Catalogue,
+    CatalogueError,
+    Types,
+    built_in,
+    figure_types,
+    installed,
+    load_all,
+    types_of_file,
+    with_offered,
+)
 
 __all__ = [
     "MSER5",
@@ -70,6 +80,7 @@ __all__ = [
     "is_path",
     "load_all",
     "model_folders",
+    "own_figures",
     "packaged_disturbances",
     "packaged_files",
     "packaged_models",
@@ -83,4 +94,5 @@ __all__ = [
     "topic_order",
     "types_of_file",
     "unreadable",
+    "with_offered",
 ]

@@ -52,7 +52,7 @@ class Figure(Configurable):
         raise NotImplementedError
 
 
-def figure_types() -> dict[str, type[Figure]]:
-    """The figures that a model may ask for, by name; Epicycle's own are looked up where they are drawn."""
+def own_figures() -> dict[str, type[Figure]]:
+    """The figures that Epicycle and the running program define, by name."""
     import_module("..show", __package__)
     return dict(sorted(variants(Figure).items()))

@@ -47,6 +47,7 @@ class MetricOptions(TypedDict, total=False):
     unit: str
     to: str
     doc: str
+    label: str
 
 
 TAKES = {
@@ -127,6 +128,7 @@ class Measure(Configurable):
     unit = Parameter(str, "", doc="what the tokens count in")
     to = Parameter(str, "", doc="the unit in which the metric is given (default: that of the tokens)")
     doc = Parameter(str, "", doc="what it is")
+    label = Parameter(str, "", doc="what it is called in figures and reports (default: its name)")
 
     @property
     def kind(self) -> Take:

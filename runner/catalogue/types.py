@@ -1,8 +1,10 @@
 """Which types a model may name: Epicycle's own, those of installed packages, and the caller's.
 
-A package offers types as entry points (``Name = "package.module:Name"``) of the groups ``epicycle.actors`` and
-``epicycle.aspects``.  They are known by name and imported when a model names them.  Epicycle's own names always mean
-Epicycle's types; where a name is taken, or two packages offer it, ``package.Name`` says which one is meant.
+A package offers types as entry points (``Name = "package.module:Name"``) of the groups ``epicycle.actors``,
+``epicycle.aspects``, ``epicycle.figures`` and ``epicycle.study_figures``.
+
+They are known by name and imported when a model names them.  Epicycle's own names always mean Epicycle's types; where
+a name is taken, or two packages offer it, ``package.Name`` says which one is meant.
 """
 
 from __future__ import annotations
@@ -26,12 +28,17 @@ from epicycle.actors import Actor, Configurable, EpicycleError, Process
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
 
 from ..text import note_package
+from .figure import Figure, own_figures
 from .packaged import unreadable
 
-GROUPS: dict[type, str] = {Actor: "epicycle.actors", Aspect: "epicycle.aspects"}
 _ENTRY = re.compile(r"[A-Za-z_][\w.]*\s*:\s*[A-Za-z_][\w.]*\s*(\[.*\])?\Z", re.ASCII)
 
 T = TypeVar("T", bound=Configurable)
+
+
+def _words(base: type) -> str:
+    """What a kind of types is called in a sentence."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", base.__name__).lower()
 
 
 class CatalogueError(EpicycleError):
@@ -65,7 +72,6 @@ class _Offer:
 
     def load(self) -> type:
         """Import it; raises ``CatalogueError`` naming the package for whatever goes wrong."""
-        kind = self.base.__name__
         if not _ENTRY.match(self.point.value):
             raise self._error("its entry point is not of the form package.module:Class")
         try:
@@ -73,15 +79,14 @@ class _Offer:
         except (Exception, SystemExit) as error:  # whatever a module of somebody else's does while it is imported
             raise self._error(f"{type(error).__name__}: {error}") from error
         if not (isinstance(found, type) and issubclass(found, self.base)) or isabstract(found):
-            raise self._error(f"{self.point.value} is not a complete subclass of {kind}")
+            raise self._error(f"{self.point.value} is not a complete subclass of {self.base.__name__}")
         if found.__name__ != self.point.name:
             raise self._error(f"the class is called {found.__name__}, and its entry point must be, too")
         return found
 
     def _error(self, reason: str) -> CatalogueError:
         return CatalogueError(
-            f"{self.base.__name__.lower()} {self.point.name!r} of the package {self.distribution!r} cannot be loaded: "
-            f"{reason}",
+            f"{_words(self.base)} {self.point.name!r} of the package {self.distribution!r} cannot be loaded: {reason}",
             f"its entry point in the group {self.point.group} is {self.point.name} = {self.point.value}",
             f"mend or uninstall {self.distribution!r}",
         )
@@ -90,15 +95,16 @@ class _Offer:
 class _Offers:
     """What the installed packages offer of a kind; they are searched when it is asked for, which takes a while."""
 
-    def __init__(self, base: type) -> None:
+    def __init__(self, base: type, group: str) -> None:
         self._base = base
+        self._group = group
         self.loaded: dict[str, Any] = {}  # types, or what is wrong with them
 
     @cached_property
     def qualified(self) -> dict[str, _Offer]:
         """By ``package.Name``."""
         found: dict[str, _Offer] = {}
-        offers = (_Offer(point, self._base) for point in entry_points(group=GROUPS[self._base]))
+        offers = (_Offer(point, self._base) for point in entry_points(group=self._group))
         for offer in sorted(offers, key=lambda offer: offer.qualified):
             found.setdefault(offer.qualified, offer)
         return found
@@ -115,10 +121,10 @@ class _Offers:
 class Types(Mapping[str, type[T]], Generic[T]):
     """Types by name; to look one up may import it, which raises ``CatalogueError`` if that fails."""
 
-    def __init__(self, base: type[T], own: Mapping[str, type[T]]) -> None:
+    def __init__(self, base: type[T], own: Mapping[str, type[T]], group: str) -> None:
         self._own = own
-        self._kind = base.__name__.lower()
-        self._offers = _Offers(base)
+        self._kind = _words(base)
+        self._offers = _Offers(base, group)
 
     def __getitem__(self, name: str) -> type[T]:
         if name in self._own:
@@ -154,6 +160,11 @@ class Types(Mapping[str, type[T]], Generic[T]):
 
     def __len__(self) -> int:
         return len(self._own) + len(self._offers.qualified)
+
+    @property
+    def loaded(self) -> list[type[T]]:
+        """The types of packages that have been imported."""
+        return [each for each in self._offers.loaded.values() if isinstance(each, type)]
 
     def with_types(self, own: Mapping[str, type[T]]) -> Types[T]:
         """The same with further types, which go before others of their name."""
@@ -222,7 +233,25 @@ def built_in() -> Catalogue:
 def installed() -> Catalogue:
     """What Epicycle and the installed packages offer."""
     own = built_in()
-    return Catalogue(Types(Actor, own.actors), Types(Aspect, own.aspects))
+    return Catalogue(Types(Actor, own.actors, "epicycle.actors"), Types(Aspect, own.aspects, "epicycle.aspects"))
+
+
+@cache
+def _offered(base: Any, group: str) -> Types[Any]:
+    """What installed packages offer of a kind whose own types are known once they are defined."""
+    return Types(base, {}, group)
+
+
+def with_offered(base: type[T], group: str, own: Mapping[str, type[T]]) -> Mapping[str, type[T]]:
+    """Types by name, and those that installed packages offer; what these define has its name from the entry point."""
+    kind: Any = base
+    offered = _offered(kind, group)
+    return offered.with_types({name: cls for name, cls in own.items() if cls not in offered.loaded})
+
+
+def figure_types() -> Mapping[str, type[Figure]]:
+    """The figures that a model may ask for, by name."""
+    return with_offered(Figure, "epicycle.figures", own_figures())
 
 
 def _with(types: Mapping[str, type[T]], more: dict[str, type[T]]) -> Mapping[str, type[T]]:

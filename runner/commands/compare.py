@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, tell, tell_json
-from .options import CHANGES, COUNT, DISTURB, DONE, FAILED, SEED, command, option, own_types, several
+from .options import (
+    CHANGES,
+    COUNT,
+    DISTURB,
+    DONE,
+    FAILED,
+    SEED,
+    check_path,
+    command,
+    option,
+    own_types,
+    several,
+)
 
 if TYPE_CHECKING:
-    from ..build import Model
     from ..calls import Changes
 
 
@@ -27,6 +39,9 @@ if TYPE_CHECKING:
     SEED,
     option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
     option("--json", action="store_true", help="print one JSON object instead of the table"),
+    option(
+        "-o", "--out", metavar="FILE", type=Path, help="a page that shows the first runs of the first two side by side"
+    ),
     imports=("calls.comparing",),
 )
 def compare(options: argparse.Namespace) -> int:
@@ -35,7 +50,7 @@ def compare(options: argparse.Namespace) -> int:
     method. A single variant is compared with the model as it is."""
     from dataclasses import asdict
 
-    from ..calls import compare
+    from ..calls import compare, load, recorded, seconds
     from ..shown import finite
 
     common: Changes = {
@@ -47,18 +62,26 @@ def compare(options: argparse.Namespace) -> int:
     }
     if options.max_actors is not None:
         common["max_actors"] = options.max_actors
-    variants: dict[str, Model | Changes] = {
+    variants: dict[str, Changes] = {
         name: common if name == "none" else {**common, "disturb": name} for name in options.disturb
     }
     variants |= {each: {**common, "set": [*options.set, each]} for each in options.vary}
     if len(variants) == 1:
         variants = {"none": common, **variants}
-    found = compare(options.model, variants, replications=options.replications, seed=options.seed, until=options.until)
+    if options.out is not None:
+        check_path("--out", options.out)
+    models = {name: load(options.model, **changes) for name, changes in variants.items()}
+    found = compare(options.model, models, replications=options.replications, seed=options.seed, until=options.until)
     if options.json:
         told = {"model": found.model, "seeds": list(found.seeds), "units": found.units}
         tell_json(finite({**told, "differences": [asdict(each) for each in found.differences()]}))
     else:
         tell(str(found))
+    if options.out is not None:
+        until, names = seconds("--until", options.until), list(models)[:2]
+        recorded([models[name] for name in names], seed=found.seeds[0], until=until, names=names).save(options.out)
+        if not options.json:
+            tell(f"wrote {options.out}")
     for (name, seed), error in found.failures.items():
         complain(f"error: {name}, seed {seed}: {error}")
     return FAILED if found.failures else DONE

@@ -247,14 +247,16 @@ def _print_reference(
 def schema(options: argparse.Namespace) -> int:
     """Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language
     server completes and checks a model whose first line is '# yaml-language-server: $schema=FILE'."""
-    from ..catalogue import figure_types, installed
+    from ..catalogue import figure_types, installed, load_all
     from ..language import json_schema, schema_text
     from ..show.report import study_figure_types
 
     catalogue, errors = installed().with_types(own_types(options)).loaded()
-    for error in errors:
+    figures, wrong = load_all(figure_types())
+    of_studies, wrong_too = load_all(study_figure_types())
+    for error in (*errors, *wrong, *wrong_too):
         complain(f"warning: {error}")
-    text = schema_text(json_schema(catalogue, figure_types(), study_figure_types()))
+    text = schema_text(json_schema(catalogue, figures, of_studies))
     if options.out is None:
         tell_json_text(text)
     else:

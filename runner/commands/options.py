@@ -153,6 +153,16 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     return model
 
 
+def check_path(flag: str, path: Path) -> None:
+    """Raise ``EpicycleError`` where no file can be written, before a run is made for it."""
+    from epicycle.actors import EpicycleError
+
+    if not path.parent.is_dir():
+        raise EpicycleError(f"{flag} {path} cannot be written: there is no folder {path.parent}")
+    if path.is_dir():
+        raise EpicycleError(f"{flag} {path} cannot be written: it is a folder")
+
+
 def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) -> int:
     """Say what went wrong after a run; the exit code."""
     for error in errors:

@@ -80,7 +80,7 @@ class Turn:
         """How many tokens have come for it."""
         found = 0
         for port in self.ports:
-            found += len(port.arrived) - port.kept
+            found += len(port.arrived)
         return found
 
     def kept(self) -> int:
@@ -88,6 +88,8 @@ class Turn:
         found = 0
         for port in self.keeps or _NOTHING:
             found += len(port.arrived)
+            if port.kept is not None:
+                found += port.kept.count
         return found
 
     def hold(self) -> None:
@@ -98,9 +100,9 @@ class Turn:
     def clear(self) -> None:
         """The actor has fired: what it has not read is gone."""
         for port in self.ports:
-            if port.arrived:
+            if port.arrived or port.kept is not None:
                 if port.keep:
-                    port.kept = len(port.arrived)
+                    port.put_in_line()
                 else:
                     port.clear()
         for port in self.later:

@@ -122,6 +122,8 @@ cdef class CounterForm(Native):
     cdef public Sender output
 
     cdef bint take(self) except -1:
+        if self.actor.reset_by != "any" or self.actor.reset_last:
+            return False
         self.increment, self.decrement = self.input_port("increment"), self.input_port("decrement")
         self.reset, self.output = self.input_port("reset"), self.sender("output")
         return self.output is not None

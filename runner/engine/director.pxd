@@ -5,9 +5,6 @@ from epicycle.actors cimport InputPort, Moment, Ranks, Times, Wake, Way, new_wak
 from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, new_instant
 
 
-cdef long long _NOTICED
-
-
 cdef class Director:
     cdef public object _all_at_once, _environment, seed, crowd, ranks, _stop_after, _reason
     cdef public list _queue, _recent, _turns
@@ -55,12 +52,6 @@ cdef class Director:
     cpdef fire(self, Turn turn)
     @cython.locals(waiting=Py_ssize_t, left=Py_ssize_t)
     cpdef _fire_on(self, Turn turn)
-    @cython.locals(
-        times=Times, instant=Instant, queue=list, is_of_simpy=cython.bint, here=cython.longlong, now=cython.longlong,
-        upcoming=cython.longlong, last_time=cython.longlong, last_step=cython.longlong,
-        never=cython.longlong,
-    )
-    cpdef run(self, stop, list actors, progress=*, pace=*, most=*)
 
 
 cdef class Entry(Way):

@@ -28,27 +28,23 @@ token; and tokens that an actor does not read do not stay in the port, unless it
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from epicycle.actors import NEVER, InputPort, Moment, Posts, Process, Ranks, Tag, Times, Wake, Way, new_wake
+from epicycle.actors import InputPort, Moment, Posts, Process, Ranks, Tag, Times, Wake, Way, new_wake
 
 from ..text import NORMAL, Limits, describe
 from . import errors
 from .agenda import Delivery, Instant, Poster, Turn, new_instant
 from .environment import Environment
-from .errors import ActorError, Crowd, CrowdError, LoopError, of_process
-from .pace import notice
+from .errors import ActorError, Crowd, CrowdError, LoopError
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor
     from epicycle.aspects import Job
 
     from ..graph import Postings
-    from .pace import Pace
 
 REPORTED = 256  # tokens that come together at one port: so many at a time are counted
-_NOTICED = 16  # steps between two looks at what else there is
 
 
 class Director:
@@ -411,83 +407,6 @@ class Director:
     def interrupt(self) -> None:
         """Raise ``KeyboardInterrupt`` in the place of the next firing, or of the next instant."""
         self._is_interrupted = True
-
-    def run(
-        self,
-        stop: int | None,
-        actors: list[Actor],
-        progress: Callable[[float], None] | None = None,
-        pace: Pace | None = None,
-        most: int | None = None,
-    ) -> str:
-        """Handle events up to and including ``stop`` (ns), until none is left, or until a stop was asked for.
-
-        Returns why it ended; nothing if that is because ``most`` steps are done, of which each is a tag or an event of
-        SimPy's.
-        """
-        environment, times, queue = self._environment, self._times, self._queue
-        last_step = NEVER if most is None else self.steps + most
-        last_time = NEVER - 1 if stop is None else stop
-        here, never = 0, NEVER
-        now = self._last.time
-        if pace is not None:
-            pace.wait_for(now)
-        if progress is not None:
-            progress(now / 1e9)
-        while self.steps < last_step:
-            instant = None if self.present is None else self._next
-            if self._stop_after is not None and self._last.tag >= self._stop_after:
-                break
-            is_of_simpy = False
-            if instant is not None:  # more of the present time
-                upcoming = instant.time
-            else:
-                upcoming = times.first()
-                if queue and queue[0][0] <= upcoming:
-                    is_of_simpy = True
-                    upcoming = math.ceil(min(queue[0][0], NEVER))
-                if upcoming == never:
-                    break
-                if self._stop_after is not None and max(upcoming, self._last.time) > self._stop_after.time:
-                    break
-            if upcoming > last_time:
-                if pace is not None:
-                    pace.wait_for(last_time)
-                return "stop time"
-            if pace is not None and upcoming > now:
-                pace.wait_for(upcoming)
-            try:
-                if self._is_interrupted:
-                    raise KeyboardInterrupt
-                if is_of_simpy:
-                    environment.step()
-                elif instant is not None:
-                    self._next = None
-                    self._handle(instant)
-                else:
-                    self._time = upcoming
-                    if self._has_simpy:
-                        environment._now = upcoming
-                    self._handle(times.pop())
-            except BaseException as error:
-                self.present = None
-                if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
-                    raise
-                found, cause = of_process(error, actors, self.tag)
-                raise found from cause
-            if upcoming != now:
-                here = 0
-            elif instant is None:
-                here += 1
-            now = upcoming
-            if here > self._most_steps:
-                raise LoopError(self.tag.time, ())
-            self.steps += 1
-            if self.steps % _NOTICED == 0:
-                notice(progress, now)
-        else:
-            return ""
-        return self._reason
 
 
 class Entry(Way):

@@ -109,6 +109,8 @@ cdef class PoissonForm(Ticking):
 
     cdef bint take(self) except -1:
         self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
+        if self.actor.one_at_a_time and self.actor.stop_time is not None:
+            return False
         return self.actor.generator is None and not self.actor.trigger.width and Ticking.take(self)
 
     cpdef fire(self):
@@ -314,7 +316,7 @@ cdef class RecorderForm(Native):
 
 # What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
 SOURCES = (
-    ("accumulation.py", "Counter", "511f83c57109ba7d"),
+    ("accumulation.py", "Counter", "3bd9c254af082445"),
     ("accumulation.py", "Integrator", "27ce6720551b6cf5"),
     ("arithmetic.py", "AddSubtract", "208b5fc20a1e18d8"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),
@@ -323,7 +325,7 @@ SOURCES = (
     ("distributions.py", "Uniform", "623cbec8bb43eb2b"),
     ("flow.py", "Merge", "2870aac0ebfab367"),
     ("functions.py", "Expression", "b1687473183ecb2d"),
-    ("queues.py", "Queue", "de9384977ec688db"),
+    ("queues.py", "Queue", "feae9e0442bd8690"),
     ("sources.py", "Random", "638494c834d75368"),
     ("core/authoring.py", "Latest", "ef29b272da8cc0c6"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
@@ -336,8 +338,8 @@ SOURCES = (
     ("queues.py", "Server", "b1b76d0c79386ea5"),
     ("sinks.py", "Recorder", "7e5e225f348888c2"),
     ("sources.py", "Clock", "e8869bd338027fbd"),
-    ("sources.py", "PoissonClock", "47664d47db418e38"),
-    ("sources.py", "_Ticking", "3720b339ddf2994e"),
+    ("sources.py", "PoissonClock", "844c4f1ae2278480"),
+    ("sources.py", "_Ticking", "dab6953921bd02e9"),
     ("arithmetic.py", "Scale", "8aa8628e425a69a5"),
     ("timing.py", "TimeDelay", "2525e8b2de82467c"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),

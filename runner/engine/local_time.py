@@ -86,7 +86,8 @@ class Passage(Actor):
     """A port of a composite with a director of its own: at each tag it lets one token of each channel through.
 
     What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.  With
-    a ``border`` it lets one token through in each firing of the composite.
+    a ``border`` it lets one token through in each firing of the composite; if it ``is_refired`` with what is around the
+    composite, in each of its own.  One that ``holds_one`` keeps the latest token alone of those that come together.
     """
 
     def __init__(self, path: str, director: Director | Refinement) -> None:
@@ -95,6 +96,8 @@ class Passage(Actor):
         self.gate: Refinement | None = None  # behind it, which may be closed: what comes then is lost
         self.beside: Actor | None = None  # who fires when something has come through
         self.border: Border | None = None
+        self.is_refired = False
+        self.holds_one = False
         self.requests: deque[Delivery] = deque()  # to an aspect that is a model, which wait for its turn
         self._director = director
         self._lanes: dict[object, _Lane] = {}
@@ -116,16 +119,20 @@ class Passage(Actor):
         return Call(arrive)
 
     def fire(self) -> None:
-        if self.border is not None:
-            self._let_through(self.border)
-            return
-        now = self.tag
         if self.gate is not None and not self.gate.is_open:
             self.clear()
         if self.beside is not None:
             self._director.trigger(self.beside)
+        if self.holds_one:
+            for lane in self._lanes.values():
+                while len(lane.waiting) > 1:
+                    lane.waiting.popleft()
+        if self.border is not None:
+            self._let_through(self.border)
+            return
+        now = self.tag
         for lane in self._lanes.values():
-            if lane.waiting and lane.passed != now:
+            if lane.waiting and (self.is_refired or lane.passed != now):
                 lane.passed = now
                 lane.waiting.popleft().arrive()
         if self.is_waited_for:
@@ -170,8 +177,8 @@ class Border(Actor):
     from outside leaves at the next microstep, unless the composite fires at this tag for what comes in.
     """
 
-    def __init__(self, path: str, director: Director, outside: Director | Refinement) -> None:
-        super().__init__(path)
+    def __init__(self, path: str, end: str, director: Director, outside: Director | Refinement) -> None:
+        super().__init__(end)
         self.enter(outside)
         self.inputs_before: list[Passage] = []
         self.outputs_behind: list[Passage] = []

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from epicycle.actors import StateMachine
 
-Entry = tuple[int, int, "Wake | Delivery | Event", "Turn | EventPriority | None"]
+# When, a number that keeps the order, what and how, and the outer time and microstep before which it is not done.
+Entry = tuple[int, int, "Wake | Delivery | Event", "Turn | EventPriority | None", tuple[int, int]]
 
 
 class Refinement:
@@ -44,6 +45,7 @@ class Refinement:
         self._stood = 0  # outer time since when it has stood still
         self._agenda: list[Entry] = []
         self._numbers = count()
+        self._is_beginning = False
 
     @property
     def time(self) -> int:
@@ -81,9 +83,16 @@ class Refinement:
         most = self.director.crowd.most
         if len(self._agenda) >= most:
             raise CrowdError(self.director.tag, most, f"things that are to come in {self.path}", ())
-        heapq.heappush(self._agenda, (time, next(self._numbers), what, how))
+        heapq.heappush(self._agenda, (time, next(self._numbers), what, how, self._not_before(time)))
         if self.is_active:
             self.conductor.plan()
+
+    def _not_before(self, time: int) -> tuple[int, int]:
+        """What is for the present time is for its next microstep; but a composite that fires again begins at once."""
+        if time > self.time or self._is_beginning:
+            return 0, 0
+        present = self.director.now()
+        return present.time, present.microstep + (self.director.present is not None)
 
     def hold(self, way: Way, token: Any) -> Delivery:
         """What lets a token go on, later."""
@@ -106,11 +115,11 @@ class Refinement:
 
     def release(self) -> bool:
         """Let go on what is due; whether anything is."""
-        now, due = self.time, []
-        while self._agenda and self._agenda[0][0] <= now:
+        now, present, due = self.time, self.director.now(), list[Entry]()
+        while self._agenda and self._agenda[0][0] <= now and self._agenda[0][4] <= (present.time, present.microstep):
             due.append(heapq.heappop(self._agenda))
         is_any = False
-        for _, _, what, how in due:
+        for _, _, what, how, _ in due:
             if isinstance(what, Delivery):
                 what.arrive()
             elif isinstance(what, Event):
@@ -130,17 +139,23 @@ class Refinement:
         self.is_active = False
 
     def resume(self) -> None:
-        """Its time resumes where it stood."""
+        """Its time goes on where it stood."""
         self._lag += self._outer.time - self._stood
         self.is_active = True
 
     def begin(self) -> None:
         """It begins again, with the time around it, and with nothing to do."""
-        for _, _, what, _ in self._agenda:
+        for _, _, what, *_ in self._agenda:
             if isinstance(what, Wake):
                 what.cancel()
         self._agenda.clear()
         self._lag, self.is_active = 0, True
+
+    def begin_inside(self, inside: Callable[[], None]) -> None:
+        """Let all that is in it begin."""
+        self._is_beginning = True
+        inside()
+        self._is_beginning = False
 
 
 class _Environment(simpy.Environment):
@@ -182,6 +197,7 @@ class Conductor(Actor):
         self._active: Refinement | None = None
         self._left: Tag | None = None  # the tag at which a preemptive transition, or an error, has cut a firing short
         self._wake: Wake | None = None
+        self.is_refired = False  # whether it fires again at a tag as long as tokens wait at the inputs of its composite
         self.failure: ActorError | None = None
         machine.refinements = self
 
@@ -191,7 +207,10 @@ class Conductor(Actor):
         return self._left is not None and self._left == self._director.tag
 
     def fire(self) -> None:
-        self._wake = None
+        if self._wake is not None and (self._wake.due or self._wake.cancelled):
+            self._wake = None
+        if self.is_refired:
+            self._left = None
         if self.machine.is_preemptive and self.machine.preempt():
             self._left = self._director.tag
         elif self._active is not None and self._active.release():
@@ -214,7 +233,7 @@ class Conductor(Actor):
     # -- for the machine ------------------------------------------------------------------------------------------
 
     def begin(self, mode: str) -> None:
-        """The run begins, or begins again, in a mode."""
+        """The run begins, or begins anew, in a mode."""
         for name, refinement in self.refinements.items():
             refinement.begin()
             if name != mode:
@@ -223,24 +242,25 @@ class Conductor(Actor):
         self._active = self.refinements.get(mode)
 
     def go(self, mode: str, *, history: bool) -> None:
-        """Leave the present mode's refinement, and enter the other's: where it was left, or from the beginning."""
+        """Leave the present mode's refinement, and enter the other's: where it was left, or anew."""
         if self._active is not None:
             self._active.suspend()
         if self._wake is not None:
             self._wake.cancel()
             self._wake = None
-        self._active = self.refinements.get(mode)
+        is_over = self.is_refired and self.machine.modes[mode].final  # in Ptolemy, it fires no more
+        self._active = None if is_over else self.refinements.get(mode)
         if self._active is None:
             return
         if history:
             self._active.resume()
         else:
             self._active.begin()
-            self.insides[mode]()
+            self._active.begin_inside(self.insides[mode])
         self.plan()
 
     def fail(self, error: ActorError) -> None:
-        """Something in the active refinement has failed: the machine decides what follows."""
+        """Something in the active refinement has failed: the machine says what comes of it."""
         if not self.machine.catches:
             raise error
         self.failure = error

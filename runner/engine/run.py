@@ -22,6 +22,7 @@ from .director import Director
 from .errors import ActorError
 from .forms import attach
 from .listeners import Measuring, Recording
+from .loop import handle_events
 from .measurement import Measurement
 from .pace import Pace
 from .trace import Tracer, TracingDirector, TracingLog
@@ -122,7 +123,7 @@ class Run:
                 if not self.is_begun:
                     self._begin()
                 with nullcontext() if most == 1 else between_steps(self.director.interrupt):
-                    self.stopped = self.director.run(stop, list(self.actors.values()), progress, pace, most)
+                    self.stopped = handle_events(self.director, stop, [*self.actors.values()], progress, pace, most)
         except BaseException as error:
             self.end()
             if isinstance(error, ActorError):
@@ -138,11 +139,11 @@ class Run:
             actor.enter(self._ways.context_of(path))
         before = ""
         for path, actor in self.actors.items():
-            self._ways.post(before, path)
+            self._ways.directors.post(before, path)
             self._call(actor, "initialize")
             self._initialized.append(actor)
             before = path
-        self._ways.post(before, "")
+        self._ways.directors.post(before, "")
         self._ways.begin()
         # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
         self._ways.open()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from epicycle.actors import (
     Actor,
@@ -28,21 +28,22 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..graph import Clock, Hop, ModelGraph, WovenAspect, channel_of, is_within
+from ..graph import Clock, Hop, ModelGraph, WovenAspect
 from ..results import EventLog, Signal
 from ..text import describe
 from .aspect_context import EngineContext
 from .director import Director
+from .directors import Directors
 from .errors import ActorError, LoopError
 from .execution import Execution
-from .local_time import Border, LocalDirector, Passage
+from .local_time import LocalDirector
 from .parameters import VaryingParameter
-from .refinement import Conductor, Refinement
+from .refinement import Refinement
 from .requests import Requests
 from .way import Call, Delayed, Deliver, Guarded, Screened, Sender, all_of
 
 if TYPE_CHECKING:
-    from epicycle.actors import StateMachine
+    pass
 
 T = TypeVar("T")
 P = TypeVar("P", bound=JoinPoint)
@@ -93,99 +94,22 @@ class Ways:
                 listeners.setdefault(woven.model.response, []).append(partial(self._answer, woven))
         for path in dict.fromkeys(path for woven in aspects for path in woven.looks_at):
             listeners.setdefault(path, []).append(partial(self._latest.__setitem__, path))
-        self._directors: dict[str, Director | LocalDirector | Refinement] = {}
-        self._conductors: dict[str, Conductor] = {}
-        self._passages: dict[str, Passage] = {}
-        self._borders: dict[str, Border] = {}
-        self._refinements: dict[str, Refinement] = {}
-        for composite, clock in self.graph.clocks.items():
-            self._add_director(composite, clock)
+        self.directors = directors = Directors(graph, actors, director)
         changed = {path.rpartition(".")[0] for woven in aspects for path in woven.parameters}
-        self._executions = {
-            path: Execution(actor, director, self._by_clock(path))
-            for path, actor in actors.items()
-            if path in self._woven_at or path in changed or self._is_caught(path)
-        }
+        self._executions = directors.executions
+        for path, actor in actors.items():
+            if path in self._woven_at or path in changed or directors.catches(path):
+                self._executions[path] = Execution(actor, director, self._by_clock(path))
         self._emitters = self._find()
         self._vary_parameters(aspects)
         for path, execution in self._executions.items():
-            if self._is_caught(path):
-                refinement = self._refinements[self.graph.refinement_of(path)]
-                execution.refinement = refinement
-            around = self.graph.director_of(path)
-            if any(self.graph.director_of(woven.name) != around for woven in self._woven_at.get(path, ())):
-                execution.border = self._borders.get(around)
+            if directors.catches(path):
+                execution.refinement = directors.refinements[graph.refinement_of(path)]
+            around = graph.director_of(path)
+            if any(graph.director_of(woven.name) != around for woven in self._woven_at.get(path, ())):
+                execution.border = directors.borders.get(around)
             execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
-
-    def _add_director(self, composite: str, clock: Clock) -> None:
-        """What is asked for under a director of its own."""
-        outside = self._base(self.graph.director_of(composite)) if composite else self.director
-        for paths in self.graph.borders(composite):
-            self._passages.update({path: Passage(path, outside) for path in paths})
-        if self.graph.refires(composite):
-            self._add_border(composite, outside)
-        self._directors[composite] = self._made_director(composite, clock)
-        if composite in self.graph.modal:
-            machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
-            conductor = Conductor(composite, machine, self.director, self._directors[composite])
-            self._conductors[composite] = conductor
-            if machine.is_preemptive:
-                for path in self.graph.borders(composite)[0]:
-                    self._passages[path].beside = conductor
-
-    def _add_border(self, composite: str, outside: Director | Refinement) -> None:
-        """Let a composite fire again as long as tokens wait at its inputs."""
-        border = self._borders[composite] = Border(composite, self.director, outside)
-        for paths, passages in zip(
-            self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
-        ):
-            passages += (self._passages[path] for path in paths)
-            for passage in passages:
-                passage.border = border
-        around = composite
-        while around and border.poster is None:
-            around = around.rpartition(".")[0]
-            border.poster = self._borders.get(around)
-        border.nesting = 0 if border.poster is None else border.poster.nesting + 1
-        self.director.posters[composite] = border
-
-    def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
-        if not composite or self.graph.refinement_of(composite) != composite:
-            base = self._base(composite)
-            return base if clock.is_global else LocalDirector(base, clock)
-        modal, _, mode = composite.rpartition(".")
-        conductor = self._conductors[modal]
-        inside = Refinement(composite, self._directors[modal], self.director, conductor)
-        self._refinements[composite] = conductor.refinements[mode] = inside
-        conductor.insides[mode] = partial(self._begin_anew, composite)
-        for path in self.graph.borders(composite)[0]:
-            self._passages[path].gate = inside
-        return inside
-
-    def _base(self, composite: str) -> Director | Refinement:
-        """Whose time a composite's clock counts from."""
-        refinement = self.graph.refinement_of(composite)
-        return self._refinements[refinement] if refinement else self.director
-
-    def _is_caught(self, path: str) -> bool:
-        """Whether an actor is in a refinement for whose errors there are transitions."""
-        refinement = self._refinements.get(self.graph.refinement_of(path))
-        return refinement is not None and refinement.conductor.machine.catches
-
-    def _begin_anew(self, refinement: str) -> None:
-        """Let all that is in a refinement begin again."""
-        for path, passage in self._passages.items():
-            if is_within(path, refinement):
-                passage.clear()
-        for path, actor in self.actors.items():
-            if is_within(path, refinement):
-                execution = self._executions.get(path)
-                if execution is not None:
-                    execution.kill()
-                else:
-                    actor.halt()
-                actor.restart()
 
     def _vary_parameters(self, aspects: list[WovenAspect]) -> None:
         """Let the aspects that stand at a parameter change it before each firing of its actor."""
@@ -202,10 +126,6 @@ class Ways:
                 entry = self._through(woven, path, path, entry)
             self._executions[owner].refresh.append(partial(entry.go, varying.nominal))
 
-    def director_of(self, path: str) -> Director | LocalDirector | Refinement:
-        """The director that an actor or composite stands under, with its time."""
-        return self._directors[self.graph.director_of(path)]
-
     def context_of(self, path: str) -> Context:
         """What an actor sees of the run."""
         return self._executions.get(path) or self._by_clock(path)
@@ -221,22 +141,14 @@ class Ways:
                     raise self._error(woven, f"error() at {path}", error) from error
                 clock = Clock(clock.start + ahead, clock.rate * speed)
         if clock == before:
-            return self.director_of(path)
-        base = self._base(self.graph.director_of(path))
+            return self.directors.over(path)
+        base = self.directors.base(self.graph.director_of(path))
         return base if clock.is_global else LocalDirector(base, clock)
 
     @property
     def executed(self) -> Container[str]:
         """The actors that aspects stand at, or whose parameters they change."""
         return self._executions
-
-    def post(self, before: str, path: str) -> None:
-        """At the start, one actor was initialized and another one is next: post composites that are done with."""
-        around = before if self._borders else ""
-        while around:
-            around = around.rpartition(".")[0]
-            if around in self._borders and not is_within(path, around):
-                self._borders[around].post()
 
     def open(self) -> None:
         """From now on tokens can be sent."""
@@ -263,12 +175,19 @@ class Ways:
         for hops in leaving.values():
             hops.sort(key=lambda way: [hop.order for hop in way])  # as they are declared
         emitters = [
-            (output, self._emitter(output, _by_channel(leaving.get(output.path, []))))
+            (output, self._emitter(output, self._by_channel(leaving.get(output.path, []))))
             for actor in self.actors.values()
             for output in actor.outputs.values()
         ]
         self._open_requests()
         return emitters
+
+    def _by_channel(self, wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
+        """The wires of an output port by the channel, in their order."""
+        found: dict[object, list[tuple[Hop, ...]]] = {}
+        for hops in wires:
+            found.setdefault(self.graph.channel_of(hops, hops[0]), []).append(hops)
+        return list(found.values())
 
     def _open_requests(self) -> None:
         """Find the ways from the request ports of aspects that are models to the actors inside."""
@@ -277,7 +196,7 @@ class Ways:
             for place, path in requests.model.requests.items():
                 if path not in ways:
                     ways[path] = all_of(self._branches(path, ()))
-                passage = self._passages.get(path)
+                passage = self.directors.passages.get(path)
                 onward = ways[path]
                 if passage is not None and passage.border is not None:
                     onward = passage.await_turn(requests.told(place, onward))
@@ -335,7 +254,7 @@ class Ways:
     def _over(self, hop: Hop, onward: Way, channel: tuple[Hop, ...]) -> Way:
         """One connection: its delay, and the aspects and the passage at its far end."""
         far = hop.destination
-        passage, lane = self._passages.get(far), channel_of(channel, hop)
+        passage, lane = self.directors.passages.get(far), self.graph.channel_of(channel, hop)
         is_output = self.graph.direction(far) == "output"
         source = far if is_output else hop.source
         # Aspects at a port of a composite stand outside of it.
@@ -349,7 +268,7 @@ class Ways:
             onward = self._through(woven, far, source, onward, f"{hop.source} -> {far}")
         if hop.delay is None:
             return onward
-        return Delayed(self._directors[self.graph.director_over(hop)], hop.delay, onward)
+        return Delayed(self.directors.of[self.graph.director_over(hop)], hop.delay, onward)
 
     def _put(self, hops: tuple[Hop, ...]) -> Way:
         """The end of a wire, in the port of an actor."""
@@ -383,7 +302,7 @@ class Ways:
     def _guarded(
         self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
     ) -> Guarded:
-        """What an aspect does with all that comes to a join point; an error in it is reported with its ``name``."""
+        """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
         holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
         return Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
 
@@ -433,7 +352,7 @@ class Ways:
     ) -> P:
         """Where an aspect stands: at a port or parameter, or at an actor."""
         name, owner = woven.name, path if kind is ActorPoint else self.graph.owner(path)
-        local = self.director if aspect.in_model_time else self.director_of(owner)
+        local = self.director if aspect.in_model_time else self.directors.over(owner)
         blame = partial(self._error, woven, f"later() at {path}")
         context = EngineContext(local, self.director, self.log, self._latest, self._signals, blame)
         point = kind(name, path, context, onward, self.shared(woven), place, woven.readings, source, woven.selections)
@@ -476,11 +395,3 @@ class Ways:
                 raise
             except Exception as error:
                 raise self._error(woven, f"begin() at {unit.port}", error) from error
-
-
-def _by_channel(wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
-    """The wires of an output port by the channel, in their order."""
-    found: dict[object, list[tuple[Hop, ...]]] = {}
-    for hops in wires:
-        found.setdefault(channel_of(hops, hops[0]), []).append(hops)
-    return list(found.values())

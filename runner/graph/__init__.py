@@ -2,7 +2,7 @@
 
 from .clock import Clock
 from .digraph import find_loop, in_order
-from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, channel_of, is_within
+from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
 from .ranks import Postings, Region, dependencies, firing_order, postings
 from .rules import LIKE, PTOLEMY, TIES, Like, Rules, Ties
 from .watched import Metric, Watched
@@ -28,7 +28,6 @@ __all__ = [
     "Watched",
     "Wire",
     "WovenAspect",
-    "channel_of",
     "check_processors",
     "dependencies",
     "extent",

@@ -191,9 +191,13 @@ class ModelGraph:
 
     def refires(self, director: str) -> bool:
         """Whether a composite fires again at a tag as long as tokens wait at its inputs, as in Ptolemy."""
-        if not director or director not in self.rules or director in self.modal:
+        if not director or director not in self.rules or self.refinement_of(director) == director:
             return False
-        return self.rules[director].are_ptolemys and self.refinement_of(director) != director
+        return self.rules[director].are_ptolemys
+
+    def end_of(self, director: str) -> str:
+        """Where a composite that fires again has the turn for it; one with modes begins at its own path."""
+        return f"{director}.(end)" if director in self.modal else director
 
     def add_refinement(self, path: str) -> None:
         """Give a composite a director of its own, whose time goes on in one mode alone; clocks in it count by that."""
@@ -349,8 +353,22 @@ class ModelGraph:
         """The wires that end at an input port, by the channel."""
         found: dict[object, list[Wire]] = {}
         for wire in self.wires_to(port):
-            found.setdefault(channel_of(wire.hops, wire.hops[-1]), []).append(wire)
+            found.setdefault(self.channel_of(wire.hops, wire.hops[-1]), []).append(wire)
         return list(found.values())
+
+    def channel_of(self, hops: tuple[Hop, ...], hop: Hop) -> object:
+        """What tells the channels of a port apart: the wire, or the connection at the port if that is one channel.
+
+        As in Ptolemy, what leaves a composite with modes is one channel, whichever refinement has sent it.
+        """
+        if hop.shared is not None:
+            return hop.shared
+        for place in range(len(hops), 0, -1) if self.modal else ():
+            far = hops[place - 1].destination
+            owner = self.owner(far)
+            if owner in self.modal and self.direction(far) == "output" and self.rules[owner].are_ptolemys:
+                return hops[place:]
+        return hops
 
     def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
         """The ways from a port to actors' ports; ``check_passages`` has seen to it that they end."""
@@ -381,11 +399,6 @@ class ModelGraph:
                 waiting += [each for each in reversed(before) if each not in seen]
                 seen.update(before)
         return found
-
-
-def channel_of(hops: tuple[Hop, ...], hop: Hop) -> object:
-    """What tells the channels of a port apart: the wire, or the connection at the port if that is one channel."""
-    return hops if hop.shared is None else hop.shared
 
 
 def is_within(path: str, outer: str) -> bool:

@@ -81,7 +81,7 @@ def _unfolded(graph: ModelGraph) -> list[tuple[list[str], Place]]:
         for port in outputs:
             add([port])
         if graph.refires(director):
-            add([director])
+            add([graph.end_of(director)])
 
     unfold("", ())
     return order

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from ..text import Position, Problems, Text, did_you_mean
@@ -43,17 +43,21 @@ class Claim:
     @property
     def statement(self) -> str:
         """The hypothesis in words."""
-        where = f", where {_shown(self.where)}" if self.where else ""
+        return self.stated()
+
+    def stated(self, words: Callable[[str], str] = str) -> str:
+        """The hypothesis, with ``words`` for metrics and factors."""
+        where = f", where {_shown(self.where, words)}" if self.where else ""
         share = f" in at least {self.share:.0%} of all cases" if self.share < 1 else ""
         if self.form == ALWAYS:
             often = "holds in every run" if self.share == 1 else f"holds in at least {self.share:.0%} of the runs"
             return f"{self.condition} {often}{where}"
-        metrics = " and ".join(metric.text for metric in self.metrics)
+        metrics = " and ".join(words(metric.text) for metric in self.metrics)
         if self.form in (RISES, FALLS):
-            what = f"the slope of {metrics} over {self.per}" if self.per else metrics
-            return f"{what} {self.form} over {self.over}{where}"
-        than = "any other level" if self.than is None else _shown(self.than)
-        return f"{metrics} is {self.form} at {_shown(self.at)} than at {than}{share}{where}"
+            what = f"the slope of {metrics} over {words(self.per)}" if self.per else metrics
+            return f"{what} {self.form} over {words(self.over)}{where}"
+        than = "any other level" if self.than is None else _shown(self.than, words)
+        return f"{metrics} is {self.form} at {_shown(self.at, words)} than at {than}{share}{where}"
 
 
 @dataclass(frozen=True)
@@ -95,9 +99,10 @@ def shown_level(value: Factor) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _shown(selection: Selection) -> str:
+def _shown(selection: Selection, words: Callable[[str], str]) -> str:
     parts = []
     for factor, levels in selection.items():
         shown = [shown_level(each) for each in levels]
-        parts.append(f"{factor}={shown[0]}" if len(shown) == 1 else f"{factor}={', '.join(shown[:-1])} or {shown[-1]}")
+        listed = shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} or {shown[-1]}"
+        parts.append(f"{words(factor)}={listed}")
     return " and ".join(parts)

@@ -354,7 +354,7 @@ RUN = Construct(
 
 
 def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
-    schema = ref("text") if key in ("unit", "to", "doc") else schema_of(parameter)
+    schema = ref("text") if key in ("unit", "to", "doc", "label") else schema_of(parameter)
     if key == "take":
         schema = {"enum": list(TAKES), "enumDescriptions": [f"{each.doc} ({each.over})" for each in TAKES.values()]}
     return Key(node_as(schema), about(parameter))

@@ -301,6 +301,7 @@ METRIC = Construct(
         "unit": Key(TEXT, "What it counts in; a metric of the model has its own."),
         "to": Key(TEXT, "The unit in which the table holds it (default: the same)."),
         "doc": Key(TEXT, "What it is."),
+        "label": Key(TEXT, "What it is called in figures and reports (default: what the model says, or its name)."),
     },
     type="object",
     required=["value"],

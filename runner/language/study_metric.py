@@ -29,6 +29,7 @@ class StudyMetric:
     unit: str = ""  # what the expression counts in; a metric of the model has its own
     to: str = ""  # the unit in which the table holds it, if that is another one
     doc: str = ""
+    label: str = ""
     places: dict[str, Position] = field(default_factory=dict, compare=False)  # of the unit and what follows
     figures: tuple[tuple[str, str], ...] = field(init=False)
     signals: tuple[str, ...] = field(init=False)

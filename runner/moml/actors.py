@@ -14,9 +14,10 @@ from ..catalogue import built_in
 from .counterpart import UNSAID, Counterpart, ParameterSaid
 from .entities import Entity, Property
 from .notes import Notes
+from .parts import Changing
 from .relations import PortFace
 from .scope import Scope, is_text, is_variable
-from .syntax import ExpressionError
+from .syntax import ExpressionError, Tree
 from .translate import translated
 
 _LAYOUT = re.compile(
@@ -32,7 +33,7 @@ _DECORATION = re.compile(
 
 
 _UNIMPORTANT = frozenset({
-    "resetOnEachRun", "stopTimeIsLocal", "UNBOUNDED", "useLocalTime", "scaleOnLeft", "trainingMode",
+    "resetOnEachRun", "stopTimeIsLocal", "UNBOUNDED", "scaleOnLeft", "trainingMode",
 })  # fmt: skip
 
 
@@ -62,9 +63,15 @@ class Actor:
     widths: Mapping[str, int] = field(default_factory=dict)  # how many channels its ports have
     values: dict[str, Any] = field(default_factory=dict)  # what is written
     ports: dict[str, str] = field(default_factory=dict)  # ours, for those of its ports that the row does not know
+    unwired: set[str] = field(default_factory=set)  # ports of its own at which nothing counts
     used: set[str] = field(default_factory=set)  # the parameters of the model that it names
     told: set[str] = field(default_factory=set)  # parameters that are dealt with
-    follow: Callable[[str, str], None] = lambda ours, text: None  # lets one of ours go by an expression over variables
+    # Lets one of ours go by an expression over variables, or by the variable that a parameter of some name is.
+    follow: Callable[[str, str, str], None] = lambda ours, text, name: None
+    # What the names in an expression are that change in the run: each by the names of variables, and these.
+    changing: Callable[[Tree], tuple[dict[str, str], dict[str, Changing]]] = lambda tree: ({}, {})
+    arrays: frozenset[str] = frozenset()  # ports at which only arrays come
+    reads: dict[str, Changing] = field(default_factory=dict)  # ports of ours to which variables lead
 
     # -- what is said in the file ---------------------------------------------------------------------------------
 
@@ -105,6 +112,7 @@ class Actor:
         for name, row in self.row.parameters.items():
             if name not in self.told:
                 self._parameter(name, row)
+        self._tell_fixed()
         given = {name: value for name, value in self.values.items() if not self._is_default(name, value)}
         self.values = {**self.row.fixed, **given}
         for name, said in self.entity.properties.items():
@@ -118,6 +126,16 @@ class Actor:
                 self._limit(name)
             elif not self._is_only_named(name, said):
                 self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: has no counterpart")
+
+    def _tell_fixed(self) -> None:
+        """Parameters from which something else was computed, though they change in the run."""
+        for name in sorted(self.told - self.row.parameters.keys()) if not self.reads else ():
+            said = self.said(name)
+            try:
+                if said is not None and not is_text(said) and self.changing(self.scope.tree(said.value or ""))[1]:
+                    self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: goes by what it is at the start")
+            except ExpressionError:
+                continue
 
     def _is_default(self, name: str, value: object) -> bool:
         """Whether our actor has this value anyway, under a director that is like Ptolemy's."""
@@ -152,6 +170,7 @@ class Actor:
         said = self.said(name)
         if row.kind == "nothing":
             return
+        self.follow(row.ours, "" if said is None or is_text(said) else said.value or "", name)
         if said is None or not (said.value or "").strip():
             if row.default is not UNSAID and self.values.get(row.ours, UNSAID) is UNSAID:
                 self.values[row.ours] = written(row.default, row.kind)
@@ -165,8 +184,6 @@ class Actor:
         try:
             found = self.scope.value_of(said)
             self.values[row.ours] = self._by_name(said, found, row.kind) or written(found, row.kind)
-            if not is_text(said):
-                self.follow(row.ours, said.value or "")
         except (ExpressionError, TypeError, ValueError, OverflowError) as error:
             self.notes.error(f"{self.path}.{name} = {_brief(said.value or '')}: {error}")
 
@@ -272,6 +289,9 @@ def face_of(actor_row: Counterpart | None, entity: Entity, port: str) -> PortFac
     said = entity.ports.get(port)
     if said is not None and (said.flag("input") or said.flag("output")):
         return PortFace("input" if said.flag("input") else "output", said.flag("multiport"))
-    if actor_row is not None and port in actor_row.parameters:  # the port of a PortParameter
+    said_parameter = entity.properties.get(port)
+    is_parameter = said_parameter is not None and said_parameter.java.endswith("PortParameter")
+    row = None if actor_row is None else actor_row.parameters.get(port)
+    if actor_row is not None and (is_parameter if row is None else row.kind != "nothing"):  # of a PortParameter
         return PortFace("input", False)
     return None

@@ -9,6 +9,7 @@ from typing import Any
 from .actors import is_decoration, is_layout, plain, seconds
 from .entities import Entity, Property, kind
 from .parts import Converting, Level
+from .reasons import why_not
 from .scope import Scope
 from .syntax import ExpressionError
 from .writing import Flow
@@ -19,6 +20,7 @@ MODELS = frozenset({"CompositeCommunicationAspect", "CompositeExecutionAspect", 
 REQUESTS = frozenset({"CommunicationRequestPort", "ExecutionRequestPort", "CQMInputPort"})
 RESPONSES = frozenset({"CommunicationResponsePort", "ExecutionResponsePort", "CQMOutputPort"})
 LOWEST = 2**31 - 1
+_STAGES = {"inputBufferDelay": "in", "switchFabricDelay": "fabric", "outputBufferDelay": "out"}  # of a switch
 
 
 def is_aspect(entity: Entity) -> bool:
@@ -83,7 +85,9 @@ def aspects_of(conversion: Converting, level: Level) -> dict[str, Flow]:
             if make is None and not here:
                 conversion.notes.note(f"{level.told(aspect.name)}, a {aspect.java}: stands nowhere, and is left out")
             elif make is None:
-                conversion.notes.error(f"{level.told(aspect.name)} is a {aspect.java}, which has no counterpart")
+                conversion.notes.error(
+                    f"{level.told(aspect.name)} is a {aspect.java}, which has no counterpart{why_not(aspect.java)}"
+                )
             else:
                 made += make(conversion, level, aspect, here)
         except (ExpressionError, ValueError, TypeError) as error:
@@ -157,6 +161,30 @@ def _bus(conversion: Converting, level: Level, aspect: Entity, places: list[Plac
     return made
 
 
+def _switch(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
+    """A switch: a buffer for each port by which tokens come, its fabric, and a buffer for each by which they leave."""
+    scope, told = conversion.scope_of(aspect), level.told(aspect.name)
+    delays = dict.fromkeys(_STAGES, 0.1)
+    for key, said in aspect.properties.items():
+        if key in delays:
+            delays[key] = delays[key] if (value := scope.value_of(said)) is None else value
+        elif key != "numberOfPorts" and not is_layout(said) and not is_decoration(said) and said.value is not None:
+            conversion.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
+    if not places:
+        conversion.notes.note(f"{told} stands nowhere, and is left out")
+    # In a crossbar, tokens that came by one port pass the fabric, and leave, apart from those of others.
+    ports = ("portIn", "portIn", "portIn") if kind(aspect) == "CrossbarSwitch" else ("portIn", "", "portOut")
+    made: Made = []
+    for (name, delay), port in zip(delays.items(), ports, strict=True):
+        groups: dict[object, list[Place]] = {}
+        for place in places:
+            groups.setdefault(place.value(port, int(port == "portOut")) if port else 0, []).append(place)
+        for here in groups.values():
+            entry = Flow({"type": "Bus", "factor": seconds(delay), "at": _at([each.path for each in here])})
+            made.append((_sequence(here), level.names.fresh(f"{aspect.name}_{_STAGES[name]}"), entry))
+    return made
+
+
 def _scheduler(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
     scope, told = conversion.scope_of(aspect), level.told(aspect.name)
     if not places:
@@ -213,7 +241,8 @@ def _model(conversion: Converting, level: Level, aspect: Entity, places: list[Pl
 
 
 _MAKERS: dict[str, Callable[[Converting, Level, Entity, list[Place]], Made]] = {
-    **dict.fromkeys(("Bus",), _bus),
+    "Bus": _bus,
+    **dict.fromkeys(("BasicSwitch", "CrossbarSwitch"), _switch),
     **dict.fromkeys(SCHEDULERS, _scheduler),
     **dict.fromkeys(MODELS, _model),
 }

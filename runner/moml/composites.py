@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -12,21 +11,23 @@ from epicycle.actors import Actor as OwnActor
 
 from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
-from .aspects import MODELS, aspects_of, is_aspect, is_decorated, is_request, is_response
+from .aspects import MODELS, aspects_of, is_aspect, is_request, is_response
 from .counterpart import UNSAID, Counterpart, counterpart_of_type
 from .directors import director_of, said_of
-from .entities import Entity, Property, kind
+from .entities import Entity, Property, kind, version_of
+from .leftovers import about_links, about_ports, about_properties, about_unknown, is_watched
 from .modes import is_machine, machine_part
 from .names import Names, snake
 from .notes import Notes
-from .parts import Level, Part
-from .reach import iterations, leave_out_idle
+from .parts import Level, Part, give_priority
+from .reach import is_fed, iterations, leave_out_idle
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope, is_text, is_variable
 from .syntax import ExpressionError
 from .table import counterpart_of
 from .variables import Variables
-from .whole import whole_ports
+from .whole import array_ports, whole_ports
+from .wires import Counting, connections_of
 from .writing import Flow
 
 COMPOSITES = frozenset({
@@ -52,7 +53,7 @@ class Conversion:
             self.rows[id(each)] = self._row(each, own) if is_row else None
         self._scopes: dict[int, Scope] = {}
         self._nets: dict[int, list[Net]] = {}
-        self._at: dict[int, dict[tuple[str, str], list[Net]]] = {}
+        self._at: dict[int, dict[tuple[str, str, int | None], list[Net]]] = {}
         self.version = version_of(model)
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
@@ -72,7 +73,7 @@ class Conversion:
         """The direction of a port, and whether it is a multiport; None if nothing is to be wired to it."""
         if id(entity) in self.idle:
             return None
-        if (id(entity), port) in self.variables.ports:
+        if self.variables.has_port(entity, port):
             return PortFace("input", False)
         if is_request(entity) or is_response(entity):
             return PortFace("output" if is_request(entity) else "input", False)
@@ -156,8 +157,8 @@ class Conversion:
         for child in entity.entities.values():
             if child.name in level.requests:
                 continue
-            self._about_ports(child, level)
-            self._about_links(child, level)
+            about_ports(self, child, level)
+            about_links(self, child, level)
             part = level.parts[child.name] = self._part(child, level)
             if part is not None:
                 actors[part.name] = part.entry
@@ -181,37 +182,8 @@ class Conversion:
         aspects = {**aspects_of(self, level), **following}
         if aspects:
             found["aspects"] = aspects
-        self._about_properties(level)
+        about_properties(self, level)
         return found
-
-    def _about_ports(self, entity: Entity, level: Level) -> None:
-        """What the file says of ports and has no counterpart."""
-        for port in entity.ports.values():
-            for said in port.properties.values():
-                known = said.name in ("input", "output", "multiport") or is_layout(said) or is_decoration(said)
-                if not known and said.value:
-                    path = (
-                        f"{level.told(entity.name)}.{port.name}"
-                        if entity is not level.entity
-                        else level.told(port.name)
-                    )
-                    self.notes.note(f"{path}.{said.name} = {said.value!r}: has no counterpart")
-
-    def _about_links(self, child: Entity, level: Level) -> None:
-        """Ports to which something is linked, and that actors of ours do not have."""
-        row = self.rows.get(id(child))
-        if row is None or row.is_view:
-            return
-        for name in row.ports:
-            if not row.has_port(name) and level.entity.links.get(f"{child.name}.{name}"):
-                self.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
-
-    def _about_properties(self, level: Level) -> None:
-        for name, said in level.entity.properties.items():
-            if is_layout(said) or is_decoration(said) or is_variable(said) or kind(said).endswith("Director"):
-                continue
-            if said.value is not None or said.java:
-                self.notes.note(f"{level.told(name)}, a {kind(said) or 'property'}: has no counterpart")
 
     def parameters(self, level: Level) -> dict[str, Any]:
         """The parameters that something inside names."""
@@ -226,17 +198,18 @@ class Conversion:
         for port in level.entity.ports:
             face = self.face(level.entity, port)
             if face is not None:
-                for channel in range(self._channels(level.entity, port)):
+                for channel in range(self.channels(level.entity, port)):
                     found[face.direction == "output"].append(self.port_name(level.ports, port, channel))
         for name, ours in level.requests.items():
             found[is_response(level.entity.entities[name])].append(ours)
         for each in self.variables.of(level.entity):
             if each.is_port and each.name not in level.entity.ports:
                 found[0].append(level.ports.of(each.name))
+        found[0].extend(level.added_inputs)
         found[1].extend(level.added_outputs)
         return found
 
-    def _channels(self, entity: Entity, port: str) -> int:
+    def channels(self, entity: Entity, port: str) -> int:
         """How many ports of ours stand for a port of a composite."""
         face = self.face(entity, port)
         if face is None or not face.multi:
@@ -266,14 +239,15 @@ class Conversion:
             self._nets[id(composite)] = self.wiring.nets(composite) if id(composite) in self.wiring.groups else []
         return self._nets[id(composite)]
 
-    def nets_at(self, composite: Entity, actor: str, port: str) -> list[Net]:
-        """The nets at a port of a child, or with no actor at a port of the composite itself."""
+    def nets_at(self, composite: Entity, actor: str, port: str, channel: int | None = None) -> list[Net]:
+        """The nets at a port of a child, or with no actor at a port of the composite itself; or at one channel."""
         if id(composite) not in self._at:
             found = self._at[id(composite)] = {}
             for net in self.nets_of(composite):
-                for place in dict.fromkeys((end.actor, end.port) for end in net.ends):
+                places = [(end.actor, end.port, each) for end in net.ends for each in (None, end.channel)]
+                for place in dict.fromkeys(places):
                     found.setdefault(place, []).append(net)
-        return self._at[id(composite)].get((actor, port), [])
+        return self._at[id(composite)].get((actor, port, channel), [])
 
     def port_name(self, names: Names, port: str, channel: int) -> str:
         """Our name for a channel of a composite's port: each channel is a port by itself."""
@@ -291,75 +265,55 @@ class Conversion:
         if id(child) in self.idle:
             return None
         if row is None:
-            self._unknown(child, level)
+            about_unknown(self, child, level)
             return None
-        if row.is_view and not self._is_watched(child, level):
+        if row.is_view and not is_watched(self, child, level):
             self.notes.count("view")
             return None
+        known = {*row.ports, *child.ports, *child.properties}
         actor = Actor(
             child, level.told(child.name), self.scope_of(child), self.notes, row, level.own_names,
             f".{self.model.name}.{level.told(child.name)}", self._seed, whole_ports(self, level.entity, child),
-            {port: self.wiring.width(level.entity, f"{child.name}.{port}") for port in {*row.ports, *child.ports}},
+            {port: self._fed_width(level.entity, child, port) for port in known},
         )  # fmt: skip
-        actor.follow = lambda ours, text: self.variables.follow(actor, level, ours, text)
+        actor.follow = lambda ours, text, name: self.variables.follow(actor, level, ours, text, name)
+        actor.arrays = array_ports(self, level.entity, child)
+        actor.changing = lambda tree: self.variables.names_in(tree, actor.scope)
         actor.convert()
         level.used |= actor.used
-        part = Part(name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports)
+        part = Part(
+            name, Flow({"type": actor.row.type, **actor.values}), actor.row, actor.ports, frozenset(actor.unwired)
+        )
+        for port, changing in actor.reads.items():
+            self.variables.lead_to(changing, level, f"{name}.{port}")
         if actor.row.type == "SetVariable":
             self.variables.note_setter(child, level, part)
         return part
+
+    @cached_property
+    def counting(self) -> Counting:
+        """How many actors there are at the ends of nets, once it is known who never fires."""
+        return Counting(self)
+
+    def _fed_width(self, composite: Entity, child: Entity, port: str) -> int:
+        """How many channels a port of an actor has; none if it is an input to which nothing sends."""
+        face = self.face(child, port)
+        if face is not None and face.direction == "input" and not is_fed(self, composite, child, port, self.counting):
+            return 0
+        return self.wiring.width(composite, f"{child.name}.{port}")
 
     @cached_property
     def _seed(self) -> object:
         """The seed that all random actors share: a value that one of them gives counts for the others."""
         for each in self.model.everything():
             said, row = each.properties.get("seed"), self.rows.get(id(each))
-            if said is not None and row is not None and row.type in ("Random", "PoissonClock"):
+            if said is not None and row is not None and row.type in ("Random", "VaryingRandom", "PoissonClock"):
                 try:
                     if (seed := self.scope_of(each).value_of(said)) not in (0, None):
                         return seed
                 except ExpressionError:
                     continue
         return 0
-
-    def _unknown(self, child: Entity, level: Level) -> None:
-        told = level.told(child.name)
-        linked = [
-            port.rpartition(".")[2]
-            for port, links in level.entity.links.items()
-            if port.startswith(f"{child.name}.") and links
-        ]
-        if not linked and is_layout(child):
-            return
-        if not linked:
-            self.notes.note(
-                f"{told} is a {child.java}, has no counterpart, and is left out: nothing is connected to it"
-            )
-        elif all(self._only_takes(child, port) for port in linked):
-            self.notes.note(f"{told} is a {child.java}, has no counterpart, and is left out: it only takes what comes")
-        else:
-            self.notes.error(f"{told} is a {child.java}, which has no counterpart")
-
-    def _only_takes(self, child: Entity, port: str) -> bool:
-        face = self.face(child, port)
-        return face is not None and face.direction == "input" and (port.startswith("input") or port in child.ports)
-
-    def _is_watched(self, child: Entity, level: Level) -> bool:
-        """Whether a view cannot be left out: an aspect stands there, or it takes a channel of a multiport."""
-        if is_decorated(child):
-            return True
-        relations = {
-            link.relation
-            for port, links in level.entity.links.items()
-            if port.startswith(f"{child.name}.")
-            for link in links
-        }
-        for port, links in level.entity.links.items():
-            face = self.wiring._face(level.entity, port)
-            is_one = face is not None and face.multi and face.direction == "output" and "." in port and len(links) > 1
-            if is_one and relations & {link.relation for link in links}:
-                return True
-        return False
 
     def composite_part(self, child: Entity, level: Level, name: str) -> Part:
         """A composite as an instance of a class of ours."""
@@ -371,9 +325,7 @@ class Conversion:
             if body.get("actors"):
                 body = _with_director(body, found)
         entry = self.instance(child, body, values)
-        for said in child.properties.values():
-            if said.name == "_priority" or kind(said) == "Priority":
-                entry["priority"] = inner.scope.value_of(said)
+        give_priority(entry, child, inner.scope, self.notes)
         return Part(name, entry)
 
     def class_name(self, name: str) -> str:
@@ -397,8 +349,6 @@ class Conversion:
     # -- wires ----------------------------------------------------------------------------------------------------
 
     def _connections(self, level: Level) -> list[Any]:
-        from .wires import connections_of
-
         return connections_of(self, level)
 
     def end(self, level: Level, end: End) -> tuple[str, bool] | None:
@@ -414,6 +364,9 @@ class Conversion:
         part = level.parts.get(end.actor)
         if part is None or end.port in part.unwired:
             return None
+        if end.port in part.channels:
+            ours = part.channels[end.port][end.channel]
+            return None if ours is None else (f"{part.name}.{ours}", face.direction == "output")
         return f"{part.name}.{self.port_of(entity, part, end.port, end.channel)}", face.direction == "output"
 
     def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str:
@@ -425,12 +378,6 @@ class Conversion:
         if port in part.row.ports:
             return part.row.ports[port].ours
         return part.row.parameters[port].ours if port in part.row.parameters else snake(port)
-
-
-def version_of(model: Entity) -> tuple[int, int]:
-    """The version of Ptolemy that wrote a model; a recent one if that is not said."""
-    said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
-    return (int(said[1]), int(said[2])) if said is not None else (11, 0)
 
 
 def is_composite(entity: Entity) -> bool:

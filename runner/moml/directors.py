@@ -8,6 +8,7 @@ from typing import Any
 from .actors import is_layout, plain, seconds
 from .entities import Entity, Property, kind
 from .notes import Notes
+from .reasons import why_not
 from .scope import Scope
 from .syntax import ExpressionError
 
@@ -16,10 +17,12 @@ _FIRED_WHOLE = frozenset({
     "SDFDirector", "SROnceDirector", "SRDirector", "DDFDirector", "HDFDirector", "PSDFDirector", "FSMDirector",
     "MultirateFSMDirector", "TMDirector", "GiottoDirector",
 })  # fmt: skip
+_IN_ITERATIONS = frozenset({"SDFDirector", "SRDirector", "SROnceDirector"})  # which a clock can start, of a model, too
+NUMBERS = {"AUTO": -1, "UNBOUNDED": 0}  # what iterations are called
 _WITHOUT_EFFECT = frozenset({
     "binCountFactor", "isCQAdaptive", "minBinCount", "maskImpliedFirings", "timeResolution", "verbose",
     "allowDisconnectedGraphs", "allowRateChanges", "vectorizationFactor", "stopWhenQueueIsEmpty", "seed",
-    "constrainBufferSizes", "enforceMicrostepSemantics", "SuppressWarnings",
+    "constrainBufferSizes", "enforceMicrostepSemantics", "SuppressWarnings", "period", "AUTO", "UNBOUNDED",
 })  # fmt: skip
 _IN_REAL_TIME = frozenset({"synchronizeToRealTime", "timeScale", "realTime"})
 
@@ -38,11 +41,11 @@ def fires_whole(director: Property) -> bool:
 def said_of(director: Property, path: str, around: Scope, notes: Notes, *, of_model: bool) -> dict[str, Any]:
     """What is said of a director, its stop time included, in s."""
     found: dict[str, Any] = {}
-    scope = Scope(director, around)
-    if fires_whole(director) and not of_model:
+    scope = Scope(director, around, NUMBERS)
+    if fires_whole(director) and (not of_model or kind(director) in _IN_ITERATIONS):
         notes.note(f"{path}, a {kind(director)}: what is inside fires by the rules of DE")
     elif kind(director) not in _DE_LIKE:
-        notes.error(f"{path} is a {director.java}, which has no counterpart")
+        notes.error(f"{path} is a {director.java}, which has no counterpart{why_not(director.java)}")
     for name, said in director.properties.items():
         if is_layout(said) or name in _WITHOUT_EFFECT:
             continue

@@ -6,6 +6,7 @@ the file defines begins as a copy of it, so what comes out knows no classes any 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -297,6 +298,12 @@ def _inherited(entity: Entity) -> None:
         for owner in (each, *each.ports.values()):
             for said in owner.properties.values():
                 said.own = False
+
+
+def version_of(model: Entity) -> tuple[int, int]:
+    """The version of Ptolemy that wrote a model; a recent one if that is not said."""
+    said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
+    return (int(said[1]), int(said[2])) if said is not None else (11, 0)
 
 
 def _down(entity: Entity, names: list[str]) -> Entity | None:

@@ -17,8 +17,12 @@ from .directors import director_of, said_of
 from .document import MomlError, read_document
 from .entities import Builder, Entity
 from .former import rename_former
+from .higher_order import plain_composites
+from .instances import expand_instances
+from .iterations import plain_iterations
 from .names import Names
 from .notes import Notes
+from .publishing import plain_channels
 from .writing import Flow, block
 
 LIKE = {"like": "ptolemy"}
@@ -60,6 +64,10 @@ def _refusal(name: str, reasons: list[str]) -> str:
 
 def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]) -> str:
     rename_former(model)
+    expand_instances(model, notes)
+    plain_composites(model, notes)
+    plain_iterations(model, notes)
+    plain_channels(model, notes)
     join_channels(model, notes)
     conversion = Conversion(model, notes, own)
     level = conversion.level(model, "")

@@ -6,21 +6,19 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from .actors import is_decoration, is_layout, plain, seconds
+from .actors import is_decoration, is_layout, plain
 from .directors import director_of, said_of
 from .entities import Entity, Property, Relation, kind
 from .names import Names
-from .parts import Converting, Level, Part
+from .parts import Converting, Level, Part, give_priority
 from .scope import is_variable
-from .syntax import Binary, Call, Const, ExpressionError, Name, Tree
-from .translate import names_of, translated
+from .syntax import ExpressionError
+from .words import QUOTED, Words
 from .writing import Flow
 
 MACHINES = frozenset({"FSMActor", "ModalController", "InterfaceAutomaton", "FSMActorModal"})
 _RESERVED = ("mode", "trigger", "time", "mode_time", "error", "machine")
-_PRESENT = "_isPresent"
 _WORD = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
-_QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 _LAST_WITH_HISTORY = (9, 0)  # versions up to here took transitions for those with history
 _FLAGS = {"preemptive": "preemptive", "immediate": "immediate", "nondeterministic": "nondeterministic",
           "defaultTransition": "else", "error": "error"}  # fmt: skip
@@ -57,19 +55,22 @@ class _Machine:
     ports: Names  # of ports and variables
     states: Names = field(default_factory=Names)
     variables: dict[str, str] = field(default_factory=dict)  # ours
-    asked: set[str] = field(default_factory=set)  # names in guards and actions
-    sent: set[str] = field(default_factory=set)  # outputs of actions
 
     def __post_init__(self) -> None:
         self.scope = self.conversion.scope_of(self.controller)
         owner = self.entity if self.entity.ports else self.controller
         said = {**self.controller.ports, **owner.ports}
         self.inputs = {
-            name: self.ports.of(name) for name, port in said.items() if port.flag("input") and not port.flag("output")
+            name: self._channels(owner, name)
+            for name, port in said.items()
+            if port.flag("input") and not port.flag("output")
         }
-        self.outputs = {name: self.ports.of(name) for name, port in said.items() if port.flag("output")}
+        self.outputs = {name: self._channels(owner, name) for name, port in said.items() if port.flag("output")}
+        heard = {} if self.entity is self.controller else self.outputs  # what refinements send
+        self.words = Words(self.scope, {**self.inputs, **heard}, self.outputs, self.variables, self.tell)
+        taken = {ours for names in (*self.inputs.values(), *self.outputs.values()) for ours in names}
         for transition in self.controller.relations.values():
-            for name, _ in self._actions(transition, "setActions"):
+            for name in self.words.targets(transition, "setActions"):
                 if (
                     "." not in name
                     and "(" not in name
@@ -79,10 +80,15 @@ class _Machine:
                     self.variables[name] = self.ports.of(name)
                 elif (inner := self._inner_of(name)) is not None:
                     ours = self.ports.of(inner[1])
-                    taken = {each: said for each, said in self.variables.items() if each != name}
-                    if ours not in {**self.inputs, **self.outputs, **taken}.values():
+                    others = {said for each, said in self.variables.items() if each != name}
+                    if ours not in taken | others:
                         self.variables[name] = ours  # else two refinements, or a port, would have it by one name
         self._hand()
+
+    def _channels(self, owner: Entity, name: str) -> list[str]:
+        """Our names for a port: each channel is a port by itself."""
+        conversion = self.conversion
+        return [conversion.port_name(self.ports, name, channel) for channel in range(conversion.channels(owner, name))]
 
     def _inner_of(self, name: str) -> tuple[Entity, str] | None:
         """The refinement, and the parameter of it, that an action sets; None if it does not."""
@@ -243,8 +249,8 @@ class _Machine:
                 f"{self.path}.{transition.name}: a refinement of a transition has no counterpart"
             )
         try:
-            said = self._guard(transition)
-            actions = [*self._said_actions(transition, "outputActions"), *self._said_actions(transition, "setActions")]
+            said = self.words.guard(transition)
+            actions = [*self.words.actions(transition, "outputActions"), *self.words.actions(transition, "setActions")]
         except ExpressionError as error:
             self.conversion.notes.error(f"{self.path}.{transition.name}: {error}")
             return None
@@ -280,116 +286,13 @@ class _Machine:
             and bool((found.text("refinementName") or "").strip())
         )
 
-    def _names(self) -> dict[str, str]:
-        """What guards and actions name, and how that is said here."""
-        found: dict[str, str] = {}
-        for name, ours in {**self.inputs, **self._heard()}.items():
-            for suffix in ("", "_0"):
-                found[f"{name}{suffix}"] = ours
-                found[f"{name}{suffix}{_PRESENT}"] = f"{ours}_is_present"
-        return {**found, **self.variables, "time": "time"}
-
-    def _heard(self) -> dict[str, str]:
-        """What refinements send, which guards may ask for."""
-        return {} if self.entity is self.controller else self.outputs
-
-    def _guard(self, transition: Relation) -> dict[str, str]:
-        """``on``, ``after`` and ``when`` of a guard."""
-        text = (transition.text("guardExpression") or "").strip()
-        if not text or text == "true":
-            return {}
-        parts, said, rest = _conjuncts(self.scope.tree(self.scope.filled(text))), dict[str, str](), list[Tree]()
-        names = self._names()
-        for part in parts:
-            match part:
-                case Name(name) if name.endswith(_PRESENT) and name in names and "on" not in said:
-                    said["on"] = names[name].removesuffix("_is_present")
-                case Call(Name("timeout"), (argument,)) if "after" not in said:
-                    said["after"] = self._time(argument, names)
-                case Const(True):
-                    pass
-                case _:
-                    rest.append(part)
-        if rest:
-            whole = rest[0]
-            for part in rest[1:]:
-                whole = Binary("&&", whole, part)
-            said["when"] = translated(whole, names, self.scope)
-        self.asked.update(*map(names_of, parts))
-        return said
-
-    def unwired(self) -> frozenset[str]:
-        """The ports that no guard or action names."""
-        asked = {re.sub(r"(_\d+)?(_isPresent)?\Z", "", name) for name in self.asked} | self.asked
-        unread = {name for name in self.inputs if name not in asked}
-        for name in sorted(unread):
-            self.tell(f"{name} is left out: nothing reads it")
-        return frozenset(unread | {name for name in self.outputs if name not in self.sent})
-
-    def _time(self, tree: Tree, names: dict[str, str]) -> str:
-        text = translated(tree, names, self.scope)
-        try:
-            return str(seconds(float(text)))
-        except ValueError:
-            return text
-
-    def _actions(self, transition: Relation, name: str) -> list[tuple[str, str]]:
-        """What actions set, and to what."""
-        found = []
-        for part in _split(transition.text(name) or ""):
-            target, equals, value = part.partition("=")
-            if equals and target.strip():
-                found.append((target.strip(), value.strip()))
-            elif part.strip():
-                self.tell(f"{transition.name}: the action {part.strip()!r} is not understood, and left out")
-        return found
-
-    def _said_actions(self, transition: Relation, name: str) -> list[str]:
-        said = []
-        for target, text in self._actions(transition, name):
-            port, _, channel = target.partition("(")
-            port = port.strip()
-            if channel and channel.strip(" )") != "0":
-                raise ExpressionError(f"{target} = ...: an action for one channel has no counterpart")
-            ours = self.outputs.get(port) or self.variables.get(port)
-            if ours is None:
-                self.tell(f"{transition.name}: {target} = {text} is left out: {port} is no output and no variable here")
-                continue
-            tree = self.scope.tree(self.scope.filled(text))
-            value = translated(tree, self._names(), self.scope)
-            self.asked |= names_of(tree)
-            self.sent.add(port)
-            said.append(f"{ours} = {value}")
-        return said
-
-
-def _conjuncts(tree: Tree) -> list[Tree]:
-    found, waiting = [], [tree]
-    while waiting:
-        each = waiting.pop()
-        if isinstance(each, Binary) and each.sign in ("&&", "&"):
-            waiting += [each.right, each.left]
-        else:
-            found.append(each)
-    return found
-
-
-def _split(text: str) -> list[str]:
-    """Actions between semicolons, those in texts and brackets not counted."""
-    masked = _QUOTED.sub(lambda match: "_" * len(match[0]), text)
-    depth, start, found = 0, 0, []
-    for place, character in enumerate(masked):
-        depth += (character in "([{") - (character in ")]}")
-        if character == ";" and depth <= 0:
-            found.append(text[start:place])
-            start = place + 1
-    return [*found, text[start:]]
-
 
 def _line(source: str, target: str, flags: list[str], said: dict[str, str]) -> Any:
     """A transition on one line, or as a mapping where its words could be mistaken."""
-    if any(_WORD.search(_QUOTED.sub("", each)) for each in said.values()):
+    if " " in said.get("probability", "") or any(_WORD.search(QUOTED.sub("", each)) for each in said.values()):
         return Flow({"from": source, "to": target, **dict.fromkeys(flags, True), **said})
+    if "probability" in said:
+        flags = [*flags, f"probability {said['probability']}"]
     clauses = [f"{key} {said[key]}" for key in ("on", "after", "when", "do") if key in said]
     return " ".join([f"{source} -> {target}", *flags, *clauses])
 
@@ -405,15 +308,17 @@ def machine_part(conversion: Converting, child: Entity, level: Level, name: str)
     ports = Names(_RESERVED, in_expressions=True)
     machine = _Machine(conversion, child, controller, path, f"{level.at}{name}.", level, ports)
     _tell_rest(conversion, child, path, machine)
-    unwired: frozenset[str] = frozenset()
+    channels: dict[str, list[str | None]] = {
+        name: [*ours] for name, ours in {**machine.inputs, **machine.outputs}.items()
+    }
     if child is controller:
         entry = Flow({"type": "StateMachine", **machine.written()})
-        unwired = machine.unwired()
+        channels = machine.words.wired()
     else:
         entry = conversion.instance(child, _class(machine), {})
-    if (priority := child.properties.get("_priority")) is not None and priority.value:
-        entry["priority"] = conversion.scope_of(child).value_of(priority)
-    return Part(name, entry, ports={**machine.inputs, **machine.outputs}, unwired=unwired)
+    give_priority(entry, child, conversion.scope_of(child), conversion.notes)
+    first = {name: ours[0] for name, ours in {**machine.inputs, **machine.outputs}.items()}
+    return Part(name, entry, ports=first, channels=channels)
 
 
 def _class(machine: _Machine) -> dict[str, Any]:
@@ -422,9 +327,9 @@ def _class(machine: _Machine) -> dict[str, Any]:
     if machine.entity.doc:
         found["doc"] = " ".join(machine.entity.doc.split())
     if machine.inputs:
-        found["inputs"] = list(machine.inputs.values())
+        found["inputs"] = [ours for names in machine.inputs.values() for ours in names]
     if machine.outputs:
-        found["outputs"] = list(machine.outputs.values())
+        found["outputs"] = [ours for names in machine.outputs.values() for ours in names]
     return {**found, **said}
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 from .counterpart import Counterpart
-from .entities import Entity
+from .entities import Entity, kind
 from .names import Names
 from .notes import Notes
 from .relations import End, Net, PortFace, Wiring
 from .scope import Scope
+from .syntax import ExpressionError
 from .writing import Flow
 
 
@@ -24,6 +26,7 @@ class Part:
     row: Counterpart | None = None  # of an actor
     ports: Mapping[str, str] = field(default_factory=dict)
     unwired: frozenset[str] = frozenset()  # ports there for which there is none of ours
+    channels: Mapping[str, Sequence[str | None]] = field(default_factory=dict)  # ours, where each is a port by itself
 
 
 @dataclass
@@ -42,12 +45,44 @@ class Level:
     used: set[str] = field(default_factory=set)
     parts: dict[str, Part | None] = field(default_factory=dict)
     requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are actors there
+    added_inputs: list[str] = field(default_factory=list)  # by which something in it knows a variable around it
     added_outputs: list[str] = field(default_factory=list)  # by which something in it sets a variable around it
     added_connections: list[str] = field(default_factory=list)
+
+    @cached_property
+    def linked(self) -> dict[str, list[str]]:
+        """The ports of each child to which something is linked."""
+        found: dict[str, list[str]] = {}
+        for path, links in self.entity.links.items():
+            actor, _, port = path.rpartition(".")
+            if links:
+                found.setdefault(actor, []).append(port)
+        return found
 
     def told(self, name: str) -> str:
         """The path of something within, for messages."""
         return f"{self.path}.{name}" if self.path else name
+
+
+@dataclass
+class Changing:
+    """One parameter that changes."""
+
+    owner: Entity
+    name: str
+    delayed: bool = True
+    is_port: bool = False  # of a composite, by which its values come
+    actor: str = ""  # our name of the Variable
+    setters: list[str] = field(default_factory=list)  # what leads to it, as seen from the owner
+    readers: list[tuple[str, str]] = field(default_factory=list)  # where parameters go by it, and how
+    inputs: list[str] = field(default_factory=list)  # to which it leads
+
+
+class CountsEnds(Protocol):
+    """Who knows how many actors send into a net, and how many take what it carries."""
+
+    def senders(self, composite: Entity, ends: list[End]) -> int: ...
+    def receivers(self, composite: Entity, ends: list[End]) -> int: ...
 
 
 class Converting(Protocol):
@@ -69,11 +104,25 @@ class Converting(Protocol):
     def is_linked(self, entity: Entity, port: str) -> bool: ...
     def hand(self, refinement: Entity, name: str) -> None: ...
     def nets_of(self, composite: Entity) -> list[Net]: ...
-    def nets_at(self, composite: Entity, actor: str, port: str) -> list[Net]: ...
+    @property
+    def counting(self) -> CountsEnds: ...
+    def nets_at(self, composite: Entity, actor: str, port: str, channel: int | None = None) -> list[Net]: ...
     def end(self, level: Level, end: End) -> tuple[str, bool] | None: ...
+    def port_name(self, names: Names, port: str, channel: int) -> str: ...
+    def channels(self, entity: Entity, port: str) -> int: ...
     def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str: ...
     def level(self, entity: Entity, path: str, at: str = "", outer: Level | None = None) -> Level: ...
     def body(self, level: Level) -> dict[str, Any]: ...
     def parameters(self, level: Level) -> dict[str, Any]: ...
     def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow: ...
     def composite_part(self, child: Entity, level: Level, name: str) -> Part: ...
+
+
+def give_priority(entry: Flow, entity: Entity, scope: Scope, notes: Notes) -> None:
+    """Put the priority of a composite or machine into its entry, if it has one."""
+    for said in entity.properties.values():
+        if (said.name == "_priority" or kind(said) == "Priority") and (said.value or "").strip():
+            try:
+                entry["priority"] = scope.value_of(said)
+            except ExpressionError as error:
+                notes.note(f"{entity.name}.{said.name} = {said.value!r}: {error}")

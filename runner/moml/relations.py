@@ -5,9 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from .entities import Entity, Link
+from .entities import Entity, Link, kind
 
 MAX_WIDTH = 1000
+_IN, _OUT = "input", "output"
+# Multiports of which there are as many channels as of another; and whether that tells of the other, too.
+_AS_WIDE: dict[str, tuple[tuple[str, str, bool], ...]] = {
+    **dict.fromkeys(("BooleanSelect", "ConfigurationSelect"), ((_OUT, "trueInput", True), (_OUT, "falseInput", True))),
+    **dict.fromkeys(("BooleanSwitch", "ConfigurationSwitch"), (("trueOutput", _IN, True), ("falseOutput", _IN, True))),
+    **dict.fromkeys(
+        ("Sampler", "Sleep", "Synchronizer", "IsPresent", "TrueGate", "EventFilter", "Inhibit"), ((_OUT, _IN, True),)
+    ),
+    **dict.fromkeys(("MostRecent", "Register", "SamplerWithDefault"), ((_OUT, _IN, False),)),
+}
 
 
 @dataclass(frozen=True)
@@ -127,6 +137,11 @@ class Wiring:
             for port, links in composite.links.items():
                 actor, _, name = port.rpartition(".")
                 child = composite.entities.get(actor)
+                for one, other, is_mutual in () if child is None else _AS_WIDE.get(kind(child), ()):
+                    if name in (one, other):
+                        of_one, of_other = (composite.links.get(f"{actor}.{each}", []) for each in (one, other))
+                        found = self._balance(outer, of_other, outer, of_one) or found
+                        found = (is_mutual and self._balance(outer, of_one, outer, of_other)) or found
                 if child is None or id(child) not in self.groups or name not in child.links:
                     continue
                 inner, inside = self.groups[id(child)], child.links[name]
@@ -138,10 +153,13 @@ class Wiring:
     def _balance(self, known: Groups, links: list[Link], open_: Groups, others: list[Link]) -> bool:
         widths = [known.width[group] for link in links if (group := known.of(link)) is not None]
         unknown = [group for link in others if (group := open_.of(link)) is not None and open_.width[group] is None]
-        if None in widths or len(unknown) != 1:
+        if None in widths or not unknown or not links:
             return False
-        taken = open_.total(others)
-        open_.width[unknown[0]] = max(known.total(links) - taken, 0)
+        difference = max(known.total(links) - open_.total(others), 0)
+        if len(unknown) not in (1, difference) and difference:
+            return False  # which of them has how many cannot be told
+        for group in unknown:
+            open_.width[group] = difference // len(unknown)
         return True
 
     def width(self, composite: Entity, port: str) -> int:

@@ -3,18 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
-
-from epicycle import actors
-from epicycle.actors import declared_parameters
-
-from .actors import plain
-from .names import Names
-from .syntax import ExpressionError
-from .translate import names_of, translated
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .actors import Actor
@@ -36,6 +26,65 @@ def old_clock(actor: Actor) -> None:
     count = actor.get("numberOfCycles", -1)
     if isinstance(count, (int, float)) and count > 0:
         actor.values["cycles"] = int(count) + 1
+
+
+def sequential_clock(actor: Actor) -> None:
+    """The clock of former versions, which counts its cycles from its first tick."""
+    offsets = actor.get("offsets", [0.0, 1.0])
+    actor.told.discard("offsets")
+    if offsets and offsets[0]:
+        actor.notes.note(
+            f"{actor.path}.offsets: the first is {offsets[0]}, from which cycles count there, and here from 0"
+        )
+
+
+def _has_local_time(actor: Actor) -> bool:
+    """Whether there may be a time of its own where it is."""
+    around, found = actor.scope.around, False
+    while around is not None and around.around is not None:
+        found = found or any(each.java.endswith("Director") for each in around.entity.properties.values())
+        around = around.around
+    return found
+
+
+def global_time(actor: Actor) -> None:
+    """The time of the model."""
+    if _has_local_time(actor):
+        actor.notes.note(f"{actor.path} sends the time of the model, here that of the composite")
+
+
+def local_time(actor: Actor) -> None:
+    """The time where it is, unless it shall be that of the model."""
+    if actor.get("useLocalTime", True) is False:
+        global_time(actor)
+
+
+def wall_clock(actor: Actor) -> None:
+    """What it sends is the time since the run began, of which no model tells."""
+    actor.notes.note(f"{actor.path} sends how long the run has taken, in s: here 0.0")
+
+
+def depths(actor: Actor) -> None:
+    """What it sends names all that Ptolemy's director knows."""
+    actor.notes.note(f"{actor.path} sends the depths of all actors and ports there: here an empty text")
+
+
+def ramp(actor: Actor) -> None:
+    """A Ramp of numbers that are not whole, where such may come for its step or its beginning."""
+    ports = [name for name in ("init", "step") if actor.widths.get(name, 0)]
+    init = actor.get("init", 0)
+    actor.told.discard("init")
+    if any(name not in actor.whole for name in ports) and type(init) is int:
+        actor.told.add("init")
+        actor.values["init"] = float(init)
+
+
+def chosen_input(actor: Actor) -> None:
+    """A ConfigurationSelect, of whose inputs one passes."""
+    names = ("trueInput", "falseInput")
+    chosen, other = names if actor.get("selector", False) is True else names[::-1]
+    actor.ports[chosen] = "input"
+    actor.unwired.add(other)
 
 
 def positive(*names: str) -> Special:
@@ -63,73 +112,6 @@ def single_event(actor: Actor) -> None:
 def text_value(actor: Actor) -> None:
     """The value of a StringConst is a text as it stands."""
     actor.values["value"] = actor.text("value").replace("${", "$${")
-
-
-def expression(actor: Actor) -> None:
-    """An Expression, whose inputs are ports that somebody added."""
-    said = actor.said("expression")
-    actor.told.add("expression")
-    text = (said.value if said is not None else "") or ""
-    names = Names(("output", "gives", "hold"), in_expressions=True)
-    for port in actor.entity.ports.values():
-        if port.flag("input"):
-            actor.ports[port.name] = names.of(port.name)
-    for name, ours in names.renamed().items():
-        actor.notes.note(f"{actor.path}.{name} is called {ours}")
-    try:
-        tree = actor.scope.tree(text)
-        known = {**actor.ports, "time": "time", "iteration": "iteration"}
-        ours = translated(tree, known, actor.scope, {*actor.whole, "iteration"})
-    except ExpressionError as error:
-        actor.notes.error(f"{actor.path}: expression: {error}")
-        return
-    if "iteration" in names_of(tree):
-        actor.values["iteration"] = True
-    actor.values["expression"] = _with_all(
-        ours, [each for port, each in actor.ports.items() if actor.widths.get(port, 0)]
-    )
-
-
-def _with_all(text: str, ports: list[str]) -> str:
-    """The expression, in which all ports are named: one that is not would be no port."""
-    left = [each for each in ports if not re.search(rf"(?<!\w){each}(?!\w)", text)]
-    return f"[{text}, {', '.join(left)}][0]" if left else text
-
-
-def formula(template: str, **defaults: object) -> Special:
-    """An Expression for an actor that computes something: ``{name}`` is a parameter, or the port of that name.
-
-    Where something is linked to such a port, it holds its latest token, and what the parameter says up to the first.
-    """
-
-    def convert(actor: Actor) -> None:
-        said: dict[str, str] = {}
-        held: dict[str, object] = {}
-        for name in re.findall(r"\{(\w+)\}", template):
-            value = actor.get(name, defaults.get(name))
-            if actor.widths.get(name, 0):
-                said[name] = name
-                if value is not None:
-                    held[name] = plain(value)
-            else:
-                said[name] = f"({value!r})" if isinstance(value, (int, float)) and value < 0 else repr(value)
-        if held:
-            actor.values |= {"type": "HoldingExpression", "held": held}
-        actor.values["expression"] = re.sub(r"\{(\w+)\}", lambda match: said[match[1]], template)
-
-    return convert
-
-
-def array_extract(actor: Actor) -> None:
-    """ArrayExtract, with zeros before and behind."""
-    part = "input[{sourcePosition}:{sourcePosition} + {extractLength}]"
-    is_whole = not any(actor.widths.get(name, 0) for name in ("destinationPosition", "outputArrayLength"))
-    length = None if actor.widths.get("extractLength", 0) else actor.get("extractLength", 1)
-    if not is_whole or actor.get("destinationPosition", 0) != 0 or actor.get("outputArrayLength", 1) != length:
-        zero = "[input[0] * 0]"
-        part = f"({zero} * {{destinationPosition}} + {part} + {zero} * {{outputArrayLength}})[:{{outputArrayLength}}]"
-    positions = {"sourcePosition": 0, "extractLength": 1, "destinationPosition": 0, "outputArrayLength": 1}
-    formula(part, **positions)(actor)
 
 
 _OF_PATTERNS = frozenset("\\^$.|?*+()[]{}")
@@ -165,104 +147,11 @@ def index_of(actor: Actor) -> None:
         actor.notes.error(f"{actor.path}.searchForwards = false: has no counterpart")
 
 
-def blocks(template: str, number: str = "1", *, items: bool = True, **defaults: object) -> Special:
-    """A BlockExpression: ``{name}`` is a parameter, ``number`` the one that says how long a block is, or a number."""
-
-    def convert(actor: Actor) -> None:
-        found = {name: actor.get(name, value) for name, value in defaults.items()}
-        if not all(isinstance(each, int) for each in found.values()):
-            actor.notes.error(f"{actor.path}: its parameters are no whole numbers")
-            return
-        count = found[number] if number in found else int(number)
-        actor.values |= {"number": count, "expression": template.format(**found)}
-        if items:
-            actor.values["items"] = True
-
-    return convert
-
-
-def up_sample(actor: Actor) -> None:
-    """UpSample, whose phase is the last by default."""
-    factor = actor.get("factor", 2)
-    phase = actor.get("phase", factor - 1)
-    zero = "[block[0] * 0]"
-    actor.values |= {"expression": f"{zero} * {phase} + block + {zero} * {factor - 1 - phase}", "items": True}
-
-
-def chop(actor: Actor) -> None:
-    """Chop: a part of each block, or more than that, with what came before it or zeros."""
-    read, write = actor.get("numberToRead", 128), actor.get("numberToWrite", 64)
-    offset, uses_past = actor.get("offset", 0), actor.get("usePastInputs", True) is not False
-    front, part, zero = "", "block", "[block[0] * 0]"
-    if offset > 0:
-        front = "past + " if uses_past else f"{zero} * {offset} + "
-        if uses_past:
-            actor.values["past"] = [0] * offset
-    elif offset < 0:
-        part = f"block[{-offset}:]"
-    behind = write - (read + offset)
-    text = f"{front}{part}" + (f" + {zero} * {behind}" if behind > 0 else "")
-    text = f"({text})[:{write}]" if behind < 0 else text
-    actor.values |= {"number": read, "expression": text, "items": True}
-
-
-def delay_line(actor: Actor) -> None:
-    """DelayLine: the latest first."""
-    initial = [plain(each) for each in actor.get("initialValues", [0, 0, 0, 0])]
-    actor.values |= {"past": initial[-2::-1], "expression": "block + past[::-1]"}
-
-
-def repeat(actor: Actor) -> None:
-    """Repeat, of single tokens or of blocks."""
-    if (size := actor.get("blockSize", 1)) == 1:
-        return
-    if actor.widths.get("numberOfTimes", 0):
-        actor.notes.error(f"{actor.path}.blockSize = {size!r}: has no counterpart where the number comes by a port")
-    times = actor.get("numberOfTimes", 2)
-    actor.values = {"type": "BlockExpression", "number": size, "expression": f"block * {times}", "items": True}
-
-
 def record_updater(actor: Actor) -> None:
     """A RecordUpdater, whose further inputs are fields."""
     names = [port.name for port in actor.entity.ports.values() if port.flag("input") and port.name != "input"]
     actor.ports |= {name: name for name in names}
     actor.values |= {"fields": names, "onto": "input"}
-
-
-def single(port: str) -> Special:
-    """An actor whose channels go their own ways, which ours cannot."""
-
-    def convert(actor: Actor) -> None:
-        if (width := actor.widths.get(port, 0)) > 1:
-            actor.notes.error(f"{actor.path}.{port} has {width} channels, each of which has no counterpart")
-
-    return convert
-
-
-def quantizer(actor: Actor) -> None:
-    """Quantizer: the level that is nearest, of two the lower one; without levels, steps from 0 on."""
-    levels = [float(each) for each in actor.get("levels", [-1.0, 1.0]) or ()]
-    step = float(actor.get("delta", 1.0))
-    if not levels:
-        actor.values["expression"] = f"{step!r} * floor(input / {step!r})"
-        return
-    parts = [f"{low!r} if input <= {(low + high) / 2.0!r} else " for low, high in pairwise(levels)]
-    actor.values["expression"] = "".join(parts) + (repr(levels[-1]) if parts else f"input * 0.0 + {levels[-1]!r}")
-
-
-def decibel(actor: Actor) -> None:
-    """DB: of an amplitude, or of a power, and no less than its ``min``."""
-    factor = 10.0 if actor.get("inputIsPower", False) is True else 20.0
-    least = float(actor.get("min", -100.0))
-    actor.values["expression"] = f"max({factor} * log(input, 10), {least!r}) if input > 0 else {least!r}"
-
-
-def array_sort(actor: Actor) -> None:
-    """ArraySort, in one direction or the other, of equals all or one."""
-    text = "sorted(input)"
-    if actor.get("allowDuplicates", True) is False:
-        text = f"[{text}[k] for k in range(len(input)) if k == 0 or {text}[k] != {text}[k - 1]]"
-    actor.values["expression"] = text if actor.get("ascending", True) is not False else f"{text}[::-1]"
 
 
 def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Special:
@@ -279,27 +168,6 @@ def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Spec
     return convert
 
 
-def math_function(actor: Actor) -> None:
-    """MathFunction, whose modulo has two operands."""
-    word = actor.text("function", "exp")
-    if word == "modulo":
-        actor.values = {
-            "type": "Expression",
-            "expression": "firstOperand - secondOperand * int(firstOperand / secondOperand)",
-        }
-        actor.ports |= {"firstOperand": "firstOperand", "secondOperand": "secondOperand"}
-        return
-    actor.ports |= {"firstOperand": "input"}
-    actor.values["function"] = word
-
-
-def rounding(actor: Actor) -> None:
-    """Round, of which the half goes up and truncation is a function of its own."""
-    words = {"ceil": "ceil(input)", "floor": "floor(input)", "round": "floor(input + 0.5)", "truncate": "int(input)"}
-    word = actor.text("function", "round")
-    actor.values["expression"] = words.get(word, words["round"])
-
-
 def sequence(actor: Actor) -> None:
     """A Sequence that repeats has nothing to hold."""
     if actor.get("repeat", False) is True:
@@ -310,84 +178,6 @@ def sequence(actor: Actor) -> None:
 def execution_time(actor: Actor) -> None:
     """What it sends is how long the computer took, which no model tells."""
     actor.notes.note(f"{actor.path} sends how long a computation took, in ms: here 0")
-
-
-def random(law: str, **parameters: str) -> Special:
-    """A Random with a distribution: ``ours="theirs=default"``."""
-
-    def convert(actor: Actor) -> None:
-        found: dict[str, Any] = {"type": law}
-        for ours, said in parameters.items():
-            name, _, default = said.partition("=")
-            if actor.widths.get(name, 0):
-                actor.notes.error(f"{actor.path}.{name}: a distribution that changes in a run has no counterpart")
-            value = actor.get(name, actor.scope.value(default))
-            parameter = declared_parameters(getattr(actors, law))[ours]
-            if parameter.required or parameter.default != value:
-                found[ours] = value
-        actor.values["distribution"] = found
-        generator(actor)
-
-    return convert
-
-
-def java_hash(text: str) -> int:
-    """The hash of a text in Java."""
-    found = 0
-    for character in text:
-        found = (31 * found + ord(character)) % 2**32
-    return found - 2**32 if found >= 2**31 else found
-
-
-def generator(actor: Actor) -> None:
-    """The numbers of Java's generators, where the model fixes them: by a seed of its own, or by the shared one."""
-    own, shared = actor.get("privateSeed"), actor.get("seed", actor.seed)
-    kind = "DRand" if ".colt." in actor.entity.java else "JavaRandom"
-    if (made := actor.text("generatorClass", "DRand")) != "DRand":
-        actor.notes.note(f"{actor.path}.generatorClass = {made!r}: has no counterpart, the numbers are others")
-    elif isinstance(own, int) and not isinstance(own, bool):
-        actor.values["generator"] = {"type": kind, "seed": own}
-    elif isinstance(shared, int) and shared:
-        actor.values["generator"] = {"type": kind, "seed": shared + java_hash(actor.full_name)}
-
-
-def poisson_clock(actor: Actor) -> None:
-    """Its stop time, and its random numbers."""
-    finite_stop(actor)
-    generator(actor)
-
-
-def colt_exponential(actor: Actor) -> None:
-    """Its lambda is the rate."""
-    rate = actor.get("lambda", 1.0)
-    actor.values["distribution"] = {"type": "Exponential", **({} if rate == 1.0 else {"mean": 1.0 / rate})}
-    generator(actor)
-
-
-def colt_gamma(actor: Actor) -> None:
-    """Its alpha is the shape, its lambda the rate."""
-    shape, rate = actor.get("alpha", 1.0), actor.get("lambda", 1.0)
-    actor.values["distribution"] = {"type": "Gamma", "shape": shape, "mean": shape / rate}
-    generator(actor)
-
-
-def colt_negative_binomial(actor: Actor) -> None:
-    """Its p is the probability of what is not counted."""
-    probability = 1.0 - actor.get("p", 0.5)
-    actor.values["distribution"] = {
-        "type": "NegativeBinomial",
-        "successes": actor.get("n", 1),
-        "probability": probability,
-    }
-    generator(actor)
-
-
-def colt_breit_wigner(actor: Actor) -> None:
-    """Its gamma is the width at half the height."""
-    found = {"type": "Cauchy", "median": actor.get("mean", 1.0), "scale": actor.get("gamma", 1.0) / 2.0}
-    cut = actor.get("cut", 1.0)
-    actor.values["distribution"] = found if math.isinf(cut) else {**found, "cut": cut}
-    generator(actor)
 
 
 def fields(direction: str) -> Special:

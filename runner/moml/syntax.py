@@ -333,7 +333,7 @@ class _Parser:
         if value == "[":
             return self._brackets()
         if value == "{|":
-            raise ExpressionError(f"{_short(self._text)}: unions are not known here")
+            return self._braces("|}")  # a union, as a record with the one field that it has
         return self._fail("it ends too early" if kind == "end" else f"{value!r} was not expected")
 
     def _is_field(self) -> bool:

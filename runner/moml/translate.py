@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import TypeAlias
 
 from .syntax import (
@@ -91,13 +91,16 @@ Said = tuple[str, int]
 _Made: TypeAlias = "tuple[tuple[str, ...], Tree, _Translation]"  # arguments, body, and what its names mean
 
 
-def translated(tree: Tree, names: Mapping[str, str], scope: Scope, whole: Collection[str] = ()) -> str:
+def translated(
+    tree: Tree, names: Mapping[str, str], scope: Scope, whole: Collection[str] = (), arrays: Collection[str] = ()
+) -> str:
     """The expression, in which ``names`` stand for what is known in the run alone; raises ``ExpressionError``.
 
-    Those in ``whole`` stand for whole numbers, whose quotients are whole in Ptolemy, too.
+    Those in ``whole`` stand for whole numbers, whose quotients are whole in Ptolemy, too; those in ``arrays`` for
+    arrays, which are added and multiplied item by item.
     """
     try:
-        return _Translation(names, scope, whole).said(tree)[0]
+        return _Translation(names, scope, whole, arrays=arrays).said(tree)[0]
     except RecursionError:
         raise ExpressionError("it is nested too deeply") from None
 
@@ -142,11 +145,31 @@ def names_of(tree: Tree) -> set[str]:
             return names_of(tree.first) | names_of(tree.step) | names_of(tree.last)
 
 
+def _leaves(tree: Tree) -> Iterator[Tree]:
+    """What stands between the operators of an expression."""
+    match tree:
+        case Unary(_, operand):
+            yield from _leaves(operand)
+        case Binary(_, left, right):
+            yield from _leaves(left)
+            yield from _leaves(right)
+        case _:
+            yield tree
+
+
 class _Translation:
-    def __init__(self, names: Mapping[str, str], scope: Scope, whole: Collection[str], depth: int = 0) -> None:
+    def __init__(
+        self,
+        names: Mapping[str, str],
+        scope: Scope,
+        whole: Collection[str],
+        depth: int = 0,
+        arrays: Collection[str] = (),
+    ) -> None:
         self._names = names
         self._scope = scope
         self._whole = set(whole)
+        self._arrays = set(arrays)
         self._depth = depth  # of functions that are opened up
 
     def said(self, tree: Tree) -> Said:
@@ -157,6 +180,9 @@ class _Translation:
         match tree:
             case Name(name):
                 return self._names[name], _ATOM
+            case Unary("-") | Binary() if self._is_array(tree):
+                array = next(each for each in _leaves(tree) if self._is_array(each))
+                return f"[{self._item(tree)} for k in range(len({self.said(array)[0]}))]", _ATOM
             case Unary("-", operand):
                 return f"-{self._held(operand, _SIGN)}", _SIGN
             case Unary("!", operand):
@@ -258,6 +284,30 @@ class _Translation:
         beside = 1 if level in (_COMPARE, _SUM, _PRODUCT, _POWER) else 0
         first = self._held(left, level + (1 if level in (_COMPARE, _POWER) else 0))
         return f"{first} {word} {self._held(right, level + beside)}", level
+
+    def _is_array(self, tree: Tree) -> bool:
+        """Whether this is known to be an array."""
+        match tree:
+            case Name(name) if name in self._names:
+                return name in self._arrays
+            case Array():
+                return True
+            case Unary("-", operand):
+                return self._is_array(operand)
+            case Binary("+" | "-" | "*" | "/", left, right):
+                return self._is_array(left) or self._is_array(right)
+            case Name():
+                return type(evaluate(tree, self._scope)) is list
+        return False
+
+    def _item(self, tree: Tree) -> str:
+        """An item of an array, at the place ``k``; what is none is the same for all."""
+        match tree:
+            case Unary("-", operand) if self._is_array(operand):
+                return f"-{self._item(operand)}"
+            case Binary(sign, left, right) if self._is_array(tree):
+                return f"({self._item(left)} {sign} {self._item(right)})"
+        return f"{self._held(tree, _ATOM)}[k]" if self._is_array(tree) else self._held(tree, _ATOM)
 
     def _rest(self, left: Tree, right: Tree) -> Said:
         """The rest has the sign of the first operand there, and that of the second here."""

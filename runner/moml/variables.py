@@ -5,30 +5,17 @@ Each is a ``Variable`` beside the actors of the composite that declares it; what
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import re
 
 from .actors import Actor, plain
 from .entities import Entity
-from .parts import Converting, Level, Part
+from .parts import Changing, Converting, Level, Part
 from .scope import Scope
 from .syntax import ExpressionError, Tree
 from .translate import names_of, translated
 from .writing import Flow
 
 _FIRST = -1000  # a priority: a new value counts for all who fire at that microstep
-
-
-@dataclass
-class Changing:
-    """One parameter that changes."""
-
-    owner: Entity
-    name: str
-    delayed: bool = True
-    is_port: bool = False  # of a composite, by which its values come
-    actor: str = ""  # our name of the Variable
-    setters: list[str] = field(default_factory=list)  # what leads to it, as seen from the owner
-    readers: list[tuple[str, str]] = field(default_factory=list)  # where parameters go by it, and how
 
 
 class Variables:
@@ -51,15 +38,19 @@ class Variables:
         around = self._conversion.container_of(entity)
         if not name or around is None:
             return
+        child, _, inner = name.rpartition(".")
+        if child and (not inner or (found_child := around.entities.get(child)) is None or found_child.entities):
+            path = self._conversion.path_of(around, entity)
+            self._conversion.notes.note(f"{path} sets {name}, which is no parameter of an actor beside it")
         home = None if scope.around is None else scope.around.home(name)
         owner = around if home is None or not isinstance(home.entity, Entity) else home.entity
         found = self._found.setdefault((id(owner), name), Changing(owner, name))
         found.delayed = (entity.text("delayed") or "true").strip() != "false"
 
-    @property
-    def ports(self) -> set[tuple[int, str]]:
-        """The ports of composites by which values come."""
-        return {key for key, each in self._found.items() if each.is_port}
+    def has_port(self, entity: Entity, port: str) -> bool:
+        """Whether values come by a port of a composite."""
+        found = self._found.get((id(entity), port))
+        return found is not None and found.is_port
 
     def hand(self, refinement: Entity, name: str) -> None:
         """Let a refinement go by a variable of its machine, which comes by an input of that name at each entry."""
@@ -91,6 +82,27 @@ class Variables:
         except ExpressionError:
             return None
 
+    def names_in(self, tree: Tree, scope: Scope) -> tuple[dict[str, str], dict[str, Changing]]:
+        """What changes of an expression: its names in terms of our names for variables, and these."""
+        if not self._found:
+            return {}, {}
+        names, _ = self._names(tree, scope, 0)
+        variables = {self.actor_of(each): each for each in self._found.values() if each.owner.entities}
+        ours = {name: text.replace(".value", "") for name, text in names.items()}
+        said = " ".join(ours.values())
+        return ours, {name: each for name, each in variables.items() if re.search(rf"(?<!\w){name}(?!\w)", said)}
+
+    def lead_to(self, changing: Changing, level: Level, port: str) -> None:
+        """Lead a variable to the input of an actor, through the composites between."""
+        here = level
+        while here.entity is not changing.owner and here.outer is not None:
+            name = here.names.fresh(f"{changing.name}_is")
+            here.added_inputs.append(name)
+            here.added_connections.append(f"{name} -> {port}")
+            port = f"{here.at.rstrip('.').rpartition('.')[2]}.{name}"
+            here = here.outer
+        changing.inputs.append(port)
+
     def _names(self, tree: Tree, scope: Scope, depth: int) -> tuple[dict[str, str], Changing | None]:
         names: dict[str, str] = {}
         some: Changing | None = None
@@ -120,9 +132,12 @@ class Variables:
             changing.actor = level.names.fresh(f"{changing.name}_variable")
         return changing.actor
 
-    def follow(self, actor: Actor, level: Level, ours: str, text: str) -> None:
-        """Let a parameter of an actor go by the variables that its expression names."""
-        found = self.said(text, actor.scope)
+    def follow(self, actor: Actor, level: Level, ours: str, text: str, name: str) -> None:
+        """Let a parameter of an actor go by the variables that its expression names, or by the one that it is."""
+        found = self.said(text, actor.scope) if text else None
+        own = self._found.get((id(level.entity), f"{actor.entity.name}.{name}"))
+        if own is not None:
+            found = f"{self.actor_of(own)}.value", own
         if found is not None:
             expression, changing = found
             owner = self._conversion.levels[id(changing.owner)]
@@ -160,10 +175,32 @@ class Variables:
             )
             sources = [level.ports.of(each.name)] if each.is_port else each.setters
             connections += [f"{source} -> {name}.input" for source in sources]
+            setters = {source.partition(".")[0] for source in sources if not each.delayed and not each.is_port}
+            for port in each.inputs:
+                if setters & self._behind(level, port.partition(".")[0]):  # it is read on the way to where it is set
+                    connections.append(Flow({"from": f"{name}.value", "to": port, "delay": "0 s"}))
+                else:
+                    connections.append(f"{name}.value -> {port}")
             for path, expression in each.readers:
                 aspect = level.names.fresh(f"{each.name}_in_{path.replace('.', '_')}")
                 aspects[aspect] = Flow({"type": "Replace", "to": expression, "at": path})
         return aspects
+
+    def _behind(self, level: Level, name: str) -> set[str]:
+        """All parts of a composite to which tokens come from one of them, itself included, by our names."""
+        ways: dict[str, set[str]] = {}
+        for net in self._conversion.nets_of(level.entity):
+            ends = {end.actor: self._conversion.end(level, end) for end in net.ends if end.actor}
+            receivers = {found[0].partition(".")[0] for found in ends.values() if found is not None and not found[1]}
+            for found in ends.values():
+                if found is not None and found[1]:
+                    ways.setdefault(found[0].partition(".")[0], set()).update(receivers)
+        reached, waiting = {name}, [name]
+        while waiting:
+            for each in ways.get(waiting.pop(), set()) - reached:
+                reached.add(each)
+                waiting.append(each)
+        return reached
 
 
 def set_variable(actor: Actor) -> None:

@@ -1,6 +1,11 @@
-"""Where only whole numbers come: what they are divided by leaves no fractions in Ptolemy."""
+"""What comes at the ports of actors, as far as those beside them tell: whole numbers, or arrays.
+
+What whole numbers are divided by leaves no fractions in Ptolemy; arrays are added item by item.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from .entities import Entity, kind
 from .parts import Converting
@@ -11,29 +16,48 @@ _VALUES = {
     "Const": ("value",), "Ramp": ("init", "step"), "Counter": (), "CurrentMicrostep": (),
 }  # fmt: skip
 # The parameters that say what these send; whole numbers if they are left out.
+_LISTS = ("DiscreteClock", "Clock", "PoissonClock", "Sequence")  # of which the values are items of a list
+_OF_ARRAYS = frozenset({
+    "SequenceToArray", "ElementsToArray",
+    "ArrayAppend", "ArraySort", "ArrayExtract", "ArrayUpdate", "ArrayRemoveElement",
+})  # fmt: skip
 
 
 def whole_ports(conversion: Converting, composite: Entity, child: Entity) -> frozenset[str]:
-    """The ports of a child at which only whole numbers come, as far as its senders beside it tell."""
+    """The ports of a child at which only whole numbers come."""
+    return _ports(conversion, composite, child, lambda entity: _sends(conversion, entity, int))
+
+
+def array_ports(conversion: Converting, composite: Entity, child: Entity) -> frozenset[str]:
+    """The ports at which only arrays come."""
+
+    def sends(entity: Entity) -> bool:
+        return kind(entity) in _OF_ARRAYS or _sends(conversion, entity, list)
+
+    return _ports(conversion, composite, child, sends)
+
+
+def _ports(conversion: Converting, composite: Entity, child: Entity, sends: Callable[[Entity], bool]) -> frozenset[str]:
     found = set()
     for port in child.ports:
         nets = conversion.nets_at(composite, child.name, port)
         senders = [
-            (composite.entities.get(end.actor), end.port)
+            composite.entities.get(end.actor)
             for net in nets
             for end in net.ends
             if (end.actor, end.port) != (child.name, port)
             and (face := conversion.face(composite.entities.get(end.actor, composite), end.port)) is not None
             and (face.direction == "output") == bool(end.actor)
         ]
-        if senders and all(each is not None and _sends_whole(conversion, each) for each, _ in senders):
+        if senders and all(each is not None and sends(each) for each in senders):
             found.add(port)
     return frozenset(found)
 
 
-def _sends_whole(conversion: Converting, entity: Entity) -> bool:
+def _sends(conversion: Converting, entity: Entity, wanted: type) -> bool:
+    """Whether all that it sends is of a type."""
     names = _VALUES.get(kind(entity))
-    if names is None:
+    if names is None or (wanted is list and not names):
         return False
     for name in names:
         said = entity.properties.get(name)
@@ -41,6 +65,7 @@ def _sends_whole(conversion: Converting, entity: Entity) -> bool:
             value = 0 if said is None else conversion.scope_of(entity).value_of(said)
         except ExpressionError:
             return False
-        if not all(type(each) is int for each in (value if isinstance(value, list) else [value])):
+        values = value if isinstance(value, list) and (wanted is int or kind(entity) in _LISTS) else [value]
+        if not all(type(each) is wanted for each in values):
             return False
     return True

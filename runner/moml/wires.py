@@ -9,22 +9,23 @@ from typing import Any
 from epicycle.actors import declared_ports
 
 from ..catalogue import built_in
+from .entities import Entity
 from .modes import is_machine
-from .parts import Converting, Level
+from .parts import Converting, CountsEnds, Level
 from .relations import End, Net
 from .writing import Flow
 
 
 def connections_of(conversion: Converting, level: Level) -> list[Any]:
     """The connections of a composite."""
-    counting = Counting(conversion)
+    counting = conversion.counting
     made = [_Line(conversion, level, net, counting) for net in conversion.nets_of(level.entity)]
     lines = [each for each in made if each.sources and each.sinks]
     for each in made:
         if each.sinks and not each.sources and any("." in sink for sink in each.sinks):
             level_path = level.told(each.sinks[0])
             conversion.notes.note(f"{level_path} is connected to nothing that sends")
-    written = [each.written() for each in _ordered(lines, conversion, level)]
+    written = [line for each in _ordered(lines, conversion, level) for line in each.written()]
     for (composite, path), port in conversion.triggers.items():
         actor, _, name = path.rpartition(".")
         if composite == id(level.entity) and (part := level.parts.get(actor)) is not None:
@@ -36,17 +37,22 @@ def connections_of(conversion: Converting, level: Level) -> list[Any]:
 class _Line:
     """One connection, with what is to be known of its ends."""
 
-    def __init__(self, conversion: Converting, level: Level, net: Net, counting: Counting) -> None:
+    def __init__(self, conversion: Converting, level: Level, net: Net, counting: CountsEnds) -> None:
         self.ends: list[End] = net.ends
         self.sources: list[str] = []
         self.sinks: list[str] = []
+        self.again: list[str] = []  # ports to which it leads by more than one channel
         for end in net.ends:
             found = conversion.end(level, end)
-            if found is not None and found[0] not in (self.sources if found[1] else self.sinks):
+            if found is None:
+                continue
+            if found[0] not in (self.sources if found[1] else self.sinks):
                 (self.sources if found[1] else self.sinks).append(found[0])
+            elif not found[1]:
+                self.again.append(found[0])
         self.shared = self._is_shared(conversion, level, counting)
 
-    def _is_shared(self, conversion: Converting, level: Level, counts: Counting) -> bool:
+    def _is_shared(self, conversion: Converting, level: Level, counts: CountsEnds) -> bool:
         """Whether it has to be said that all of it is one channel."""
         if counts.senders(level.entity, self.ends) > 1:
             return True
@@ -54,11 +60,14 @@ class _Line:
             return False
         return any(_sends_by_channel(conversion, level, end) for end in self.ends)
 
-    def written(self) -> Any:
-        sources, sinks = ", ".join(self.sources), ", ".join(self.sinks)
+    def written(self) -> list[Any]:
+        """The line, and more of them where it leads to a port by several channels."""
+        return [self._written(self.sinks), *(self._written([each]) for each in self.again)]
+
+    def _written(self, sinks: list[str]) -> Any:
         if not self.shared:
-            return f"{sources} -> {sinks}"
-        one = [each[0] if len(each) == 1 else each for each in (self.sources, self.sinks)]
+            return f"{', '.join(self.sources)} -> {', '.join(sinks)}"
+        one = [each[0] if len(each) == 1 else each for each in (self.sources, sinks)]
         return Flow({"from": one[0], "to": one[1], "shared": True})
 
 
@@ -81,6 +90,8 @@ class Counting:
     def __init__(self, conversion: Converting) -> None:
         self._conversion = conversion
         self._found: dict[tuple[int, str, int, bool], int] = {}  # 0 while it is looked for
+        self._nets: dict[tuple[int, bool], int] = {}
+        self._machines: dict[int, bool] = {}
 
     def senders(self, composite: Any, ends: list[End]) -> int:
         """How many outputs of actors lead to some ends of a net; 2 stands for several."""
@@ -108,7 +119,7 @@ class Counting:
         comes_from = (face.direction == "output") == bool(end.actor)
         if comes_from is not senders:
             return 0
-        if end.actor and (id(child) not in conversion.wiring.groups or is_machine(child)):
+        if end.actor and (id(child) not in conversion.wiring.groups or self._is_machine(child)):
             return 1
         # On the other side of a composite's port.
         if end.actor:
@@ -117,17 +128,27 @@ class Counting:
             inside, actor = conversion.container_of(composite), composite.name
         if inside is None:
             return 0
-        if is_machine(inside):  # whose refinements are joined with its ports by their names
+        if self._is_machine(inside):  # whose refinements are joined with its ports by their names
             return 1
         key = (id(inside), f"{actor}.{end.port}", end.channel, senders)
         if key not in self._found:
             self._found[key] = 0
-            for net in conversion.nets_at(inside, actor, end.port):
-                here = [each for each in net.ends if (each.actor, each.port) == (actor, end.port)]
-                if any(each.channel == end.channel for each in here):
-                    others = [each for each in net.ends if each not in here]
-                    self._found[key] = min(self._found[key] + self._all(inside, others, senders=senders), 2)
+            for net in conversion.nets_at(inside, actor, end.port, end.channel):
+                self._found[key] = min(self._found[key] + self._in_net(inside, net, senders=senders), 2)
         return self._found[key]
+
+    def _is_machine(self, entity: Entity) -> bool:
+        if id(entity) not in self._machines:
+            self._machines[id(entity)] = is_machine(entity)
+        return self._machines[id(entity)]
+
+    def _in_net(self, composite: Any, net: Net, *, senders: bool) -> int:
+        """The same of all of a net: the end that asks is none of those that it asks for."""
+        key = (id(net), senders)
+        if key not in self._nets:
+            self._nets[key] = 0
+            self._nets[key] = self._all(composite, net.ends, senders=senders)
+        return self._nets[key]
 
 
 def _ordered(lines: list[_Line], conversion: Converting, level: Level) -> list[_Line]:

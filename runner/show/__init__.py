@@ -1,15 +1,18 @@
 """What people see: of a run summary, figures, results folder; of what is installed, the reference."""
 
 from ..catalogue import Figure
-from .figures import Histogram, TimeSeries, Trajectories
+from .figures import Histogram, TimeSeries
 from .outcome import check_folder, draw_figures, summary_object, summary_table, write_folder
 from .pen import FigureError, draw
 from .reference import aspects_at, described, detail, markdown, overview, parts_described, weaving
+from .sheet import Sheet
+from .trajectories import Trajectories
 
 __all__ = [
     "Figure",
     "FigureError",
     "Histogram",
+    "Sheet",
     "TimeSeries",
     "Trajectories",
     "aspects_at",

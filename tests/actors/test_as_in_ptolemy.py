@@ -45,6 +45,24 @@ def there(actor: str, feeds: Feeds, until: float = 100, outputs: int = 0, direct
          [(0, 1, "size", 0), (1, 1, "size", 0), (2, 1, "output", "a"), (2, 1, "size", 0), (3, 1, "size", 1)]),
         # Nothing is connected to the trigger; tokens of one tag come in firing by firing.
         ("Queue", [("input", [[0, "a"], [0, "b"]])], [(0, 1, "size", 1), (0, 1, "size", 2)]),
+        # Only the first channel of its trigger lets it fire; what comes on another counts when it does.
+        ("Queue", [("input", [[0, "a"], [2, "b"]]), ("trigger", [[3, 0]]), ("trigger", [[1, 0], [3, 0]])],
+         [(0, 1, "size", 1), (2, 1, "output", "a"), (2, 1, "size", 1), (3, 1, "output", "b"), (3, 1, "size", 0)]),
+        # Only what is true resets it, and that counts behind what is counted with it.
+        ("Counter", [("increment", [[0, 0], [1, 0], [2, 0], [2, 0], [3, 0]]),
+                     ("reset", [[1, True], [2, False], [4, False], [5, True]])],
+         [(0, 1, "output", 1), (1, 1, "output", 0), (2, 1, "output", 1), (2, 1, "output", 2), (3, 1, "output", 3),
+          (5, 1, "output", 0)]),
+        ("Counter", [("decrement", [[0, 0], [0, 0]]), ("reset", [[0, True]])],
+         [(0, 1, "output", 0), (0, 1, "output", -1)]),
+        ("Counter, reset_last: false", [("increment", [[0, 0], [0, 0]]), ("reset", [[0, True], [0, True]])],
+         [(0, 1, "output", 1), (0, 1, "output", 1)]),
+        ("Counter, reset_by: any", [("increment", [[0, 0]]), ("reset", [[1, 5]])],
+         [(0, 1, "output", 1), (1, 1, "output", 0)]),
+        # Each trigger lets a tick come, and the first at its end is the last.
+        ("PoissonClock, mean_interval: 1000 s, stop_time: 3 s", [("trigger", [[1, 0], [1, 0], [4, 0], [4, 0], [5, 0]])],
+         [(0, 1, "output", 0), (1, 1, "output", 1), (1, 1, "output", 2), (4, 1, "output", 3)]),
+        ("PoissonClock, mean_interval: 1000 s, stop_time: 0 s", [("trigger", [[1, 0]])], [(0, 1, "output", 0)]),
         ("Server", [("input", [[0, "a"], [0.5, "b"]])],
          [(0, 1, "size", 1), (0.5, 1, "size", 2), (1, 1, "output", "a"), (1, 1, "size", 1), (2, 1, "output", "b"),
           (2, 1, "size", 0)]),
@@ -352,6 +370,18 @@ def test_a_trigger_of_a_poisson_clock() -> None:
     assert with_trigger[1] == (0.05, 1, "output", "b")
     later = [after[0] - before[0] for before, after in pairwise(with_trigger[1:])]
     assert later[:5] == pytest.approx(gaps[1:6])
+
+
+def test_the_last_tick_of_a_poisson_clock_comes_behind_its_end() -> None:
+    """So it does in Ptolemy, where the clock is done when it has fired; here none comes behind it."""
+    clock = "PoissonClock, mean_interval: 20 ms, stop_time: 1 s"
+    all_of_them = there("PoissonClock, mean_interval: 20 ms", [], until=1.5)
+    last = next(number for number, each in enumerate(all_of_them) if each[0] > 1)
+    assert last > 20
+    assert there(clock, [], until=1.5) == all_of_them[: last + 1]
+    assert there(f"{clock}, one_at_a_time: false", [], until=1.5) == all_of_them[:last]
+    triggers: Feeds = [("trigger", [[1.2, 0], [1.4, 0]])]
+    assert behave(f"{{type: {clock}}}", triggers, until=1.5) == behave(f"{{type: {clock}}}", [], until=1.5)
 
 
 EVERY = [

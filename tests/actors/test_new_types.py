@@ -145,6 +145,8 @@ ROWS = {
         "max_speed: -1", "it.max_speed: -1 is out of bounds, expected a number in m/s >= 0"),
     "Variable": Row("", {"input": BEATS},
         "delayed: 2", "it.delayed: 2 is not true or false"),
+    "VaryingRandom": Row("distribution: {type: Normal}, varying: [mean]", {"trigger": BEATS, "mean": BEATS},
+        "varying: [median]", "it: varying: Normal has no parameter 'median', did you mean 'mean'?"),
     "WaitingLine": Row("discipline: lifo", {"input": BEATS, "trigger": BEATS[::3]},
         "discipline: lilo", "it.discipline: 'lilo' is not one of fifo, lifo, random, did you mean 'lifo'?"),
     "WaitingTime": Row("", {"waiter": BEATS, "waited_for": BEATS[::3]}),

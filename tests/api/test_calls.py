@@ -260,3 +260,52 @@ def test_a_simulation_says_how_far_it_is() -> None:
     assert simulation.run().digest == looked_at
     assert before.tag.seconds <= 10.0
     assert repr(simulation) == f"<Simulation of mm1, seed 3: at {simulation.tag.seconds:g} s of 4000 s, over>"
+
+
+# -- pages ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_page_of_a_run_and_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = epicycle.view("mm1", until=50.0, seed=3, progress=False)
+    assert repr(page) == "<Page of mm1>"
+    assert page.recordings[0].results is not None
+    assert page.recordings[0].results.digest == epicycle.run("mm1", seed=3, until=50.0).digest
+    assert page.save("one.html") == Path("one.html")
+    shown = page._repr_html_()
+    assert shown.startswith('<iframe sandbox="allow-scripts" srcdoc="&lt;!DOCTYPE html&gt;')
+    assert "<script" not in shown
+    two = epicycle.view("mm1", epicycle.load("mm1", set={"load": 0.9}), until=50.0, names=["calm", "busy"])
+    assert repr(two) == "<Page of calm and busy>"
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    path = two.open()
+    assert opened == [path.as_uri()]
+    assert path.name == "mm1.html"
+
+
+def test_a_page_of_a_run_that_fails_says_why() -> None:
+    Path("failing.yaml").write_text(
+        "model: failing\nactors:\n  clock: {type: Clock, period: 1}\n"
+        "  inverse: {type: Expression, expression: 1 / (2 - x)}\nconnections: [clock.output -> inverse.x]\n"
+        "run: {stop: 5}\n"
+    )
+    page = epicycle.view("failing.yaml")
+    assert [str(error).splitlines()[0] for error in page.errors] == [
+        "inverse failed in fire() at (2 s, 1): '1 / (2 - x)': 1 / (2 - x) divides by zero, with x = 2"
+    ]
+    assert page.recordings[0].firings > 3
+
+
+def test_a_page_of_none_or_three() -> None:
+    with pytest.raises(EpicycleError) as caught:
+        epicycle.view()
+    assert str(caught.value) == "a page shows one run or two, not 0"
+    with pytest.raises(EpicycleError) as caught:
+        epicycle.view("mm1", "mg1", names=["one"])
+    assert str(caught.value) == "names: 1 for 2 models"
+
+
+def test_compare_writes_a_page_of_the_first_two(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "mm1", "--vary", "load=0.9", "--until", "50", "--replications", "2", "-o", "two.html"]) == 0
+    assert capsys.readouterr().out.endswith("\nwrote two.html\n")
+    assert Path("two.html").stat().st_size > 30_000

@@ -14,8 +14,12 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner.build import load_model
-from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, installed
+from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, figure_types, installed
 from epicycle.runner.catalogue.reference import TOPICS
+from epicycle.runner.catalogue.types import _offered
+from epicycle.runner.language import read_study
+from epicycle.runner.show.report import check_figures
+from epicycle.runner.study import Plan
 from epicycle.runner.text import ModelError
 
 THIRD_PARTY = Path(__file__).parents[1] / "third_party"
@@ -34,6 +38,12 @@ connections: [clock.output -> outside.trigger]
 aspects: {icing: {type: Icing, at: outside.temperature}}
 run: {stop: 5, record: outside.temperature}
 metrics: {coldest: {of: outside.temperature, take: min}, last: {of: outside.temperature}}
+figures: {span: {type: Extremes, signal: outside.temperature}}
+"""
+STUDY = """\
+study: icy
+model: ./weather.yaml
+figures: {runs: {type: acme_sensing.Ladder, metric: coldest, doc: Coldest of all}}
 """
 
 
@@ -54,8 +64,10 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.chdir(tmp_path)
     installed.cache_clear()
+    _offered.cache_clear()
     yield folder
     installed.cache_clear()
+    _offered.cache_clear()
     for name in [name for name in sys.modules if name.startswith("acme_")]:
         del sys.modules[name]
 
@@ -111,6 +123,39 @@ def test_broken_package_is_named(source: str, entry: str, reason: str, site: Pat
     assert "Lidar" not in catalogue.actors
     assert "Clock" in catalogue.actors
     assert [error.message for error in errors] == [f"actor 'Lidar' of the package 'acme-a' cannot be loaded: {reason}"]
+
+
+def test_broken_figure_is_named(site: Path) -> None:
+    install(site, "acme_a", "1 / 0", figures="Dial = acme_a:Dial", study_figures="Dial = acme_a:Dial")
+    Path("m.yaml").write_text("model: m\nfigures: {x: {type: Dial}, y: {type: Dail}}\n", encoding="utf-8")
+    with pytest.raises(ModelError) as caught:
+        load_model("./m.yaml")
+    valid = "Dial, Histogram, TimeSeries, Trajectories"
+    assert str(caught.value) == (
+        "m.yaml:2:21: error: figure x: figure 'Dial' of the package 'acme-a' cannot be loaded: "
+        "ZeroDivisionError: division by zero\n"
+        "    2 | figures: {x: {type: Dial}, y: {type: Dail}}\n"
+        "      |                     ^^^^\n"
+        "   help: its entry point in the group epicycle.figures is Dial = acme_a:Dial\n"
+        "   help: mend or uninstall 'acme-a'\n\n"
+        "m.yaml:2:38: error: figure y: there is no figure type 'Dail', did you mean 'Dial'?\n"
+        "    2 | figures: {x: {type: Dial}, y: {type: Dail}}\n"
+        "      |                                      ^^^^\n"
+        f"   help: valid types: {valid}\n"
+        "2 errors in m.yaml"
+    )
+    Path("s.yaml").write_text("study: s\nmodel: mm1\nfigures: {x: {type: Dial}}\n", encoding="utf-8")
+    with pytest.raises(ModelError, match="study figure 'Dial' of the package 'acme-a' cannot be loaded"):
+        check_figures(Plan.made(read_study("./s.yaml")))
+
+
+def test_figure_of_a_package_goes_by_its_entry_point(site: Path) -> None:
+    source = "from epicycle.runner.show import Figure\nclass Dial(Figure):\n    def signal_patterns(self): return ()\n"
+    install(site, "acme_a", source, figures="Dial = acme_a:Dial")
+    install(site, "acme_b", source, figures="Dial = acme_b:Dial")
+    assert figure_types()["acme_a.Dial"].__module__ == "acme_a"
+    with pytest.raises(CatalogueError, match="figure type 'Dial' is offered by the packages 'acme-a' and 'acme-b'"):
+        figure_types()["Dial"]  # although the class of one of them is there by now
 
 
 def test_broken_aspect_is_named(site: Path) -> None:
@@ -190,14 +235,20 @@ def check_installed(site: Path) -> None:
     schema = json.loads(epicycle(site, "schema"))
     assert schema["$defs"]["actor.Thermometer"]["properties"]["start"]["minimum"] == 0
     assert "Icing" in schema["$defs"]["aspect"]["properties"]["type"]["anyOf"][0]["enum"]
+    assert "Extremes" in schema["$defs"]["figure"]["properties"]["type"]["enum"]
     (site / "weather.yaml").write_text(MODEL, encoding="utf-8")
     results = json.loads(epicycle(site, "run", "weather.yaml", "--json"))
     assert results["metrics"] == {"coldest": 273.15, "last": 275.0}
     assert results["aspects"] == {"icing": {"frozen": 4}}
-    (site / "icy.yaml").write_text("study: icy\nmodel: ./weather.yaml\n", encoding="utf-8")
+    epicycle(site, "run", "weather.yaml", "--out", "once")
+    assert (site / "once" / "span.png").read_bytes().startswith(b"\x89PNG")
+    (site / "icy.yaml").write_text(STUDY, encoding="utf-8")
     epicycle(site, "study", "icy.yaml", "--out", "icy", "--jobs", "1")
     manifest = json.loads((site / "icy" / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["sources"]["package acme-sensing"] == "1.0"  # another version, other runs
+    epicycle(site, "report", "icy")
+    assert "Coldest of all. </" in (site / "icy" / "report.html").read_text(encoding="utf-8").replace("<span", "</")
+    assert (site / "icy" / "figures" / "runs.svg").is_file()
 
 
 def test_third_party_package_shows_up(tmp_path: Path) -> None:

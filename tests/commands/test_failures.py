@@ -257,7 +257,7 @@ m.yaml:6:17: error: figure whole: there is no figure type 'TimeSeriez', did you 
 m.yaml:7:53: error: figure other: Histogram has no parameter 'bin', did you mean 'bins'?
     7 |   other: {type: Histogram, signals: [clock.output], bin: 3}
       |                                                     ^^^
-   help: valid parameters: signals, bins, label
+   help: valid parameters: signals, bins, label, log_x, log_y
 
 m.yaml:8:37: error: figure last: 'clock.out' is not recorded, did you mean 'clock.output'?
     8 |   last: {type: Histogram, signals: [clock.out]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -113,3 +114,72 @@ def test_a_page_that_cannot_be_written(line: str, capsys: pytest.CaptureFixture[
     assert said(capsys, line, "-o", "none/page.html", code=2) == message
     Path("taken").mkdir()
     assert said(capsys, line, "-o", "taken", code=2) == "error: --out taken cannot be written: it is a folder\n"
+
+
+def test_files_for_other_viewers_are_written_instead_of_a_page_or_beside_it(
+    line: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("webbrowser.open", lambda uri: pytest.fail(f"opened {uri}"))
+    assert said(capsys, line, "--mcap", "line.mcap") == "wrote line.mcap\n"
+    assert Path("line.mcap").read_bytes()[:5] == b"\x89MCAP"
+    assert not Path("results").exists()
+    assert said(capsys, line, "--mcap", "line.mcap", "-o", "page.html") == "wrote line.mcap\nwrote page.html\n"
+    assert sorted(each.name for each in Path().iterdir()) == ["line.mcap", "line.yaml", "page.html"]
+
+
+def test_a_recording_of_rerun(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("rerun")
+    assert said(capsys, line, "--rerun", "line.rrd") == "wrote line.rrd\n"
+    assert Path("line.rrd").read_bytes()[:3] == b"RRF"
+
+
+def test_a_run_that_fails_is_written_up_to_there(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("failing.yaml").write_text(FAILING, encoding="utf-8")
+    told = said(capsys, "failing.yaml", "--mcap", "run.mcap", code=1)
+    assert told.startswith("wrote run.mcap\nerror: inverse failed in fire() at (1 s, 1)")
+
+
+def test_other_viewers_are_shown_one_run(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for flag in ("--mcap", "--rerun"):
+        message = f"error: {flag} writes one run, not two: line.yaml, line.yaml\n"
+        assert said(capsys, line, line, flag, "run", code=2) == message
+
+
+@pytest.mark.parametrize(
+    ("flag", "module", "message"),
+    [
+        (
+            "--mcap",
+            "mcap.writer",
+            "an MCAP file needs the package mcap, which is not installed: pip install 'epicycle[mcap]'",
+        ),
+        (
+            "--rerun",
+            "rerun",
+            "a recording of rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'",
+        ),
+    ],
+)
+def test_what_is_missing_for_other_viewers_is_said_before_the_run(
+    flag: str,
+    module: str,
+    message: str,
+    line: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr("epicycle.runner.show.view.Recording.run", lambda *_, **__: pytest.fail("the model was run"))
+    assert said(capsys, line, flag, "run", code=2) == f"error: {message}\n"
+
+
+def test_files_for_other_viewers_that_cannot_be_written(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    message = "error: --mcap none/run.mcap cannot be written: there is no folder none\n"
+    assert said(capsys, line, "--mcap", "none/run.mcap", code=2) == message
+    message = "error: --rerun none/run.rrd cannot be written: there is no folder none\n"
+    assert said(capsys, line, "--rerun", "none/run.rrd", code=2) == message
+    Path("taken").mkdir()
+    assert said(capsys, line, "--mcap", "taken", code=2) == "error: --mcap taken cannot be written: it is a folder\n"
+    name = "x" * 255
+    message = f"error: {name} cannot be written: File name too long\n"
+    assert said(capsys, line, "--mcap", name, code=2) == message

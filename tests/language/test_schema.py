@@ -25,7 +25,7 @@ from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
 from epicycle.runner.build.connect import _ENDPOINT as ENDPOINT
 from epicycle.runner.build.connect import BadIndexError
 from epicycle.runner.build.connect import indices_of as resolve
-from epicycle.runner.catalogue import Catalogue, built_in, figure_types, model_folders, packaged_models
+from epicycle.runner.catalogue import Catalogue, built_in, model_folders, own_figures, packaged_models
 from epicycle.runner.language import (
     dimensions,
     disturbance,
@@ -39,7 +39,7 @@ from epicycle.runner.language.fields import QUANTITY, Construct
 from epicycle.runner.language.fields import schema_of as value_schema
 from epicycle.runner.language.models import BESIDE
 from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
-from epicycle.runner.show.report import study_figure_types
+from epicycle.runner.show.report import own_study_figures
 from epicycle.runner.text import NodeReader, PatternError, Problems, compile_pattern, parse, plain
 from tests.bad_models.test_bad_models import CASES
 from tests.cases import Case
@@ -67,7 +67,7 @@ NOT_SHAPE = re.compile(
 @cache
 def validator() -> Draft202012Validator:
     """For Epicycle's own types."""
-    return Draft202012Validator(json_schema(built_in(), figure_types(), study_figure_types()))
+    return Draft202012Validator(json_schema(built_in(), own_figures(), own_study_figures()))
 
 
 def document(text: str) -> Any:
@@ -114,7 +114,7 @@ def test_models_of_the_documents_validate(path: Path) -> None:
 def validator_of_bad_models() -> Draft202012Validator:
     """For the types that the bad models name."""
     catalogue = Catalogue({}, {"PacketLoss": PacketLoss, "MeasurementFailure": MeasurementFailure})
-    return Draft202012Validator(json_schema(catalogue.with_types(TYPES), figure_types(), study_figure_types()))
+    return Draft202012Validator(json_schema(catalogue.with_types(TYPES), own_figures(), own_study_figures()))
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -46,6 +46,10 @@ def random_machine(seed: int) -> tuple[dict[str, Any], list[tuple[int, str, int]
             if draw.random() < share:
                 rule[flag] = True
         rules.append(rule)
+    if draw.random() < 0.3:
+        for rule in rules:
+            if draw.random() < 0.5:
+                rule["probability"] = draw.choice([0.0, 0.25, 0.5, 1.0])
     events = [(draw.randint(0, 2 * UNTIL) * 500_000_000, draw.choice("ab"), draw.randint(0, 4)) for _ in range(25)]
     return {"modes": modes, "final": final, "variables": {"n": 0}, "transitions": rules}, sorted(events)
 
@@ -55,6 +59,8 @@ def as_text(rule: dict[str, Any]) -> str:
     words = [f"{', '.join(rule['from'])} -> {rule['to']}"]
     words += [flag for flag in ("else", "immediate", "nondeterministic", "preemptive") if rule.get(flag)]
     words.append(f"priority {rule['priority']}")
+    if "probability" in rule:
+        words.append(f"probability {rule['probability']}")
     if "on" in rule:
         words.append(f"on {', '.join(rule['on'])}")
     if "after" in rule:
@@ -159,8 +165,9 @@ def as_class(machine: dict[str, Any]) -> type[ModalActor]:
         body[f"rule_{place}"] = transition(
             rule["from"], rule["to"], on=rule.get("on", ()), when=when if "when" in rule else None,
             after=rule["after"] / 1e9 if "after" in rule else None, priority=rule["priority"],
-            otherwise=rule.get("else", False), immediate=rule.get("immediate", False),
-            nondeterministic=rule.get("nondeterministic", False), preemptive=rule.get("preemptive", False),
+            probability=rule.get("probability"), otherwise=rule.get("else", False),
+            immediate=rule.get("immediate", False), nondeterministic=rule.get("nondeterministic", False),
+            preemptive=rule.get("preemptive", False),
         )(act)  # fmt: skip
     return type("Modal", (ModalActor,), body)
 
@@ -199,10 +206,14 @@ def disagreement(seed: int) -> dict[str, object] | None:
     wanted = interpret(machine, events, UNTIL * 10**9)
     if wanted == "endless":
         return None
-    entry["ports"] = [port for port in ("a", "b") if port in inputs]
+    entry["ports"] = ports = [port for port in ("a", "b") if port in inputs]
     found = {
         "reference": wanted,
         "model file": sends_of(entry, events),
         "Python": sends_of({"type": "Modal", "ports": ("a", "b")}, events, [as_class(machine)]),
     }
-    return found if any(each != wanted for each in found.values()) else None
+    if any(each != wanted for each in found.values()):
+        return found
+    wanted = interpret({**machine, "as_in_ptolemy": True}, events, UNTIL * 10**9)
+    there = sends_of({**entry, "ports": ports, "one_at_a_time": True, "set_last": True}, events)
+    return None if wanted in ("endless", there) else {"reference, as in Ptolemy": wanted, "model file": there}

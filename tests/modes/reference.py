@@ -1,7 +1,8 @@
 """What a state machine is, once more and as plainly as can be: an interpreter to compare machines with.
 
 A machine is a dict: ``modes``, ``final``, ``variables``, ``transitions``; each of these is a dict as a model file has
-it, with whole ns in ``after`` and conditions that Python reads.  Time is in ns.
+it, with whole ns in ``after`` and conditions that Python reads.  Time is in ns.  One that is ``as_in_ptolemy`` takes
+tokens that come together at one tag, sets variables last, and reacts again behind each transition.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ def interpret(machine: Mapping[str, Any], events: list[tuple[int, str, Any]], un
     """What a machine sends up to a time; "error" if two transitions are enabled at once, "endless" if time stands."""
     sends: list[Send] = []
     queues: dict[str, list[Any]] = {}
-    stream = random_stream(0, "it", "")
+    stream, chance = random_stream(0, "it", ""), random_stream(0, "it", "probability")
+    as_in_ptolemy = machine.get("as_in_ptolemy", False)
+    lot, used, drawn = None, 0.0, dict[int, bool]()
     known = dict(machine["variables"])
     mode, entered, is_begun = machine["modes"][0], 0, False
     timers: dict[int, Tag] = {}
@@ -51,7 +54,18 @@ def interpret(machine: Mapping[str, Any], events: list[tuple[int, str, Any]], un
     def enabled(number: int, rule: Mapping[str, Any], tokens: Mapping[str, Any]) -> bool:
         if "on" in rule and not any(port in tokens for port in rule["on"]):
             return False
-        return is_open(number, rule) and true(rule.get("when", "True"), tokens)
+        return is_open(number, rule) and true(rule.get("when", "True"), tokens) and likely(number, rule)
+
+    def likely(place: int, rule: Mapping[str, Any]) -> bool:
+        nonlocal lot, used
+        if "probability" in rule and place not in drawn:
+            if lot is None:
+                lot, used = chance.random(), 0.0
+            if used + rule["probability"] > 1:
+                raise ValueError
+            drawn[place] = used <= lot < used + rule["probability"]
+            used += rule["probability"]
+        return drawn.get(place, True)
 
     def choose(among: list[tuple[int, Mapping[str, Any]]], tokens: Mapping[str, Any]) -> Mapping[str, Any] | None:
         for otherwise in (False, True):
@@ -67,14 +81,34 @@ def interpret(machine: Mapping[str, Any], events: list[tuple[int, str, Any]], un
         return None
 
     def enter(target: str) -> None:
-        nonlocal mode, entered, timers, deadlines
-        mode, entered, timers, deadlines = target, now[0], {}, set()
+        nonlocal mode, entered, timers, deadlines, lot
+        mode, entered, timers, deadlines, lot = target, now[0], {}, set(), None
+        drawn.clear()
         for number, rule in leaving():
             if "after" in rule:
                 timers[number] = (now[0] + rule["after"], 1) if rule["after"] else (now[0], now[1] + 1)
             deadlines |= {
                 entered + round(float(x) * 1e9) for x in re.findall(r"mode_time [<>]=? ([\d.]+)", rule.get("when", ""))
             }
+
+    def follow(rule: Mapping[str, Any] | None, tokens: Mapping[str, Any]) -> bool:
+        taken, to_set = 0, list[tuple[str, str]]()
+        while rule is not None:
+            taken += 1
+            if taken > 1000:
+                raise ValueError
+            for target, text in rule.get("do", ()):
+                if target not in known:
+                    sends.append((*now, target, eval(text, {"__builtins__": {}}, {**known, **tokens})))
+                elif as_in_ptolemy:
+                    to_set.append((target, text))
+                else:
+                    known[target] = eval(text, {"__builtins__": {}}, {**known, **tokens})
+            enter(rule["to"])
+            rule = choose(leaving(immediate=True), tokens)
+        for target, text in to_set:
+            known[target] = eval(text, {"__builtins__": {}}, {**known, **tokens})
+        return taken > 0
 
     by_time: dict[int, list[tuple[str, Any]]] = {}
     for time, port, token in events:
@@ -93,35 +127,32 @@ def interpret(machine: Mapping[str, Any], events: list[tuple[int, str, Any]], un
             return "endless"
         for port, token in by_time.get(now[0], ()) if now[1] == 1 else ():
             queues.setdefault(port, []).append(token)
-        tokens = {port: queue.pop(0) for port, queue in queues.items() if queue}
         is_called = now in calls or now in timers.values() or any(seen[0] < time <= now[0] for time in deadlines)
-        is_new, taken = not is_begun, 0
-        if is_new:
-            is_begun = True
-            enter(mode)
-        if is_called or tokens:
+        is_first = True
+        while is_first or (as_in_ptolemy and any(queues.values())):
+            tokens = {port: queue.pop(0) for port, queue in queues.items() if queue}
+            is_new, has_moved = not is_begun, False
+            drawn.clear()
+            lot = None
             try:
-                early = [each for each in leaving() if each[1].get("preemptive")]
-                late = [each for each in leaving() if not each[1].get("preemptive")]
-                rule = choose(early, tokens) or choose(late, tokens)
-                while rule is not None:
-                    is_new, taken = True, taken + 1
-                    if taken > 1000:
-                        raise ValueError
-                    for target, text in rule.get("do", ()):
-                        value = eval(text, {"__builtins__": {}}, {**known, **tokens})
-                        if target in known:
-                            known[target] = value
-                        else:
-                            sends.append((*now, target, value))
-                    enter(rule["to"])
-                    rule = choose(leaving(immediate=True), tokens)
+                if is_new:
+                    is_begun = True
+                    enter(mode)
+                    if as_in_ptolemy:
+                        follow(choose(leaving(immediate=True), tokens), tokens)
+                if (is_called and is_first) or tokens:
+                    early = [each for each in leaving() if each[1].get("preemptive")]
+                    late = [each for each in leaving() if not each[1].get("preemptive")]
+                    has_moved = follow(choose(early, tokens) or choose(late, tokens), tokens)
+                    is_new = is_new or has_moved
             except ValueError:
                 return "error"
-        if is_new:
-            sends.append((*now, "mode", mode))
-            alone = [(n, rule) for n, rule in leaving() if not rule.get("else") and "on" not in rule]
-            if any(is_open(n, rule) and true(rule.get("when", "True"), {}) for n, rule in alone):
-                calls.add((now[0], now[1] + 1))
+            is_first = False
+            if is_new:
+                sends.append((*now, "mode", mode))
+                alone = [(n, rule) for n, rule in leaving() if not rule.get("else") and "on" not in rule]
+                goes_on = any(is_open(n, rule) and true(rule.get("when", "True"), {}) for n, rule in alone)
+                if (has_moved and mode not in machine["final"]) if as_in_ptolemy else goes_on:
+                    calls.add((now[0], now[1] + 1))
         if any(queues.values()):
             rest.add((now[0], now[1] + 1))

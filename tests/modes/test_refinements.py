@@ -94,6 +94,13 @@ def test_a_preemptive_transition_keeps_the_refinement_from_firing() -> None:
     assert sends(text, "it.on.clock") == [(0, 1, 0), (1, 1, 1)]
 
 
+def test_a_machine_that_looks_before_its_refinement_loses_no_token() -> None:
+    """Two come together by two connections: each is for a reaction of its own."""
+    text = switching("on: {refinement: Ticking}, off: ", "on -> off preemptive on go, off -> on preemptive on go")
+    text = text.replace("[go.output -> it.go]", "[go.output -> it.go, go.output -> it.go]")
+    assert sends(text, "it.machine")[:5] == [(0, 1, "on"), (2.5, 1, "off"), (2.5, 2, "on"), (5, 1, "off"), (5, 2, "on")]
+
+
 def test_inputs_reach_the_active_refinement_alone() -> None:
     text = switching("on: {refinement: Delaying}, off: ", "on -> off after 2 s, off -> on history after 2 s")
     for old, new in (("[go]", "[x]"), ("[tick]\n    modes", "[y]\n    modes"), ("it.go", "it.x")):

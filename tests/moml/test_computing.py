@@ -40,6 +40,8 @@ SORTED = {"input": "{{3, 1, 3, 2}} at {0.0}"}
         ("Quantizer", {}, {"input": "{0.0, 0.5} at {0.0, 1.0}"}, [-1.0, 1.0]),
         ("Quantizer", {"levels": "{0, 1, 4}"}, {"input": "{0.5, 0.6, 2.5, 9.0} at {0.0, 1.0, 2.0, 3.0}"},
          [0.0, 1.0, 1.0, 4.0]),
+        ("ArrayAverage", {}, {"input": "{{1, 2}} at {0.0}"}, [1]),
+        ("ArrayAverage", {}, {"input": "{{1.0, 2.0}} at {0.0}"}, [1.5]),
         ("ArraySort", {}, SORTED, [[1, 2, 3, 3]]),
         ("ArraySort", {"ascending": "false", "allowDuplicates": "false"}, SORTED, [[3, 2, 1]]),
         ("sdf.DotProduct", {}, {"input1": "{{1, 2}} at {0.0}", "input2": "{{3, 4}} at {0.0}"}, [11]),

@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.runner.moml import MomlError
 from tests.moml.moml_parts import (
-    DIRECTOR,
+    LIB,
     MODAL,
     composite,
     entity,
@@ -18,6 +18,7 @@ from tests.moml.moml_parts import (
     port,
     prop,
     recorded,
+    sent,
     wires,
     written,
 )
@@ -175,9 +176,9 @@ def test_what_of_machines_has_no_counterpart(tmp_path: Path) -> None:
     )
     text = around(machine(parts))
     assert notes(tmp_path, text) == [
-        "M: t: the action 'nonsense' is not understood, and left out",
         "M: t: other = 1 is left out: other is no output and no variable here",
         "M: t: b.gain = 2 is left out: b.gain is no output and no variable here",
+        "M: t: the action 'nonsense' is not understood, and left out",
         "M: in is called in_",
     ]
     wrong = around(machine(state("a", isInitialState="true"), transition("t", "a", "a", "random() > 0.5")))
@@ -186,11 +187,11 @@ def test_what_of_machines_has_no_counterpart(tmp_path: Path) -> None:
     assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: the function 'random' is not known here"
 
 
-__all__ = ["DIRECTOR"]
-
-
 def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
-    """A composite whose director is that of a modal model; what goes by a variable changes with it."""
+    """A composite whose director is that of a modal model; what goes by a variable changes with it.
+
+    What the action sends takes the place of the 20 that the refinement has sent in the same firing.
+    """
     controller = state("one", "one", isInitialState="true") + transition(
         "t", "one", "one", "in == 2", "out = k", "k = k + 1"
     )
@@ -208,7 +209,7 @@ def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
         entity("Ctrl", "ptolemy.domains.fsm.kernel.FSMActor", PORTS, controller),
     )
     text = around(made)
-    assert sorted(token for _, _, token in recorded(tmp_path, text)) == [1, 10, 20, 60, 80]
+    assert sorted(token for _, _, token in recorded(tmp_path, text)) == [1, 10, 60, 80]
 
 
 def test_an_action_sets_a_parameter_of_a_refinement(tmp_path: Path) -> None:
@@ -254,3 +255,139 @@ def test_a_default_transition_has_a_guard_too(tmp_path: Path) -> None:
     parts = [state("a", isInitialState="true"), transition("t", "a", "a", "in == 1", "out = 10"),
              transition("u", "a", "a", "in > 2", "out = 20", defaultTransition="true")]  # fmt: skip
     assert [token for _, _, token in recorded(tmp_path, around(machine(*parts)))] == [10, 20, 20]
+
+
+SEVERAL = port("in", "input", "multiport") + port("out", "output", "multiport")
+
+
+def with_channels(made: str, *more: str) -> str:
+    """A machine with two clocks at its input, and two recorders at its output."""
+    clocks = entity("C1", "DiscreteClock", values="{1, 2, 3}") + entity("C2", "DiscreteClock", values="{5, 6, 7}")
+    sinks = entity("R1", "Recorder") + entity("R2", "Recorder")
+    return model(clocks, sinks, made, *more, stop=2)
+
+
+def test_channels_of_a_machine(tmp_path: Path) -> None:
+    """Each is a port; a name without a number is of the last one, and an action without a channel sends by all."""
+    parts = [
+        state("a", isInitialState="true"),
+        state("b"),
+        transition("t", "a", "b", "in_0 == 1 && in_1 == 5", "out(1) = in_0; out = in; out(2) = 1"),
+        transition("u", "b", "a", "in_0_isPresent && in_isPresent", "out(0) = in_1 + in"),
+    ]
+    made = entity("M", f"{MODAL}kernel.FSMActor", SEVERAL, *parts)
+    text = with_channels(made, wires("C1.output M.in", "C2.output M.in", "M.out R1.input", "M.out R2.input"))
+    assert (
+        written(tmp_path, text).split("connections:")[0].split("  M:")[1]
+        == """
+    type: StateMachine
+    modes: [a, b]
+    transitions:
+      - a -> b when in_ == 1 and in_1 == 5 do out_1 = in_; out = in_1; out_1 = in_1
+      - b -> a on in_ when in_1_is_present do out = in_1 + in_1
+"""
+    )
+    assert notes(tmp_path, text) == [
+        "M: t: out(2) = 1 is left out: out has no such channel",
+        "M: in is called in_",
+    ]
+    assert recorded(tmp_path, text, "R1") == [(0.0, 1, 5), (1.0, 1, 12)]
+    assert recorded(tmp_path, text, "R2") == [(0.0, 1, 1), (0.0, 1, 5)]
+
+
+def test_channels_of_a_modal_model(tmp_path: Path) -> None:
+    """Its refinements know them by the same names; of what leaves together by one channel the last alone counts."""
+    inner = composite("a", SEVERAL, entity("Scale", "Scale", factor=10), entity("Other", "Scale", factor=100),
+                      wires("in Scale.input", "in Other.input", "Scale.output out", "Other.output out"),
+                      director=True)  # fmt: skip
+    controller = [state("a", "a", isInitialState="true"), transition("t", "a", "a", "in_1 == 6", "out(1) = in_0")]
+    own = entity("_Controller", f"{MODAL}modal.ModalController", SEVERAL, *controller)
+    names = "in _Controller.in a.in", "out _Controller.out a.out"
+    relations = "".join(
+        f'<relation name="w{number}" class="ptolemy.actor.TypedIORelation">{prop("width", 2)}</relation>'
+        + "".join(f'<link port="{each}" relation="w{number}"/>' for each in name.split())
+        for number, name in enumerate(names)
+    )
+    made = entity("M", f"{MODAL}modal.ModalModel", SEVERAL, own, inner, relations)
+    text = with_channels(made, wires("C1.output M.in", "C2.output M.in", "M.out R1.input", "M.out R2.input"))
+    assert (
+        written(tmp_path, text).split("  M:")[1].split("actors:")[0]
+        == """
+    inputs: [in_, in_1]
+    outputs: [out, out_1]
+    modes:
+      a: {refinement: a}
+    transitions:
+      - a -> a when in_1 == 6 do out_1 = in_
+"""
+    )
+    assert recorded(tmp_path, text, "R1") == [(0.0, 1, 10), (1.0, 1, 20), (2.0, 1, 30)]
+    assert recorded(tmp_path, text, "R2") == [(0.0, 1, 500), (1.0, 1, 2), (2.0, 1, 700)]
+
+
+def test_an_action_for_a_channel_that_is_none(tmp_path: Path) -> None:
+    parts = state("a", isInitialState="true") + transition("t", "a", "a", "in_isPresent", "out(0.5) = 1")
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, around(machine(parts)))
+    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: out(0.5) = ...: 0.5 is no channel"
+
+
+def test_probabilities(tmp_path: Path) -> None:
+    parts = [
+        state("a", isInitialState="true"),
+        transition("t", "a", "a", "in_isPresent && probability(p)", "out = 1"),
+        transition("u", "a", "a", "probability(0.75) && in > 0", "out = 2"),
+        transition("v", "a", "a", "in == -1 && probability(in * 0.5)", "out = 3"),
+        prop("p", 0.25),
+    ]
+    text = around(machine(*parts), "{1}", stop=999)
+    assert (
+        written(tmp_path, text).split("transitions:")[1].split("connections:")[0]
+        == """
+      - a -> a probability 0.25 on in_ do out = 1
+      - a -> a probability 0.75 when in_ > 0 do out = 2
+      - {from: a, to: a, probability: in_ * 0.5, when: in_ == -1, do: out = 3}
+"""
+    )
+    tokens = [token for _, _, token in recorded(tmp_path, text)]
+    assert len(tokens) == 1000
+    assert tokens.count(1) == pytest.approx(250, abs=4 * 13.7)
+    wrong = machine(state("a", isInitialState="true") + transition("t", "a", "a", "in > 1 || probability(0.5)"))
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, around(wrong))
+    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: the function 'probability' is not known here"
+
+
+def together(made: str, values: str, number: int) -> str:
+    """A machine that gets so many tokens at once."""
+    actors = entity("Clock", "DiscreteClock", values=f"{{{values}}}") + entity("Recorder", "Recorder")
+    actors += entity("Each", f"{LIB[:-1]}.ArrayToSequence".replace("actor.lib", "domains.sdf.lib"), arrayLength=number)
+    return model(actors, made, wires("Clock.output Each.input", "Each.output M.in", "M.out Recorder.input"), stop=0)
+
+
+def test_tokens_that_come_together_are_for_a_firing_each(tmp_path: Path) -> None:
+    """At the same tag; and set actions come behind all output actions of a reaction, by which its guards go, too."""
+    parts = [prop("n", 0), state("a", isInitialState="true"), state("b"), state("c"),
+             transition("t", "a", "b", "in > 0", "out = n", "n = n + in"),
+             transition("i", "b", "c", "in > 4", "out = -n", "n = n + 100", immediate="true"),
+             transition("u", "b", "a", "in > 1", "out = in * 10"),
+             transition("w", "c", "a", "n > 100 && !in_isPresent", "out = n")]  # fmt: skip
+    text = together(machine(*parts), "{1, 2, 3, 4, 5}", 5)
+    # 1 takes t, 2 u, 3 t (n is 1), 4 u (n is 4), 5 t and i (n is 4, and then 9 and 109); and no token w.
+    wanted = [(0.0, 1, each) for each in (0, 20, 1, 40, 4, -4)]
+    assert recorded(tmp_path, text) == [*wanted, (0.0, 2, 109)]
+
+
+def test_a_modal_model_fires_again_for_tokens_that_come_together(tmp_path: Path) -> None:
+    """Also what a transition enters does so at the same tag, and begins if it is entered anew."""
+    inner = composite("two", PORTS, entity("Scale", "Scale", factor=10), entity("Begin", "DiscreteClock", values="{7}"),
+                      wires("in Scale.input", "Scale.output out", "Begin.output Recorder.input"),
+                      entity("Recorder", "Recorder"), director=True)  # fmt: skip
+    controller = state("one", isInitialState="true") + state("two", "two")
+    controller += transition("t", "one", "two", "in == 2", "out = 2", history="false")
+    controller += transition("u", "two", "one", "in == 4", history="false")
+    text = together(modal(controller, inner), "{1, 2, 3, 4, 5, 2}", 6)
+    # 2 leads to the other mode, where 3 and 4 are scaled; 5 comes to nothing, and 2 leads there once more.
+    assert recorded(tmp_path, text) == [(0.0, 1, 2), (0.0, 1, 30), (0.0, 1, 40), (0.0, 1, 2)]
+    begins = [each[:2] for each in sent(tmp_path, text) if each[2] == "M.two.Begin.output"]
+    assert begins == [(0.0, 1), (0.0, 2)]

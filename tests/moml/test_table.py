@@ -1,4 +1,4 @@
-"""Every row of the table: its actor can be imported, with something at each of its ports."""
+"""Every row of the table: with something at each port, and all parameters given, it is imported and runs."""
 
 from __future__ import annotations
 
@@ -6,42 +6,60 @@ from pathlib import Path
 
 import pytest
 
+from runner.moml.counterpart import Counterpart
 from runner.moml.table import _NAMED as ROWS
 from runner.moml.table import counterpart_of
-from tests.moml.moml_parts import DE, LIB, entity, imported, model, port, wires
+from tests.moml.moml_parts import DE, LIB, TEXT, entity, model, notes, port, prop, run, wires
 
 NEEDED = {
-    "RecordAssembler": port("x", "input"),
-    "RecordDisassembler": port("x", "output"),
-    "Expression": port("x", "input"),
-    "RecordUpdater": port("x", "input"),
+    **dict.fromkeys(("RecordAssembler", "Expression", "RecordUpdater", "UnionMerge"), port("x", "input")),
+    **dict.fromkeys(("RecordDisassembler", "UnionDisassembler"), port("x", "output")),
 }  # what somebody adds to it
-PARAMETERS: dict[str, dict[str, object]] = {
+VALUES = {
+    "flag": "true", "list": "{1}", "number": "1.0", "text": '"a"', "time": "1.0", "times": "{0.0}", "value": "1",
+    "whole": "1",
+}  # fmt: skip
+GIVEN: dict[str, dict[str, object]] = {
     "Expression": {"expression": "2 * x"},
-    "LookupTable": {"table": "{1, 2}"},
+    "Pulse": {"indexes": "{0}"},
+    "NonStrictTest": {"correctValues": "{1}"},
+    "Test": {"correctValues": "{1}"},
     "SetVariable": {"variableName": "P"},
-    "SequenceToArray": {"arrayLength": 2},
+    "Sequence": {"repeat": "false"},
+    "IIR": {"numerator": "{1.0}", "denominator": "{1.0}"},
 }
-NOT_WIRED = {
-    "mean",
-    "standardDeviation",
-    "lowerBound",
-    "upperBound",
-    "trueProbability",
-    "min",
-    "max",
-    "mode",
-    "lambda",
-    "alpha",
-    "n",
-    "p",
-    "freedom",
-    "gamma",
-    "cut",
-    "secondOperand",
-    "pattern",
-}  # parameters of distributions, and one of two
-_TRUTHS = ("control", "select", "selector", "enable")
+# What cannot change in a run, and what does not go with something else.
+NOT_WIRED = {"lambda", "alpha", "gamma", "cut", "secondOperand", "pattern"}
+FED = {
+    "ArrayToElements": "{1, 2}", "ArrayToSequence": "{1, 2}", "ArrayAppend": "{1, 2}", "DotProduct": "{1, 2}",
+    "RecordDisassembler": "{x = 1}", "RecordUpdater": "{y = 1}", "UnionDisassembler": "{x = 1}",
+    "StringLength": '"a"', "StringSubstring": '"a"', "StringToInt": '"1"', "StringToDouble": '"1"',
+    "StringToBoolean": '"true"',
+}  # fmt: skip
+PORTS_FED = {
+    "control": "true", "enable": "true", "selector": "true", "select": "true", "array": "{1, 2}",
+    "standardDeviation": "1.0", "upperBound": "2.0", "max": "2.0", "mode": "1.5", "p": "0.5", "trueProbability": "0.5",
+}  # fmt: skip
+SAID = {
+    "ExecutionTime": ["A sends how long a computation took, in ms: here 0"],
+    "WallClockTime": ["A sends how long the run has taken, in s: here 0.0"],
+    "SequenceToArray": ["A.arrayLength has no counterpart: its wires are left out"],
+    "TestActorPortDepth": ["A sends the depths of all actors and ports there: here an empty text"],
+    "SingleEvent": ["A.trigger has no counterpart: its wires are left out"],
+}
+
+
+def token(name: str, row: Counterpart, port_name: str) -> str:
+    """What is fed to a port."""
+    if row.type == "TextFunction":
+        return '"a"'
+    if name.startswith("Logic") or name in ("EventFilter", "TrueGate", "BooleanToAnything"):
+        return "true"
+    if name.startswith("Array") and port_name == "input" and name != "ArrayAppend":
+        return "{1, 2}"
+    if port_name in ("control", "select") and row.type in ("Switch", "Select"):
+        return "0"
+    return PORTS_FED.get(port_name) or (FED.get(name) if port_name.startswith("input") else None) or "1"
 
 
 @pytest.mark.parametrize("name", ROWS)
@@ -49,19 +67,32 @@ def test_a_row(tmp_path: Path, name: str) -> None:
     java = next(each for each in (f"{LIB}{name}", f"{DE}{name}") if counterpart_of(each) is not None)
     row = counterpart_of(java)
     assert row is not None
-    made = entity("A", java, NEEDED.get(name, ""), **PARAMETERS.get(name, {}))
-    ports = {**{each: said.face.direction for each, said in row.ports.items()}}
+    said = {key: VALUES[each.kind] for key, each in row.parameters.items() if each.kind in VALUES}
+    said |= {key: str(value) for key, value in GIVEN.get(name, {}).items()}
+    texts = "".join(prop(key, "a", TEXT) for key, each in row.parameters.items() if each.kind == "text")
+    made = entity("A", java, NEEDED.get(name, ""), texts, **{k: v for k, v in said.items() if v != VALUES["text"]})
+    ports = {each: port_said.face.direction for each, port_said in row.ports.items()}
     if name in NEEDED:
         ports["x"] = "output" if "Disassembler" in name else "input"
     clocks, sinks, nets = [], [], []
+    left_out = NOT_WIRED | ({"n", "p", "mean"} if row.type == "Random" else set())
     for each, direction in ports.items():
-        if direction == "input" and each not in NOT_WIRED:
-            values = "{true}" if each in _TRUTHS or name.startswith("Logic") else "{1}"
-            values = '{"a"}' if row.type == "TextFunction" else values
+        if direction == "input" and each not in left_out:
+            values = f"{{{token(name, row, each)}}}"
             clocks.append(entity(f"c_{each}", "DiscreteClock", values=values))
             nets.append(f"c_{each}.output A.{each}")
         elif direction == "output":
             sinks.append(entity(f"r_{each}", "Recorder"))
             nets.append(f"A.{each} r_{each}.input")
-    text = imported(tmp_path, model(*clocks, made, *sinks, wires(*nets))).text
-    assert "  A:" in text
+    text = model(*clocks, made, *sinks, wires(*nets), stop=2)
+    assert notes(tmp_path, text) == SAID.get(name, [])
+    assert "A" in run(tmp_path, text).model.graph.actors
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_a_row_to_which_nothing_is_connected(tmp_path: Path, name: str) -> None:
+    """It is left out, unless it begins something by itself."""
+    java = next(each for each in (f"{LIB}{name}", f"{DE}{name}") if counterpart_of(each) is not None)
+    made = entity("A", java, NEEDED.get(name, ""), **GIVEN.get(name, {}))
+    others = entity("Clock", "DiscreteClock") + entity("Recorder", "Recorder")
+    run(tmp_path, model(made, others, wires("Clock.output Recorder.input"), stop=1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 import yaml
@@ -13,8 +14,9 @@ from epicycle.runner import Model, Results, Simulation
 from epicycle.runner.cli import main
 from epicycle.runner.show import Figure, FigureError, draw, draw_figures
 from epicycle.runner.show.graph import outline, write_graph
-from epicycle.runner.show.pen import Sheet, style
+from epicycle.runner.show.pen import style
 from epicycle.runner.show.report.data import shown
+from epicycle.runner.show.sheet import Sheet
 
 TEXTS = ["$\\left $\\frac{a}{", "$x^" + "{" * 40, "a $b$ \x1b[31m\u202e & #1_2"]
 
@@ -30,6 +32,7 @@ def test_a_figure_of_a_study(text: str, tmp_path: Path) -> None:
         sheet.legend([line], [text], title=text)
         sheet.save(paths)
     assert all(path.stat().st_size > 5_000 for path in paths)
+    ElementTree.parse(paths[0])  # no character in it breaks the file
 
 
 class _Broken(Figure):
@@ -66,6 +69,8 @@ def test_a_drawing_of_the_graph(kind: str, tmp_path: Path) -> None:
     model.add(Clock("clock", period=1))
     write_graph(outline(model), tmp_path / f"g.{kind}")
     assert (tmp_path / f"g.{kind}").stat().st_size > 50
+    if kind == "svg":
+        ElementTree.parse(tmp_path / "g.svg")
 
 
 LONG = "x" * 50_000

@@ -15,10 +15,10 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from epicycle.runner import ModelError, load_model
-from epicycle.runner.catalogue import built_in, figure_types
+from epicycle.runner.catalogue import built_in, own_figures
 from epicycle.runner.cli import main
 from epicycle.runner.language import json_schema
-from epicycle.runner.show.report import check_figures, study_figure_types
+from epicycle.runner.show.report import check_figures, own_study_figures
 from epicycle.runner.study import open_study
 from epicycle.runner.text import Problems, parse, plain
 from tests import cases
@@ -117,7 +117,7 @@ def test_schema_refuses_what_is_misshapen() -> None:
         assert node is not None
         return plain(node)
 
-    validator = Draft202012Validator(json_schema(built_in(), figure_types(), study_figure_types()))
+    validator = Draft202012Validator(json_schema(built_in(), own_figures(), own_study_figures()))
     refused = [case.name for case in CASES if not validator.is_valid(document(case.text))]
     assert [name for name in SHAPES if name not in refused] == []
     said = {case.name: case.message for case in CASES}

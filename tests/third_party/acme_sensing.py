@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter
 from epicycle.aspects import JoinPoint, MeasurementAspect
+from epicycle.runner.show import Figure
+from epicycle.runner.show.report import StudyFigure
 
 
 class Thermometer(Actor):
@@ -31,3 +34,34 @@ class Icing(MeasurementAspect):
         if token < self.freezing:
             point.act("frozen", token)
         point.forward(max(token, self.freezing))
+
+
+class Extremes(Figure):
+    """The least and the greatest value of a signal."""
+
+    signal = Parameter(str, doc="which signal")
+
+    def signal_patterns(self) -> tuple[str, ...]:
+        return (self.signal,)
+
+    def draw(self, results: Any, path: Path) -> None:
+        from matplotlib.figure import Figure as Canvas
+
+        canvas, values = Canvas(), results.signals[self.signal].tokens
+        canvas.subplots().barh(["least", "greatest"], [min(values), max(values)])
+        canvas.savefig(path)
+
+
+class Ladder(StudyFigure):
+    """A metric of all runs, the least first."""
+
+    metric = Parameter(str, doc="column of the table")
+
+    def draw(self, data: Any, extracts: Any, paths: Any) -> str:
+        from matplotlib.figure import Figure as Canvas
+
+        canvas = Canvas()
+        canvas.subplots().plot(sorted(row[self.metric] for row in data.rows), "o")
+        for path in paths:
+            canvas.savefig(path)
+        return f"{len(data.rows)} runs."

@@ -269,7 +269,7 @@ class _Scope:
                 begin, end = self.spans[cell.layer]
                 start = begin if cell.layer > net.source.cell.layer else end - cell.width
                 at = top + cell.y + cell.height / 2
-                drawing.pills.append(Pill(label(link), "", x + start + 4.0, at, link.delay))
+                drawing.pills.append(Pill(label(link), "", x + start + 4.0, at, delay=link.delay))
 
     def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
         """The name and type of a box: in one line above the inside of a composite, else one below the other."""

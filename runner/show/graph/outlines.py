@@ -6,7 +6,6 @@ becomes a closed box.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import accumulate, chain
@@ -234,21 +233,32 @@ class _Outliner:
 
     def _links(self, path: str) -> list[Link]:
         """The connections inside a composite; those of instances that are one box are one link."""
-        counts = Counter(
-            (self._shown(hop.source), self._shown(hop.destination), hop.delay) for hop in self.hops.get(path, ())
-        )
-        return [Link(*key, self._how_many(path, *key[:2], count)) for key, count in counts.items()]
+        links: dict[tuple[str, str, int | None], list[Hop]] = {}
+        for hop in self.hops.get(path, ()):
+            links.setdefault((self._shown(hop.source), self._shown(hop.destination), hop.delay), []).append(hop)
+        return [Link(*key, self._how_many(path, *key[:2], hops)) for key, hops in links.items()]
 
-    def _how_many(self, path: str, source: str, target: str, count: int) -> str:
-        """What to say of the number of connections that one link inside a composite stands for."""
+    def _how_many(self, path: str, source: str, target: str, hops: list[Hop]) -> str:
+        """What to say of the connections that one link inside a composite stands for."""
         one, other = [1 if _owner(port) == path else len(self._instances(_owner(port))) for port in (source, target)]
+        count = len(hops)
         if count == max(one, other):
-            return ""
+            if min(one, other) == 1:
+                return ""
+            is_same = all(self._index(hop.source) == self._index(hop.destination) for hop in hops)
+            if _owner(source) == _owner(target):
+                return "each to itself" if is_same else "each to another"
+            return "in pairs" if is_same else f"×{count}"
         if min(one, other) > 1 and count == one * other:
             return "each to all"
         if min(one, other) > 1 and count == one * (one - 1) and _owner(source) == _owner(target):
             return "each to all others"
         return f"×{count}"
+
+    def _index(self, port: str) -> int:
+        """Which instance of its array the owner of a port is."""
+        owner = _owner(port)
+        return self._instances(owner).index(owner)
 
     def _instances(self, path: str) -> list[str]:
         """The instances for which the box of an actor or composite stands."""

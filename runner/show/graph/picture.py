@@ -7,16 +7,18 @@ Colours are Okabe and Ito's, which people with any colour vision can tell apart;
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import networkx as nx
 
+from epicycle.aspects import Medium, Processor
+
 from ...graph import WovenAspect, extent
 from ..pen import font, new_canvas, save, style, text_width
-from .layout import MARGIN, PILL, PILL_HEIGHT, PORT, Drawing, Line, PlacedBox, Point, Wire, Words, pill_width
+from .layout import MARGIN, PILL, PILL_HEIGHT, PORT, Drawing, Line, Pill, PlacedBox, Point, Wire, Words, pill_width
 from .outlines import duration, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
@@ -24,18 +26,14 @@ FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")
 ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0072B2", "#999999")
 DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
 # Of a PNG: whole pixels for a point, so that lines are sharp; how many pixels there may be, and on one side.
-DPI, PIXELS, SIDE = (288, 144, 72), 4e7, 30000
+DPI, PIXELS, SIDE = (144, 72), 1.6e7, 12000
 LINE = 15.0  # height of a line of the legend
 
 
 def write_picture(drawing: Drawing, path: Path) -> None:
     """Draw into a file, whose ending decides the format; the same drawing gives the same bytes."""
-    seen = {pill.aspect for pill in drawing.pills}
-    aspects: dict[str, list[WovenAspect]] = {}  # in the order of their declaration
-    for woven in drawing.outline.model.aspects:
-        if (name := short_name(woven.name)) in seen:
-            aspects.setdefault(name, []).append(woven)
-    legend = _legend(drawing, aspects)
+    aspects = aspects_seen(drawing)
+    legend = legend_of(drawing, aspects)
     width = max([drawing.width, *(row.indent + text_width(row.explanation, PORT) + 2 * MARGIN for row in legend)])
     height = drawing.height + LINE * len(legend) + (MARGIN if legend else 0.0)
     most = 72 * min(SIDE / max(width, height), math.sqrt(PIXELS / (width * height)))
@@ -46,6 +44,16 @@ def write_picture(drawing: Drawing, path: Path) -> None:
         colours = dict(zip(aspects, cycle(ASPECTS), strict=False))
         Painter(sheet, colours).paint(drawing, legend)
         save(canvas, path, dpi=next((dpi for dpi in DPI if dpi <= most), most), facecolor="white")
+
+
+def aspects_seen(drawing: Drawing) -> dict[str, list[WovenAspect]]:
+    """The aspects whose badges are in a drawing, by name, in the order of their declaration."""
+    seen = {pill.aspect for pill in drawing.pills}
+    found: dict[str, list[WovenAspect]] = {}
+    for woven in drawing.outline.model.aspects:
+        if (name := short_name(woven.name)) in seen:
+            found.setdefault(name, []).append(woven)
+    return found
 
 
 class Row(NamedTuple):
@@ -61,13 +69,44 @@ class Row(NamedTuple):
         return 6.0 + (pill_width(self.words) if self.words else 14.0)
 
 
-def _legend(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[Row]:
+def shared(woven: WovenAspect) -> tuple[str, ...] | None:
+    """The medium or processor of an aspect, which others may name, too; None if its places share nothing."""
+    if not isinstance(woven.aspect, Medium | Processor):
+        return None
+    name = getattr(woven.aspect, "medium", None)
+    return (woven.kind, woven.name.rpartition(".")[0], name) if name else (woven.kind, woven.name)
+
+
+def tied(drawing: Drawing) -> list[list[Pill]]:
+    """The badges of each medium and processor that several places share."""
+    groups: dict[tuple[str, ...], list[Pill]] = {}
+    for woven in drawing.outline.model.aspects:
+        if key := shared(woven):
+            places = [*woven.ports, *woven.actors]
+            groups.setdefault(key, []).extend(
+                pill
+                for pill in drawing.pills
+                if pill.aspect == short_name(woven.name)
+                and any(place == pill.place or place.startswith(f"{pill.place}.") for place in places)
+            )
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def ties(group: list[Pill]) -> Iterator[Line]:
+    """Lines that join badges: each to the nearest of those before it, along and then up or down."""
+    middles = sorted((pill.x + pill.width / 2, pill.y) for pill in group)
+    for number, (x, y) in enumerate(middles[1:], start=1):
+        other, level = min(middles[:number], key=lambda end: abs(end[0] - x) + abs(end[1] - y))
+        yield ((other, level), (x, level), (x, y)) if other != x and level != y else ((other, level), (x, y))
+
+
+def legend_of(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[Row]:
     """What needs to be explained of a drawing."""
     boxes = [placed.box for placed in drawing.boxes]
     rows = []
     for name, woven in aspects.items():
         kinds = ", ".join(dict.fromkeys(each.kind for each in woven))
-        rows.append(Row("aspect", name, f"aspect {kinds}, at {extent(woven)}"))
+        rows.append(Row("aspect", name, f"aspect {kinds}, at {extent(woven)}{_sharing(woven)}"))
     delay = next((pill.delay for pill in drawing.pills if pill.delay is not None), None)
     if delay is not None:
         rows.append(Row("label", duration(delay), "delay of a connection"))
@@ -78,6 +117,15 @@ def _legend(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[Row
         "closed": ("composite whose inside is not shown", any(box.is_closed for box in boxes)),
     }
     return rows + [Row(sample, "", explanation) for sample, (explanation, is_seen) in signs.items() if is_seen]
+
+
+def _sharing(woven: list[WovenAspect]) -> str:
+    """What to say if the places of aspects share something."""
+    found = {shared(each) for each in woven}
+    if None in found or sum(len(each.places) for each in woven) < 2:
+        return ""
+    what = "processor" if isinstance(woven[0].aspect, Processor) else "medium"
+    return f", which share one {what}" if len(found) == 1 else f"; dashed lines join those that share one {what}"
 
 
 class Painter:
@@ -93,6 +141,8 @@ class Painter:
     def paint(self, drawing: Drawing, legend: list[Row]) -> None:  # what lies below first
         for placed in drawing.boxes:
             self.box(placed)
+        for group in tied(drawing):
+            self.path(ties(group), self.colours[group[0].aspect], 3.0, dashes=(1.2, 1.0))
         self.wires(drawing.wires)
         for placed in drawing.boxes:
             for port in placed.ports:
@@ -150,7 +200,9 @@ class Painter:
             corners = [(x - 2.4, y), (x - 8.4, y - 2.6), (x - 8.4, y + 2.6)]
             self.sheet.add_artist(self.shapes.Polygon(corners, closed=True, **look))
 
-    def path(self, lines: Iterable[Line], colour: str, width: float, radius: float = 4.0) -> None:
+    def path(
+        self, lines: Iterable[Line], colour: str, width: float, radius: float = 4.0, dashes: Sequence[float] = ()
+    ) -> None:
         """Lines with round corners."""
         from matplotlib.path import Path as Outline
 
@@ -166,7 +218,8 @@ class Painter:
             corners.append(line[-1])
             codes.append(Outline.LINETO)
         if corners:
-            look = {"fill": False, "edgecolor": colour, "linewidth": width, "capstyle": "round", "zorder": 2}
+            look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": width, "zorder": 2}
+            look |= {"linestyle": (0, dashes), "capstyle": "butt"} if dashes else {"capstyle": "round"}
             self.sheet.add_artist(self.shapes.PathPatch(Outline(corners, codes), **look))
 
     def pill(self, words: str, aspect: str, x: float, y: float) -> None:

@@ -16,7 +16,7 @@ from ...text import ModelError, Problems, describe, raised_at
 from ..outcome import MAX_NAME
 from ..pen import FORMATS, FigureError, style
 from .data import Data
-from .declared import check_figures, figures_of_study, study_figure_types
+from .declared import check_figures, figures_of_study, own_study_figures, study_figure_types
 from .figure import RunKey, SignalFigure, StudyFigure
 from .page import Picture, report_page
 
@@ -26,6 +26,7 @@ __all__ = [
     "StudyFigure",
     "check_figures",
     "figures_of_study",
+    "own_study_figures",
     "study_figure_types",
     "write_report",
 ]

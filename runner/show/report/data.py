@@ -84,8 +84,9 @@ class Names:
         return self.plan.columns.get(column, Column()).doc
 
     def words(self, column: str) -> str:
-        """A column's name, to be read."""
-        return abridged(self.labels.get(column) or column.replace("_", " "), MAX_LABEL)
+        """What a column is called."""
+        label = self.labels.get(column) or self.plan.columns.get(column, Column()).label
+        return abridged(label or column.replace("_", " "), MAX_LABEL)
 
     def axis(self, column: str) -> str:
         """What stands at an axis: the name with its unit."""

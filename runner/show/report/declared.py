@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as AnyMapping
 from contextlib import suppress
 
 from epicycle.actors import UnitError, variants
 
 from ...build import Complaint, made_figure, place_in_figure, tell_of_figure
+from ...catalogue import with_offered
 from ...language import in_si, split_number
 from ...study import Plan
 from ...text import Mapping, Node, Problems, Sequence, plain
@@ -15,10 +17,15 @@ from .figure import SignalFigure, StudyFigure
 from .of_table import CURVES, Distributions, Means
 
 
-def study_figure_types() -> dict[str, type[StudyFigure]]:
-    """The figures that a study may ask for, by name."""
+def own_study_figures() -> dict[str, type[StudyFigure]]:
+    """The figures of studies that Epicycle and the running program define, by name."""
     known: dict[str, type[StudyFigure]] = variants(StudyFigure)
     return dict(sorted((name, cls) for name, cls in known.items() if cls.draw is not StudyFigure.draw))
+
+
+def study_figure_types() -> AnyMapping[str, type[StudyFigure]]:
+    """The figures that a study may ask for, by name."""
+    return with_offered(StudyFigure, "epicycle.study_figures", own_study_figures())
 
 
 def check_figures(plan: Plan) -> None:

@@ -13,7 +13,7 @@ from ...build import Complaint, Model
 from ...language import Dimension, Factor
 from ...results import Results
 from ...study import Plan
-from ..pen import MAX_LINES, MAX_PANELS, Sheet
+from ..sheet import DASHES, FEW, MARKERS, MAX_LINES, MAX_PANELS, Sheet, colours
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 
 # The parameters of figures that name parts of the study, as far as a figure has them.
@@ -73,11 +73,13 @@ class StudyFigure(Configurable):
         value = getattr(self, parameter, None) or ()
         return (value,) if isinstance(value, str) else tuple(value)
 
-    def arranged(self, data: Data, *, has_axis: bool = False) -> Layout:
+    def arranged(self, data: Data, *, has_axis: bool = False, metrics: Sequence[str] = ()) -> Layout:
+        """The conditions in panels and lines; with ``metrics``, these are the lines."""
         over = getattr(self, "over", None) if has_axis else None
-        lines = getattr(self, "lines", "")  # a figure that has no such parameter draws one line a panel
+        # A figure that has no such parameter draws one line a panel.
+        lines = "" if metrics else getattr(self, "lines", "")
         found = roles(data.plan, self.where, over, lines, self.named("panels"), has_axis=has_axis)
-        return Layout(data, self, found)
+        return Layout(data, self, found, metrics)
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         """Write the figure to the files, and return what is to be said of it; ``extracts`` are of repeated runs."""
@@ -157,12 +159,15 @@ class Layout:
     More than can be told apart are left out, which ``omitted`` says.
     """
 
-    def __init__(self, data: Data, figure: StudyFigure, found: Roles) -> None:
+    def __init__(self, data: Data, figure: StudyFigure, found: Roles, metrics: Sequence[str] = ()) -> None:
         self.roles = found
+        self._metrics = metrics
         self.names = Names(data.plan, figure.labels)
         self.chosen = data.where(figure.where)
         self.handles: dict[str, Any] = {}
-        levels: list[Factor] = data.levels(found.lines, self.chosen, figure.where) if found.lines else [None]
+        levels: list[Factor] = (
+            data.levels(found.lines, self.chosen, figure.where) if found.lines else [*metrics] or [None]
+        )
         choices = [data.levels(name, self.chosen, figure.where) for name in found.panels]
         panels = []
         for combination in product(*choices):
@@ -180,20 +185,39 @@ class Layout:
             omitted.append(f"Of {counted(len(panels), 'panel')} the first {MAX_PANELS} are shown.")
         self.omitted = " ".join(omitted)
         self.panels, self.levels = panels[:MAX_PANELS], levels[:MAX_LINES]
+        self.shades = colours(len(self.levels))
         # Two factors make rows and columns.
         self.columns = len(choices[1]) if len(choices) == 2 and 1 < len(choices[1]) <= 4 else None
 
     def sheet(self, **look: Any) -> Sheet:
         return Sheet(**{"panels": [panel.title for panel in self.panels] or [""], "columns": self.columns, **look})
 
+    def look(self, number: int, *, marked: bool = False) -> dict[str, Any]:
+        """How a line is drawn: few differ in more than their colours."""
+        few = number < FEW and len(self.levels) <= FEW
+        look = {"color": self.shades[number], "linestyle": DASHES[number] if few else "-"}
+        return {**look, "marker": MARKERS[number] if few else "."} if marked else look
+
+    def called(self, level: Factor) -> str:
+        """What a line is called in the key."""
+        return self.names.words(str(level)) if self._metrics else self.names.level(self.roles.lines or "", level)
+
+    def about(self, panel: Panel, level: Factor) -> str:
+        """Which panel and line a tip is of."""
+        line = self.names.place({self.roles.lines: level}) if self.roles.lines else ""
+        return ", ".join(filter(None, (line, panel.title)))
+
     def show(self, level: Factor, handle: Any) -> None:
-        """Let the legend say which line is that of a level."""
-        if self.roles.lines:
-            self.handles.setdefault(self.names.level(self.roles.lines, level), handle)
+        """Let the key say which line is that of a level."""
+        if self.roles.lines or self._metrics:
+            self.handles.setdefault(self.called(level), handle)
 
     def finish(self, sheet: Sheet, paths: Sequence[Path], *said: str) -> str:
-        """Add the legend, and write the files; what is said of the figure, and of what is left out of it."""
+        """Add the key, and write the files; what is said of the figure, and of what is left out of it."""
         title = self.names.words(self.roles.lines) if self.roles.lines else ""
-        sheet.legend(list(self.handles.values()), list(self.handles), title)
+        if len(self.levels) > FEW:
+            sheet.band([*map(self.called, self.levels)], self.shades, title)
+        else:
+            sheet.legend(list(self.handles.values()), list(self.handles), title)
         sheet.save(paths)
         return " ".join(filter(None, (*said, self.omitted)))

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +28,17 @@ from ...catalogue import Figure
 from ...results import Results
 from ...study import Plan, half_width
 from ...text import Problems
-from ..figures import selected
-from ..pen import DASHES, FORMATS, PALETTE, draw
+from ..pen import FORMATS, draw
+from ..samples import selected
+from ..sheet import colours, set_log
 from ..space import positions
+from ..trajectories import arrows, every, round_step, tip_path, write_times
 from .data import Condition, Data, Names
 from .figure import RunKey, SignalFigure
 
 TOKEN = "token"
 MOST, LEAST = "most", "least"
+_TIPS = 40  # of one line
 _GRID = 400  # points of a mean over time, where tokens come at more times than that
 _FEWEST = 0.5  # share of the runs that a mean over time needs
 
@@ -69,6 +72,7 @@ class Series(RepeatedFigure):
     lines: Parameter[str | None] = Parameter(
         str, None, doc="factor with a line for each level; the next one if left out"
     )
+    log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
 
     def complaints(self, plan: Plan) -> Iterator[Complaint]:
         yield from super().complaints(plan)
@@ -100,10 +104,16 @@ class Series(RepeatedFigure):
             for number, (level, conditions) in enumerate(panel.lines.items()):
                 times, means, halves = over_time([extracts[run] for run in self.first(conditions)])
                 if len(times):
-                    colour = PALETTE[number]
-                    (line,) = axes.plot(times, means, color=colour, linestyle=DASHES[number])
-                    axes.fill_between(times, means - halves, means + halves, color=colour, alpha=0.18, linewidth=0)
+                    look, about = arranged.look(number), arranged.about(panel, level)
+                    (line,) = axes.plot(times, means, **look)
+                    low, high = means - halves, means + halves
+                    axes.fill_between(times, low, high, color=look["color"], alpha=0.18, linewidth=0)
                     arranged.show(level, line)
+                    every = slice(None, None, math.ceil(len(times) / _TIPS))
+                    found = [*zip(times, means, halves, strict=True)][every]
+                    texts = [f"{time:.4g} s: {value:.4g} ± {half:.2g}\n{about}" for time, value, half in found]
+                    sheet.tip(axes, [(time, value) for time, value, _ in found], texts)
+            set_log(axes, x=False, y=self.log_y)
         sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
         said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"
         return arranged.finish(sheet, paths, f"{said}, as long as half of them go on.")
@@ -134,10 +144,19 @@ def over_time(
     return times[kept], np.array(means), np.array(halves)
 
 
+class Way(NamedTuple):
+    """Where a thing was when."""
+
+    signal: str
+    times: NDArray[np.float64]
+    points: NDArray[np.float64]
+
+
 class Tracks(RepeatedFigure):
     """The ways of moving things, the first runs of a condition in one panel, in the manner of the paper's Fig. 6.
 
-    Signals are of states with a ``position``; a circle is where a way begins.
+    Signals are of states with a ``position``.  A way begins with a circle and has arrowheads; dots on it are as far
+    apart in time as the times that are written at the first one.
     """
 
     signal_parameters = ("signals", "around")
@@ -148,41 +167,57 @@ class Tracks(RepeatedFigure):
         array_parameter((2,), unit="m"), {}, doc="places by what they are called, such as {goal: [0, 0]}"
     )
 
-    def extract(self, model: Model, results: Results) -> dict[str, list[tuple[str, NDArray[np.float64]]]]:
+    def extract(self, model: Model, results: Results) -> dict[str, list[Way]]:
         """Signals and ways, by what they are shown as."""
         ways = (("ways", self.signals), ("around", self.around))
         return {
-            kind: [(name, positions(results[name])) for name in selected(patterns, results)] for kind, patterns in ways
+            kind: [Way(name, results[name].times, positions(results[name])) for name in selected(patterns, results)]
+            for kind, patterns in ways
         }
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         arranged = self.arranged(data)
         columns = arranged.columns or (1 if len(arranged.panels) == 1 else 2)
-        seen = [way for extract in extracts.values() for ways in extract.values() for _, way in ways]
+        seen = [way.points for extract in extracts.values() for ways in extract.values() for way in ways]
         points = np.concatenate([*seen, *(place[None] for place in self.marks.values())])
         low, high = points.min(axis=0), points.max(axis=0)
         room = 0.04 * max(*(high - low), 1e-9)
         width, depth = high - low + 2 * room
+        longest = max(
+            (way.times[-1] for each in extracts.values() for way in each["ways"] if len(way.times)), default=1.0
+        )
+        step = round_step(longest / 5)
         height = min(6.0, (3.8 if columns == 1 else 6.4 / columns) * depth / width + 0.35)
         sheet = arranged.sheet(columns=columns, height=height, same_x=True, same_y=True)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
             runs = [run for conditions in panel.lines.values() for run in self.first(conditions)]
-            for number, run in enumerate(runs):
-                for _, way in extracts[run]["ways"]:
-                    axes.plot(*way.T, color=PALETTE[number % len(PALETTE)], linewidth=0.9, alpha=0.85)
-                    look = {"markersize": 4.5, "color": "white", "markeredgecolor": "0.2", "zorder": 4}
-                    (arranged.handles["start"],) = axes.plot(*way[:1].T, "o", **look)
-                for name, way in extracts[run]["around"] if number == 0 else ():
-                    (line,) = axes.plot(*way.T, "--", color="0.3", linewidth=1.0)
-                    arranged.handles[name.rpartition(".")[0]] = line
-            for (name, place), marker in zip(self.marks.items(), cycle("*XPDv"), strict=False):
-                look = {"marker": marker, "markersize": 8, "color": "black", "linestyle": "none", "zorder": 5}
-                (arranged.handles[name],) = axes.plot(*place, **look)
             axes.set_aspect("equal")
             axes.set_xlim(low[0] - room, high[0] + room)
             axes.set_ylim(low[1] - room, high[1] + room)
+            shades = colours(len(runs))
+            for number, run in enumerate(runs):
+                for way in extracts[run]["ways"]:
+                    axes.plot(*way.points.T, color=shades[number], linewidth=0.9, alpha=0.85)
+                    look = {"markersize": 4.5, "color": "white", "markeredgecolor": "0.2", "zorder": 4}
+                    (arranged.handles["start"],) = axes.plot(*way.points[:1].T, "o", **look)
+                    arrows(axes, way.points, shades[number], size=8.0)
+                    dots = every(way.times, step)
+                    axes.plot(*way.points[dots].T, ".", color=shades[number], markersize=3.5)
+                    if number == 0:
+                        write_times(axes, way.points, way.times, dots, shades[number])
+                    place = arranged.names.place(data.conditions[run[0]].values)
+                    about = f"{way.signal}, replication {run[1]}\n{place}"
+                    tip_path(sheet, axes, about, way.times, way.points, _TIPS)
+                for way in extracts[run]["around"] if number == 0 else ():
+                    (line,) = axes.plot(*way.points.T, "--", color="0.3", linewidth=1.0)
+                    arrows(axes, way.points, "0.3", size=8.0)
+                    arranged.handles[way.signal.rpartition(".")[0] or way.signal] = line
+            for (name, place), marker in zip(self.marks.items(), cycle("*XPDv"), strict=False):
+                look = {"marker": marker, "markersize": 8, "color": "black", "linestyle": "none", "zorder": 5}
+                (arranged.handles[name],) = axes.plot(*place, **look)
         sheet.call_axes("x (m)", "y (m)")
-        return arranged.finish(sheet, paths, f"The first {counted(self.runs, 'run')} of each condition.")
+        said = f"The first {counted(self.runs, 'run')} of each condition; dots are {step:g} s apart."
+        return arranged.finish(sheet, paths, said)
 
 
 class SingleRun(SignalFigure):

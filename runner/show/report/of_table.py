@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import statistics
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
-from epicycle.actors import Parameter, counted, texts_parameter
+from epicycle.actors import EpicycleError, Parameter, counted, texts_parameter
 
 from ...build import Complaint
 from ...language import Factor
-from ...study import Plan, mean
-from ..pen import DASHES, LIMIT, MARKERS, PALETTE
-from .data import Condition, Data, is_numeric, mean_of
+from ...study import Estimate, Plan, mean
+from ..sheet import LIMIT, Sheet, set_log
+from .data import Condition, Data, Names, estimated, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure
 
 BOXES, CURVES = "boxes", "curves"
+_TIPS = 60  # of a curve
+_LETTERS = 84  # in a line below a sheet
 
 
 class TableFigure(StudyFigure):
@@ -32,46 +34,100 @@ class TableFigure(StudyFigure):
 
 class Means(TableFigure):
     """The mean of a metric over a factor, with 95 % intervals (Student): a line for each level of another factor, and
-    a panel for each level of a third."""
+    a panel for each level of a third.
 
-    metric = Parameter(str, doc="column of the table")
+    Several metrics have a row of panels each, or are the lines of one panel.
+    """
+
+    metric = texts_parameter(doc="column of the table, or several")
     over: Parameter[str | None] = Parameter(
         str, None, doc="factor along the axis; the first one that is a number, if left out"
     )
+    together = Parameter(bool, False, doc="whether several metrics are the lines of one panel; they need one unit")
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
+    log_x = Parameter(bool, False, doc="whether the horizontal axis is logarithmic")
+    log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
+
+    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+        yield from super().complaints(plan)
+        if not self.metric:
+            yield Complaint("metric", "there is no metric in it", "name one at least")
+        units = {plan.columns[name].unit for name in self.metric if name in plan.columns}
+        if self.together and len(units) > 1:
+            listed = ", ".join(f"{name} in {plan.columns[name].unit or '1'}" for name in self.metric)
+            yield Complaint("together", "metrics in one panel need one unit", listed)
+        if self.together and self.lines:
+            yield Complaint("lines", "the metrics are its lines already", "leave 'lines' or 'together' out")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        arranged = self.arranged(data, has_axis=True)
-        names, over = arranged.names, arranged.roles.over
-        sheet = arranged.sheet(same_y=self.same_scale)
-        axis = _Axis(data, arranged)
-        for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
+        arranged = self.arranged(data, has_axis=True, metrics=self.metric if self.together else ())
+        names, axis = arranged.names, _Axis(data, arranged)
+        sheet, panels = by_metric(arranged, self.metric[:1] if self.together else self.metric, self.same_scale)
+        for axes, (metric, panel) in zip(sheet.axes, panels, strict=True):
             for number, (level, conditions) in enumerate(panel.lines.items()):
-                arranged.show(level, self._line(axes, axis, conditions, number, len(arranged.levels)))
-            axis.dress(axes)
-        sheet.call_axes(names.axis(over) if over else "", mean_of(names.axis(self.metric)))
-        what = f"{mean_of(names.words(self.metric)).capitalize()} with its 95 % interval (Student)."
-        return arranged.finish(sheet, paths, what, counts(arranged.chosen, [self.metric]))
+                points = self._points(axis, conditions, str(level) if self.together else metric)
+                self._line(sheet, axes, axis, arranged, panel, number, points)
+            axis.dress(axes, sheet.columns, is_log=self.log_x)
+            set_log(axes, x=self.log_x, y=self.log_y)
+            what = f"mean ({names.unit(metric)})" if names.unit(metric) else "mean"
+            sheet.call(axes, axis.name, what if self.together else mean_of(names.axis(metric)))
+        said = f"{mean_of(listed(map(names.words, self.metric)))} with 95 % intervals (Student)."
+        return arranged.finish(sheet, paths, capitalised(said), counts(arranged.chosen, self.metric, names))
 
-    def _line(self, axes: Any, axis: _Axis, conditions: list[Condition], number: int, lines: int) -> Any:
-        points = []
-        for condition in conditions:
-            estimate = mean(condition.numbers(self.metric))
-            if estimate.count:
-                half = estimate.high - estimate.value
-                points.append((axis.place(condition), estimate.value, half if math.isfinite(half) else 0.0))
-        if axis.is_numeric:
-            points.sort()
-        shift = axis.step * 0.06 * (number - (lines - 1) / 2)  # so that intervals stand beside each other
-        return axes.errorbar(
-            [place + shift for place, _, _ in points],
-            [value for _, value, _ in points],
-            yerr=[half for _, _, half in points],
-            color=PALETTE[number],
-            marker=MARKERS[number],
-            linestyle=DASHES[number] if axis.is_connected else "none",
+    def _points(self, axis: _Axis, conditions: Iterable[Condition], metric: str) -> list[_Point]:
+        points = [_Point(axis.place(each), each, metric, mean(each.numbers(metric))) for each in conditions]
+        known = [point for point in points if point.estimate.count]
+        return sorted(known, key=lambda point: point.place) if axis.is_numeric else known
+
+    def _line(
+        self, sheet: Sheet, axes: Any, axis: _Axis, arranged: Layout, panel: Panel, number: int, points: list[_Point]
+    ) -> None:
+        count, names = len(arranged.levels), arranged.names
+        # So that intervals stand beside each other.
+        shift = 0.0 if self.log_x else axis.step * min(0.06, 0.5 / count) * (number - (count - 1) / 2)
+        places = [(point.place + shift, point.estimate.value) for point in points]
+        look = arranged.look(number, marked=True)
+        handle = axes.errorbar(
+            [place for place, _ in places],
+            [value for _, value in places],
+            yerr=[point.half for point in points],
             elinewidth=1.0,
+            **(look if axis.is_connected else {**look, "linestyle": "none"}),
         )
+        arranged.show(arranged.levels[number], handle)
+        for place, point in zip(places, points, strict=True):
+            value = f"{estimated(point.estimate)} {names.unit(point.metric)}".rstrip()
+            said = f"{mean_of(names.words(point.metric))}: {value} ({counted(point.estimate.count, 'run')})"
+            sheet.tip(axes, [place], [f"{said}\n{names.place(point.condition.values)}"])
+
+
+class _Point(NamedTuple):
+    """A condition in a figure of means."""
+
+    place: float
+    condition: Condition
+    metric: str
+    estimate: Estimate
+
+    @property
+    def half(self) -> float:
+        """Half of the interval, if it has one."""
+        half = self.estimate.high - self.estimate.value
+        return half if math.isfinite(half) else 0.0
+
+
+def by_metric(arranged: Layout, metrics: Sequence[str], same_y: bool = True) -> tuple[Sheet, list[tuple[str, Panel]]]:
+    """A sheet with all panels for each metric, in rows if there are few."""
+    panels = [(metric, panel) for metric in metrics for panel in arranged.panels or [Panel("", {})]]
+    across = len(arranged.panels)
+    is_grid = len(metrics) > 1 and 1 < across <= 4
+    sheet = arranged.sheet(
+        panels=[panel.title for _, panel in panels],
+        columns=across if is_grid else min(len(metrics), 3) if across <= 1 else arranged.columns,
+        same_y=same_y and ("row" if is_grid else len(metrics) == 1),
+    )
+    sheet.are_alike = is_grid or len(metrics) == 1
+    return sheet, panels
 
 
 class Distributions(TableFigure):
@@ -87,6 +143,7 @@ class Distributions(TableFigure):
         str, None, doc="factor along the axis of boxes; the first one that is a number, if left out"
     )
     limit: Parameter[float | None] = Parameter(float, None, doc="a value with a line, such as a distance to be kept")
+    log = Parameter(bool, False, doc="whether the axis of the values is logarithmic")
 
     def complaints(self, plan: Plan) -> Iterator[Complaint]:
         yield from super().complaints(plan)
@@ -96,25 +153,16 @@ class Distributions(TableFigure):
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         has_axis = self.style == BOXES
         arranged = self.arranged(data, has_axis=has_axis)
-        panels = [(metric, panel) for metric in self.metrics for panel in arranged.panels] or [("", Panel("", {}))]
-        across = len(arranged.panels)
-        is_grid = len(self.metrics) > 1 and 1 < across <= 4  # a row for each metric
-        sheet = arranged.sheet(
-            panels=[panel.title for _, panel in panels],
-            columns=across if is_grid else min(len(self.metrics), 3) if across == 1 else arranged.columns,
-            same_y="row" if is_grid else len(self.metrics) == 1,
-        )
+        sheet, panels = by_metric(arranged, self.metrics)
         for axes, (metric, panel) in zip(sheet.axes, panels, strict=True):
             if has_axis:
-                self._boxes(axes, data, metric, panel, arranged)
+                self._boxes(sheet, axes, data, metric, panel, arranged)
             else:
-                self._curves(axes, metric, panel, arranged)
-        if is_grid or len(self.metrics) == 1:  # the panels of a row have one axis
-            for axes in sheet.axes:
-                axes.label_outer(remove_inner_ticks=False)
+                self._curves(sheet, axes, metric, panel, arranged)
+            set_log(axes, x=self.log and not has_axis, y=self.log and has_axis)
         boxes = "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
         said = [boxes if has_axis else "Share of the runs whose value is no greater."]
-        said.append(counts(arranged.chosen, self.metrics))
+        said.append(counts(arranged.chosen, self.metrics, arranged.names))
         if self.limit is not None:
             for metric in self.metrics:
                 values, names = _numbers(arranged.chosen, metric), arranged.names
@@ -122,23 +170,29 @@ class Distributions(TableFigure):
                 said.append(f"Below {names.level(metric, self.limit)}: {names.words(metric)} of {below:,} of {runs}.")
         return arranged.finish(sheet, paths, *said)
 
-    def _boxes(self, axes: Any, data: Data, metric: str, panel: Panel, arranged: Layout) -> None:
+    def _boxes(self, sheet: Sheet, axes: Any, data: Data, metric: str, panel: Panel, arranged: Layout) -> None:
         from matplotlib.patches import Patch
 
         names, over, lines = arranged.names, arranged.roles.over, len(arranged.levels)
         levels = data.levels(over, arranged.chosen, self.where) if over else [None]
         width = 0.8 / lines
         for number, (line, conditions) in enumerate(panel.lines.items()):
-            colour = PALETTE[number]
+            colour = arranged.shades[number]
             groups: dict[int, list[float]] = {}
             for place, level in enumerate(levels):
                 here = [each for each in conditions if not over or each.values[over] == level]
                 if values := _numbers(here, metric):
                     groups[place] = values
+            places = {place: place + width * (number - (lines - 1) / 2) for place in groups}
+            for place, values in groups.items():
+                value = f"{names.words(metric)}: {_spread(values, names.unit(metric))} ({counted(len(values), 'run')})"
+                at = names.place({over: levels[place]}) if over else ""
+                said = "\n".join(filter(None, (value, at, arranged.about(panel, line))))
+                sheet.tip(axes, [(places[place], statistics.median(values))], [said])
             if groups:
                 axes.boxplot(
                     list(groups.values()),
-                    positions=[place + width * (number - (lines - 1) / 2) for place in groups],
+                    positions=list(places.values()),
                     widths=0.8 * width,
                     manage_ticks=False,
                     patch_artist=True,
@@ -150,23 +204,29 @@ class Distributions(TableFigure):
                 )
             arranged.show(line, Patch(facecolor=colour, alpha=0.5, edgecolor=colour))
         axes.set_xlim(-0.6, len(levels) - 0.4)
-        _texts_along(axes, range(len(levels)), [names.level("", level) if over else "" for level in levels])
-        axes.set_xlabel(names.axis(over) if over else "")
-        axes.set_ylabel(fill(names.axis(metric), 30))
+        texts = [names.level("", level) if over else "" for level in levels]
+        _texts_along(axes, range(len(levels)), texts, sheet.columns)
+        sheet.call(axes, names.axis(over) if over else "", names.axis(metric))
         axes.grid(axis="x", visible=False)
         if self.limit is not None:
             axes.axhline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
 
-    def _curves(self, axes: Any, metric: str, panel: Panel, arranged: Layout) -> None:
+    def _curves(self, sheet: Sheet, axes: Any, metric: str, panel: Panel, arranged: Layout) -> None:
         for number, (line, conditions) in enumerate(panel.lines.items()):
             if values := sorted(_numbers(conditions, metric)):
                 shares = [place / len(values) for place in range(len(values) + 1)]
-                look = {"drawstyle": "steps-post", "color": PALETTE[number], "linestyle": DASHES[number]}
+                look = {"drawstyle": "steps-post", **arranged.look(number)}
                 (curve,) = axes.plot([values[0], *values], shares, **look)
                 arranged.show(line, curve)
+                every = slice(None, None, math.ceil(len(values) / _TIPS))
+                unit, about = arranged.names.unit(metric), arranged.about(panel, line)
+                texts = [
+                    f"{share:.3g} of the runs: up to {value:.4g} {unit}".rstrip() + f"\n{about}"
+                    for value, share in zip(values, shares[1:], strict=True)
+                ]
+                sheet.tip(axes, [*zip(values, shares[1:], strict=True)][every], texts[every])
         axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel(arranged.names.axis(metric))
-        axes.set_ylabel("share of runs")
+        sheet.call(axes, arranged.names.axis(metric), "share of runs")
         if self.limit is not None:
             axes.axvline(self.limit, color=LIMIT, linewidth=1.0, zorder=1)
 
@@ -175,7 +235,24 @@ def _numbers(conditions: Sequence[Condition], metric: str) -> list[float]:
     return [value for condition in conditions for value in condition.numbers(metric)]
 
 
-def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
+def _spread(values: Sequence[float], unit: str) -> str:
+    """What a box shows, in words."""
+    low, middle, high = statistics.quantiles(values, method="inclusive") if len(values) > 1 else [values[0]] * 3
+    return f"median {middle:.4g} {unit}".rstrip() + f", middle half {low:.4g} to {high:.4g}"
+
+
+def listed(words: Iterable[str]) -> str:
+    """Several things in a sentence."""
+    *others, last = words
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def capitalised(text: str) -> str:
+    """A sentence as it begins."""
+    return text[:1].upper() + text[1:]
+
+
+def counts(chosen: Sequence[Condition], metrics: Sequence[str], names: Names) -> str:
     """How many runs stand behind a figure, and how many are in none of its numbers."""
     runs = sum(len(condition.rows) for condition in chosen)
     bad = runs - sum(len(condition.good) for condition in chosen)
@@ -184,7 +261,7 @@ def counts(chosen: Sequence[Condition], metrics: Sequence[str]) -> str:
         parts.append(f"{bad:,} of them failed")
     for metric in metrics:
         if missing := runs - bad - len(_numbers(chosen, metric)):
-            parts.append(f"{missing:,} have no {metric}")
+            parts.append(f"{missing:,} have no {names.words(metric)}")
     return f"{', '.join(parts)}."
 
 
@@ -193,6 +270,7 @@ class _Axis:
 
     def __init__(self, data: Data, arranged: Layout) -> None:
         self._factor = factor = arranged.roles.over
+        self.name = arranged.names.axis(factor) if factor else ""
         self._levels: list[Factor] = data.levels(factor, arranged.chosen) if factor else [None]
         self._texts = [arranged.names.level("", level) if factor else "" for level in self._levels]
         self.is_numeric = factor is not None and is_numeric(data.plan, factor) and None not in self._levels
@@ -211,17 +289,23 @@ class _Axis:
     def place(self, condition: Condition) -> float:
         return self._of(condition.values[self._factor]) if self._factor else 0.0
 
-    def dress(self, axes: Any) -> None:
+    def dress(self, axes: Any, columns: int, *, is_log: bool) -> None:
         """Ticks where levels are: numbers only if they are few, and not strewn like the points of a hypercube."""
+        if is_log and not self.is_numeric:
+            raise EpicycleError("the levels along the axis are not numbers, so that it cannot be logarithmic")
+        if is_log:
+            return
         if not self.is_numeric or (self.is_connected and len(self._places) <= 12):
-            _texts_along(axes, self._places, self._texts)
+            _texts_along(axes, self._places, self._texts, columns)
         if not self.is_numeric:
             axes.set_xlim(-0.5, len(self._places) - 0.5)
 
 
-def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str]) -> None:
-    """Write texts at their places, of many only some, and aslant where they are long."""
-    every = -(-len(texts) // 16)
+def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str], columns: int) -> None:
+    """Write texts at their places: numbers with room between them, and words aslant where they are long."""
+    longest, room = max(map(len, texts), default=0), _LETTERS // columns
+    is_short = longest <= 6
+    every = math.ceil(len(texts) * (longest + 2) / room) if is_short else math.ceil(len(texts) / 16)
     places, texts = places[::every], texts[::every]
-    turned = max(map(len, texts), default=0) * len(texts) > 60
+    turned = not is_short and longest * len(texts) > room
     axes.set_xticks(places, texts, rotation=30 if turned else 0, ha="right" if turned else "center")

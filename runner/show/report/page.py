@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
@@ -27,6 +28,7 @@ from ...study import (
     ranked,
 )
 from ...text import plain
+from ..sheet import tips_of
 from .data import Condition, Data, Names, estimated, mean_of, shown
 
 MAX_ROWS = 400  # of one table
@@ -50,24 +52,59 @@ def report_page(
     recommendations: Sequence[Recommendation],
 ) -> str:
     study = data.plan.study
-    sections: list[tuple[str, list[Html]]] = [
-        ("The study", [*_what(data), *_provenance(data)]),
-        ("Runs", list(_runs(data))),
-        ("Figures", [_picture(number, each) for number, each in enumerate(pictures, start=1)]),
-        ("Means", list(_means(data))),
+    figures = [_picture(number, each) for number, each in enumerate(pictures, start=1)]
+    sections: list[tuple[str, list[Html]]] = [  # answers before numbers, and these before where they come from
         ("Claims", list(claims(data.names, judgements))),
         ("Guideline", list(_guideline(data, recommendations))),
+        ("Figures", [tag("div", figures, class_="figures")] if figures else []),
+        ("Means", list(_means(data))),
+        ("Study", list(_what(data))),
+        ("Runs", list(_runs(data))),
+        ("Provenance", list(_provenance(data))),
     ]
-    filled = [(heading, heading.split()[-1].lower(), content) for heading, content in sections if content]
+    filled = [(heading, heading.lower(), content) for heading, content in sections if content]
     title = study.name.replace("_", " ")
     return page(
         f"{title}: report",
-        Path(__file__).with_suffix(".css").read_text(encoding="utf-8"),
+        _beside("css"),
         tag("h1", title),
         tag("p", study.doc, class_="lead") if study.doc else None,
+        list(_in_short(data, judgements)),
         tag("nav", [tag("a", heading, href=f"#{anchor}") for heading, anchor, _ in filled]),
         [tag("section", tag("h2", heading), content, id=anchor) for heading, anchor, content in filled],
+        tag("dialog", tag("button", "close", type="button", class_="close"), tag("div", "", class_="stage")),
+        script=_beside("js"),
     )
+
+
+def _beside(ending: str) -> str:
+    """The text of the page's own file with this ending."""
+    return Path(__file__).with_suffix(f".{ending}").read_text(encoding="utf-8")
+
+
+def _in_short(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
+    """What a reader should know first: what came of the claims, how much there is, and what is wrong with it."""
+    verdicts = Counter(each.verdict for each in judgements)
+    if verdicts:
+        said = [[tag("b", f"{number} {verdict}", class_=_class(verdict)), " "] for verdict, number in _sorted(verdicts)]
+        yield tag("p", f"{counted(verdicts.total(), 'claim')}: ", said, class_="short")
+    counts, plan = data.results.counts(), data.plan
+    over = counts.total() - data.results.beyond()
+    missing = plan.size - over if plan.study.until is None else 0
+    if missing:
+        yield tag("p", f"The study is not finished: {counted(missing, 'run')} are missing.", class_="problem")
+    if bad := counts.total() - counts["ok"]:
+        link = tag("a", f"{counted(bad, 'run')} without a result", href="#runs")
+        yield tag("p", link, ": in none of the numbers.", class_="problem")
+
+
+def _sorted(verdicts: Counter[str]) -> list[tuple[str, int]]:
+    order = [REPRODUCED, UNDECIDED]
+    return sorted(verdicts.items(), key=lambda each: order.index(each[0]) if each[0] in order else len(order))
+
+
+def _class(verdict: str) -> str:
+    return verdict.replace(" ", "-")
 
 
 def _at_most(data: Data) -> str:
@@ -125,7 +162,6 @@ def _provenance(data: Data) -> Iterable[Html]:
         "SHA-256 of the table": data.results.digest(),
         "repeat a run": f"epicycle replay {data.results.folder.as_posix()} RUN",
     }
-    yield tag("h3", "Made with")
     yield wide_table(["", ""], [[name, tag("code", value)] for name, value in facts.items() if value], class_="facts")
 
 
@@ -137,7 +173,6 @@ def _runs(data: Data) -> Iterable[Html]:
     yield tag("p", f"{over:,} of {_at_most(data)}{counted(plan.size, 'run')} are over{more}")
     rows = [[status, f"{number:,}"] for status, number in sorted(counts.items(), key=lambda each: each[0] != "ok")]
     if missing:
-        yield tag("p", f"The study is not finished: {counted(missing, 'run')} are missing.", class_="problem")
         rows.append(["missing", f"{missing:,}"])
     yield wide_table(["status", "runs"], rows)
     if failures := [row for row in data.rows if row["status"] != "ok"]:
@@ -170,10 +205,26 @@ def _picture(number: int, picture: Picture) -> Html:
     if picture.svg is None:
         shown = tag("p", f"This figure could not be drawn: {picture.said}", class_="problem")
     else:
-        source = f"data:image/svg+xml;base64,{base64.b64encode(picture.svg).decode()}"
-        shown = tag("img", src=source, alt=what)
+        shown = _shown(picture.svg, what)
         caption += [" ", tag("span", picture.said, class_="note")]
+        caption.insert(0, tag("button", "enlarge", type="button", class_="enlarge", aria_label=f"enlarge: {what}"))
     return tag("figure", shown, tag("figcaption", caption), id=f"figure-{picture.name}")
+
+
+def _shown(svg: bytes, what: str) -> Html:
+    """A picture that can be enlarged, and over it what a pointer finds: no part of it can be more than a picture."""
+    source = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+    found = tips_of(svg)
+    if found is None:
+        frame = tag("div", tag("img", src=source, alt=what), class_="frame", tabindex="0")
+    else:
+        width, height = f"{found.width:.0f}", f"{found.height:.0f}"
+        dots = [tag("circle", tag("title", tip.text), cx=f"{tip.x:g}", cy=f"{tip.y:g}", r="4") for tip in found.tips]
+        view = {"viewBox": f"0 0 {found.width:g} {found.height:g}"}
+        over = tag("svg", dots, class_="tips", aria_hidden="true", **view)
+        image = tag("img", src=source, alt=what, width=width, height=height)
+        frame = tag("div", image, over, class_="frame", tabindex="0")
+    return tag("div", frame, class_="scroll")
 
 
 def _means(data: Data) -> Iterable[Html]:
@@ -260,13 +311,13 @@ def claims(names: Names, judgements: Sequence[Judgement]) -> Iterable[Html]:
             "The best comes first: the fewest claims that are not reproduced; then the most that hold in the means, by "
             "chance or not, the most that are reproduced, and the largest share of agreeing comparisons."
         )
-    head = [*map(names.axis, apart), "claim", "", "verdict", "confirmed", "reversed", "undecided", "agreeing"]
+    head = [*map(names.axis, apart), "claim", "verdict", "", "confirmed", "reversed", "undecided", "agreeing"]
     rows = [
         [
             *map(shown, each.where.values()),
             tag("b", each.name),
-            [each.claim.doc, " ", tag("small", each.claim.statement)],
             _verdict(each),
+            [each.claim.doc, " ", tag("small", each.claim.stated(names.words))],
             *(str(each.counts(outcome)) for outcome in (CONFIRMED, REVERSED, UNDECIDED)),
             str(each.agreeing),
             _weakest(names, each),
@@ -311,7 +362,7 @@ def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
 
 
 def _verdict(judgement: Judgement) -> Html:
-    return tag("b", judgement.verdict, class_=judgement.verdict.replace(" ", "-"))
+    return tag("b", judgement.verdict, class_=_class(judgement.verdict))
 
 
 def _findings(names: Names, judgement: Judgement) -> Html:

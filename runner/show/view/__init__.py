@@ -1,6 +1,18 @@
-"""A page that shows a run, or two side by side: what is recorded, how it is packed, and the program that shows it."""
+"""Files that show a run: a page, for one or two side by side, and recordings for other viewers."""
 
-from .page import ViewError, page, write_page
+from .mcap_file import require_mcap, write_mcap
+from .page import page_of, write_page
 from .recording import Recording
+from .rerun_file import require_rerun, write_rerun
+from .writing import ViewError
 
-__all__ = ["Recording", "ViewError", "page", "write_page"]
+__all__ = [
+    "Recording",
+    "ViewError",
+    "page_of",
+    "require_mcap",
+    "require_rerun",
+    "write_mcap",
+    "write_page",
+    "write_rerun",
+]

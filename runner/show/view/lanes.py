@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...catalogue import Figure
 from ...results import Results
-from ..figures import read
+from ..samples import read
 
 POINTS = 8_000  # of a line; above, its lowest and highest value in each of half as many parts of the run
 CHANGES = 20_000  # of a strip

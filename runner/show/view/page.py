@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
@@ -13,41 +12,34 @@ from typing import Any
 
 import numpy as np
 
-from epicycle.actors import EpicycleError, shortened, to_nanoseconds
+from epicycle.actors import shortened, to_nanoseconds
 
 from ...catalogue import Figure
 from ...html import Html, tag
 from ...results import Results
 from ...shown import in_words, short
+from ..sheet import PALETTE
 from .drawing import drawn
 from .lanes import lanes
 from .packing import Pack
 from .recording import NOTHING, Recording
+from .writing import ViewError, replace_file
 
 # In this order, for each uses what stands before.
 PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "main")
 
 
-class ViewError(EpicycleError):
-    """A page that cannot be made."""
-
-
 def write_page(recordings: Sequence[Recording], path: Path, *, names: Sequence[str] = ()) -> None:
     """Write the page of one run, or of two that are compared; raises ``ViewError``."""
-    text = page(recordings, names=names)
-    aside = path.with_name(f".{path.name}")
-    try:
-        aside.write_text(text, encoding="utf-8")
-        os.replace(aside, path)
-    except OSError as error:
-        raise ViewError(f"{path} cannot be written: {error.strerror or error}") from error
+    replace_file(path, page_of(recordings, names=names).encode())
 
 
-def page(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
+def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
     """The page as text; ``names`` tell the runs apart."""
     pack = Pack()
     runs = [_run(each, name, pack) for each, name in zip(recordings, [*names, "", ""], strict=False)]
     about = {
+        "palette": PALETTE,
         "runs": runs,
         "difference": _difference(recordings) if len(recordings) > 1 else None,
         "comparison": _comparison(recordings) if len(recordings) > 1 else [],

@@ -18,10 +18,11 @@ from ...text import Problems, inside, select
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table: what it counts in (empty if that is not known), and what it is."""
+    """A column of the table: what it counts in (empty if that is not known), what it is, and what it is called."""
 
     unit: str = ""
     doc: str = ""
+    label: str = ""
 
 
 # -- metrics ----------------------------------------------------------------------------------------------------------
@@ -110,10 +111,11 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
                 # A number with a unit is in the table in SI units, one without in the parameter's own.
                 unit = si_unit(written[1]) if written is not None and written[1] else declared.unit
                 found[setting.path] = Column(unit, declared.doc)
-    own = {metric.name: Column(metric.unit, metric.measure.doc) for metric in model.metrics}
+    own = {metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.metrics}
     for metric in metrics:
         known = own.get(metric.source.strip(), Column())
-        found[metric.name] = Column(metric.to or known.unit or metric.unit, metric.doc or known.doc)
+        unit = metric.to or known.unit or metric.unit
+        found[metric.name] = Column(unit, metric.doc or known.doc, metric.label or known.label)
     return found
 
 

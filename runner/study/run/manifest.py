@@ -41,7 +41,7 @@ _SHAPE: dict[str, Any] = {
     "lender": (None, [str, str]),
     "factors": {str: _KINDS},
     "metrics": {str: str},
-    "columns": {str: {"unit": str, "doc": str}},
+    "columns": {str: ({"unit": str, "doc": str, "label": str}, {"unit": str, "doc": str})},
     "model": {str: str},
     "sources": {str: str},
     "level_sources": [{str: {str: str}}],

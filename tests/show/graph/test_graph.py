@@ -1,229 +1,24 @@
-"""The drawing of model graphs: what every drawing must have, and what is drawn of a model."""
+"""What is drawn of a model, and the command that draws it."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from itertools import combinations, pairwise
 from pathlib import Path
 
 import networkx as nx
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from epicycle.runner import load_model
 from epicycle.runner.build import Model
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.commands.options import BAD_INPUT
 from epicycle.runner.show.graph import mermaid, outline, write_graph
-from epicycle.runner.show.graph.layers import Cell, Net, Pin, Run
-from epicycle.runner.show.graph.layout import Drawing, Line, PlacedBox, draw
-from epicycle.runner.show.graph.outlines import Box, Link, Outline, Port
-from epicycle.runner.show.graph.places import tracks
-
-Rectangle = tuple[float, float, float, float]  # left, top, right, bottom
-
-
-# -- what must hold for every drawing -----------------------------------------------------------------------------
-
-
-def meet(one: Rectangle, other: Rectangle, by: float = 0.01) -> bool:
-    """Whether two rectangles have more than an edge in common."""
-    return (
-        one[0] + by < other[2] and other[0] + by < one[2] and one[1] + by < other[3] and other[1] + by < one[3]
-    )  # fmt: skip
-
-
-def outside(inner: Rectangle, outer: Rectangle) -> bool:
-    """Whether a rectangle reaches out of another one."""
-    return inner[0] < outer[0] or inner[1] < outer[1] or inner[2] > outer[2] or inner[3] > outer[3]
-
-
-def area(box: PlacedBox) -> Rectangle:
-    return box.x, box.y, box.x + box.width, box.y + box.height
-
-
-def strokes(lines: tuple[Line, ...]) -> Iterator[Rectangle]:
-    """The straight pieces of lines, as rectangles without width."""
-    for line in lines:
-        for (x, y), (u, v) in pairwise(line):
-            yield min(x, u), min(y, v), max(x, u), max(y, v)
-
-
-def words_of(drawing: Drawing) -> list[tuple[str, Rectangle]]:
-    """The places of all texts, badges included."""
-    found = []
-    for each in drawing.words:
-        left = each.x - {"left": 0.0, "center": 0.5, "right": 1.0}[each.align] * each.width
-        found.append((each.text, (left, each.y - 0.75 * each.size, left + each.width, each.y + 0.2 * each.size)))
-    return found + [(each.text, (each.x, each.y - 6.0, each.x + each.width, each.y + 6.0)) for each in drawing.pills]
-
-
-def check(drawing: Drawing) -> None:
-    """Assert everything that makes a drawing right."""
-    boxes = {placed.box.path: placed for placed in drawing.boxes}
-    sheet = (0.0, 0.0, drawing.width, drawing.height)
-    ports = {port.port.path: port for placed in drawing.boxes for port in placed.ports}
-    assert set(boxes) == {box.path for box in drawing.outline.root.walk()}
-
-    for placed in drawing.boxes:
-        around = boxes.get(placed.box.path.rpartition(".")[0])
-        left, top, right, bottom = area(around) if around else sheet
-        assert not outside(area(placed), (left + 4, top + 4, right - 4, bottom - 4))
-        for port in placed.ports:  # inputs on the left edge, outputs on the right one
-            assert port.x == (placed.x if port.port in placed.box.inputs else placed.x + placed.width)
-            assert placed.y < port.y < placed.y + placed.height
-        for one, other in combinations([boxes[child.path] for child in placed.box.children], 2):
-            assert not meet(area(one), area(other)), (one.box.path, other.box.path)
-    for one, other in combinations([boxes[child.path] for child in drawing.outline.root.children], 2):
-        assert not meet(area(one), area(other)), (one.box.path, other.box.path)
-
-    # Each connection is drawn, from its port to its port, and nothing is drawn that is no connection.
-    scopes = [drawing.outline.root, *(box for box in drawing.outline.root.walk() if box.is_open)]
-    links = {(link.source, link.target) for scope in scopes for link in scope.links}
-    assert {(wire.source, target) for wire in drawing.wires for target in wire.targets} == links
-    for wire in drawing.wires:
-        graph: nx.Graph[tuple[float, float]] = nx.Graph()
-        for line in wire.lines:
-            for (x, y), (u, v) in pairwise(line):
-                assert x == u or y == v, "a line that is neither horizontal nor vertical"
-                graph.add_edge((x, y), (u, v))
-        start = (ports[wire.source].x, ports[wire.source].y)
-        ends = {(ports[target].x, ports[target].y) for target in wire.targets}
-        assert nx.is_connected(graph)
-        assert nx.is_tree(graph)
-        assert {point for point, degree in graph.degree if degree == 1} == {start, *ends}
-        assert set(wire.heads) == ends
-
-    # Lines keep out of boxes that they do not belong to, and do not lie on each other without a common port.
-    for wire in drawing.wires:
-        for stroke in strokes(wire.lines):
-            for placed in drawing.boxes:
-                if placed.level >= wire.level:
-                    left, top, right, bottom = area(placed)
-                    assert not meet(stroke, (left + 1, top + 1, right - 1, bottom - 1), 0.0), (wire, placed.box.path)
-    for one_wire, other_wire in combinations(drawing.wires, 2):
-        if {one_wire.source, *one_wire.targets} & {other_wire.source, *other_wire.targets}:
-            continue
-        for a in strokes(one_wire.lines):
-            for b in strokes(other_wire.lines):
-                if a[0] == a[2] == b[0] == b[2]:
-                    assert min(a[3], b[3]) <= max(a[1], b[1]), (one_wire, other_wire)
-                if a[1] == a[3] == b[1] == b[3]:
-                    assert min(a[2], b[2]) <= max(a[0], b[0]), (one_wire, other_wire)
-
-    # Text can be read: it lies on no other text, on no edge of a box, and on no line but that of its own badge.
-    texts = words_of(drawing)
-    for (one_text, one_area), (other_text, other_area) in combinations(texts, 2):
-        assert not meet(one_area, other_area), (one_text, other_text)
-    for text, place in texts:
-        for left, top, right, bottom in map(area, drawing.boxes):
-            for edge in ((left, top, left, bottom), (right, top, right, bottom), (left, top, right, top)):
-                assert not meet(place, edge, 0.0), text
-    for text, place in texts[: len(drawing.words)]:
-        for wire in drawing.wires:
-            assert not any(meet(place, stroke, 0.0) for stroke in strokes(wire.lines)), (text, wire)
-    for pill, (_, place) in zip(drawing.pills, texts[len(drawing.words) :], strict=True):
-        for wire in drawing.wires:
-            for stroke in strokes(wire.lines):
-                assert not meet(place, stroke, 0.0) or stroke[1] == stroke[3] == pill.y, (pill, wire)
-
-
-@st.composite
-def boxes(draw_from: st.DrawFn, path: str = "", level: int = 0) -> Box:
-    """Any box with what is in it."""
-    number = st.integers(0, 3)
-
-    def some_ports(side: str) -> list[Port]:
-        count = draw_from(number) if path else 0
-        aspects = st.lists(st.sampled_from(["loss", "a_long_name"]), max_size=2, unique=True).map(tuple)
-        return [Port(f"{path}.{side}{n}", f"{side}{n}", n == 1, draw_from(aspects)) for n in range(count)]
-
-    name = path.rpartition(".")[2]
-    box = Box(path, name, "Composite" if level < 2 else "T", some_ports("in"), some_ports("out"))
-    box.is_composite = not path or (level < 3 and draw_from(st.booleans()))
-    if not box.is_composite:
-        return box
-    if path and draw_from(st.sampled_from([False, False, True])):
-        box.is_closed, box.aspects = True, draw_from(st.sampled_from([(), ("inner",), ("inner", "loss")]))
-        return box
-    box.children = [
-        draw_from(boxes(f"{path}.b{n}" if path else f"b{n}", level + 1)) for n in range(draw_from(st.integers(0, 5)))
-    ]
-    sources = [port.path for port in (*box.inputs, *(p for child in box.children for p in child.outputs))]
-    targets = [port.path for port in (*box.outputs, *(p for child in box.children for p in child.inputs))]
-    if sources and targets:
-        delays = st.sampled_from([None, None, None, 0, 100_000_000])
-        link = st.builds(Link, st.sampled_from(sources), st.sampled_from(targets), delays)
-        box.links = draw_from(st.lists(link, max_size=12, unique_by=lambda each: (each.source, each.target)))
-    return box
-
-
-@given(boxes())
-@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-def test_every_drawing_is_right(root: Box) -> None:
-    anything = Outline(Model("any"), root, 9, 9)
-    drawing = draw(anything)
-    check(drawing)
-    assert draw(anything) == drawing
-
-
-@given(st.lists(st.tuples(st.sets(st.integers(0, 5), min_size=1), st.sets(st.integers(0, 5), min_size=1)), max_size=5))
-@settings(max_examples=150, deadline=None, derandomize=True)
-def test_lines_between_layers_keep_apart(sides: list[tuple[set[int], set[int]]]) -> None:
-    used: tuple[set[int], set[int]] = (set(), set())
-    runs = []
-    for left, right in sides:  # every height has one pin on each side
-        left, right = left - used[0], right - used[1]
-        if left and right:
-            used[0].update(left)
-            used[1].update(right)
-            pins = [[Pin(Cell("box", y=12.0 * height)) for height in sorted(side)] for side in (left, right)]
-            runs.append(Run(Net(pins[0][0], pins[1]), *pins))
-    trunks, count = tracks(runs)
-    for trunk in trunks:
-        assert 0 <= trunk.track < count
-    for one, other in combinations(trunks, 2):
-        if one.track == other.track:
-            assert one.high < other.low or other.high < one.low
-        if one.runs == other.runs:
-            continue
-        first, last = sorted((one, other), key=lambda trunk: trunk.track)
-        if first.track < last.track:  # lines from the left to the last trunk, from the first one to the right
-            assert not set(first.right) & set(last.left)
-    for run in runs:  # whatever the number of its trunks, they join what the run joins
-        mine = [trunk for trunk in trunks if run in trunk.runs]
-        if mine:
-            assert set(mine[0].left) == {pin.cell.y for pin in run.left}
-            assert set(mine[-1].right) == {pin.cell.y for pin in run.right}
-            assert all(before.right == after.left for before, after in pairwise(mine))
-        else:
-            assert len({pin.cell.y for pin in (*run.left, *run.right)}) == 1
-
-
-def test_two_nets_that_change_places_take_a_detour() -> None:
-    """a goes from 0 to 1 and b from 1 to 0: whichever trunk is on the left, one of them must have a second track."""
-    (a, b), (c, d) = [[Pin(Cell("box", y=24.0 * height)) for height in (0, 1)] for _ in range(2)]
-    trunks, count = tracks([Run(Net(a, [d]), [a], [d]), Run(Net(b, [c]), [b], [c])])
-    assert (len(trunks), count) == (3, 3)
-
-
-@pytest.mark.parametrize("name", sorted(packaged_models()))
-@pytest.mark.parametrize(("depth", "expand"), [(None, False), (0, False), (None, True)])
-def test_packaged_models_are_drawn_right(name: str, depth: int | None, expand: bool) -> None:
-    check(draw(outline(load_model(name), depth, expand)))
-
-
-@pytest.mark.parametrize("observers", [0, 1, 8])
-@pytest.mark.parametrize("expand", [False, True])
-def test_scenario_is_drawn_right_for_any_number_of_observers(observers: int, expand: bool) -> None:
-    check(draw(outline(load_model("collision_avoidance", set=[f"observers={observers}"]), 1, expand)))
-
-
-# -- what is drawn ------------------------------------------------------------------------------------------------
+from epicycle.runner.show.graph.layout import draw
+from epicycle.runner.show.graph.outlines import Outline
+from epicycle.runner.show.graph.picture import aspects_seen, legend_of, tied, ties
+from tests.show.graph.drawings import check
 
 SMALL = """\
 model: small
@@ -310,7 +105,10 @@ def test_instances_are_one_box_if_they_are_alike(
 def test_number_of_connections_is_written_if_boxes_do_not_say_it(tmp_path: Path) -> None:
     cells = ["cell[0].end", "cell[1].end", "cell[2].end"]
     wirings = {
-        "{from: 'cell[*].end', to: 'cell[*].start', delay: 1 s}": "1 s",
+        "{from: 'cell[*].end', to: 'cell[*].start', delay: 1 s}": "1 s, each to itself",
+        "\n  - ".join(f"{{from: 'cell[{n}].end', to: 'cell[{(n + 1) % 3}].start', delay: 1 s}}" for n in range(3)): (
+            "1 s, each to another"
+        ),
         f"{{from: {cells}, to: 'cell[*].start', delay: 1 s}}": "1 s, each to all",
         f"{{from: {cells * 2}, to: 'cell[*].start', delay: 1 s}}": "1 s, ×18",
     }
@@ -318,6 +116,47 @@ def test_number_of_connections_is_written_if_boxes_do_not_say_it(tmp_path: Path)
         drawn = outline(small(tmp_path, too(wiring)))
         assert names(drawn) == ["clock: Clock", *ONE, "all: BroadcastChannel", "last: MostRecent"]
         assert sorted(pill.text for pill in draw(drawn).pills if not pill.aspect) == sorted(["10 ms", written])
+
+
+BUS = """\
+model: bus
+actors:
+  clock: {type: Clock, period: 0.1 s, count: 3}
+  node: {type: Accumulator, count: 3}
+  other: {type: Accumulator, count: 3}
+connections:
+  - clock[*].output -> node[*].input
+  - {from: ["clock[0].output", "clock[1].output", "clock[2].output"], to: "other[*].input"}
+aspects:
+  can: {type: Bus, factor: 0.001, at: "node[*].input"}
+  low: {type: Bus, factor: 0.001, medium: second, at: "other[0].input"}
+  high: {type: Bus, factor: 0.001, medium: second, at: ["other[1].input", "other[2].input"]}
+  cpu: {type: Processor, time: 0.001, at: ["node[0]", "node[1]"]}
+  loss: {type: PacketLoss, probability: 0.1, at: "node[*].input"}
+"""
+
+
+def test_places_that_share_a_medium_are_joined(tmp_path: Path) -> None:
+    (tmp_path / "bus.yaml").write_text(BUS, encoding="utf-8")
+    drawing = draw(outline(load_model(tmp_path / "bus.yaml"), expand=True))
+    groups = [[(pill.aspect, pill.place) for pill in group] for group in tied(drawing)]
+    assert groups == [
+        [("can", f"node[{n}].input") for n in range(3)],
+        [("low", "other[0].input"), ("high", "other[1].input"), ("high", "other[2].input")],
+        [("cpu", "node[0]"), ("cpu", "node[1]")],
+    ]
+    for group in tied(drawing):  # each badge is reached by a line from another one
+        lines = list(ties(group))
+        middles = [(pill.x + pill.width / 2, pill.y) for pill in group]
+        assert len(lines) == len(group) - 1
+        graph = nx.Graph((line[0], line[-1]) for line in lines)
+        assert nx.is_connected(graph)
+        assert {*graph} == {*middles}
+    folded = draw(outline(load_model(tmp_path / "bus.yaml", without_aspects=["low", "high", "cpu"])))
+    assert tied(folded) == []
+    assert sorted(pill.text for pill in folded.pills) == ["can", "each to all", "in pairs", "loss"]
+    texts = [row.explanation for row in legend_of(folded, aspects_seen(folded))]
+    assert texts[:2] == ["aspect Bus, at 3 ports, which share one medium", "aspect PacketLoss, at 3 ports"]
 
 
 def test_aspects_and_delays_are_written_where_they_are(tmp_path: Path) -> None:

@@ -116,7 +116,7 @@ metrics:
         "walks.yaml:14:23: error: metric 'f' has no key 'docs', did you mean 'doc'?\n"
         "   14 |   f: {value: [place], docs: x}\n"
         "      |                       ^^^^\n"
-        "   help: valid keys: value, unit, to, doc\n"
+        "   help: valid keys: value, unit, to, doc, label\n"
         "3 errors in walks.yaml"
     )
     assert problems_of(path, "\n".join(line for line in study.splitlines() if line[:4] not in ("  e:", "  f:"))) == (

@@ -11,6 +11,7 @@ async function main() {
     return;
   }
   holder.remove();
+  PALETTE.push(...data.palette.map((colour) => (colour === "#000000" ? "#8c6bb1" : colour))); // black is no colour in the dark
   data.runs.forEach((run, i) => {
     const record = data.difference?.records[i] ?? NOTHING;
     run.tagOfDifference = record >= 0 ? run.record_tag[record] : undefined;

@@ -1,6 +1,6 @@
 // Canvases that fit their boxes, colours of the theme, and the gestures that all views share.
 
-const PALETTE = ["#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#8C6BB1", "#A6761D"];
+const PALETTE = []; // of figures, too: filled by main
 
 function element(name, options = {}, ...children) {
   const { text, label, ...rest } = options, made = document.createElement(name);

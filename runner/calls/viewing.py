@@ -1,0 +1,107 @@
+"""Runs as a page: what ``epicycle.view`` and the commands that write one do."""
+
+from __future__ import annotations
+
+import html
+import tempfile
+import webbrowser
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Unpack
+
+from epicycle.actors import EpicycleError
+
+from ..bars import SOON
+from ..build import Model, figures_of
+from ..engine import ActorError, LoopError
+from ..printing import complain
+from ..show.view import Recording, page_of, write_page
+from ..text import Problems
+from .running import Changes, loaded, seconds, watched
+
+
+class Page:
+    """A page that shows one run or two, in a notebook, a browser or a file; it needs no network.
+
+    A run that failed is shown up to there: ``errors`` say why.
+    """
+
+    def __init__(self, recordings: Sequence[Recording], names: Sequence[str], errors: Sequence[EpicycleError]) -> None:
+        self.recordings = recordings
+        self.names = names
+        self.errors = errors
+
+    def save(self, path: str | Path) -> Path:
+        """Write it to a file (.html)."""
+        write_page(self.recordings, Path(path), names=self.names)
+        return Path(path)
+
+    def open(self) -> Path:
+        """Open it in the browser; the file, which stays until the computer clears its temporary ones."""
+        path = self.save(Path(tempfile.mkdtemp(prefix="epicycle-"), f"{self.recordings[0].model.name}.html"))
+        webbrowser.open(path.as_uri())
+        return path
+
+    def __repr__(self) -> str:
+        return f"<Page of {' and '.join(self.names or [self.recordings[0].model.name])}>"
+
+    def _repr_html_(self) -> str:
+        whole = html.escape(page_of(self.recordings, names=self.names))
+        look = "width: 100%; height: 80vh; border: 0"
+        return f'<iframe sandbox="allow-scripts" srcdoc="{whole}" style="{look}"></iframe>'
+
+
+def view(
+    *models: Model | str | Path,
+    seed: int | None = None,
+    until: float | str | None = None,
+    names: Sequence[str] = (),
+    progress: bool = True,
+    **changes: Unpack[Changes],
+) -> Page:
+    """Run a model, or two to compare, and show what happened: space, graph, signals, and what caused what.
+
+    ``set``, ``disturb`` and the other options of ``load`` change each model that is given by name or file; ``names``
+    tell two runs apart.  ``save`` writes the page, ``open`` shows it in the browser, a notebook shows it in place.
+
+    >>> epicycle.view("collision_avoidance", disturb="wifi_burst").save("run.html")
+    """
+    if not 1 <= len(models) <= 2:
+        raise EpicycleError(f"a page shows one run or two, not {len(models)}")
+    if names and len(names) != len(models):
+        raise EpicycleError(f"names: {len(names)} for {len(models)} models")
+    made = [loaded(each, {} if isinstance(each, Model) else changes) for each in models]
+    if len(made) == 2 and not names:
+        names = [each.name for each in made]
+        names = [f"{name} {number}" for number, name in enumerate(names, 1)] if len({*names}) == 1 else names
+    return recorded(made, seed=seed, until=seconds("until", until), names=names, progress=progress)
+
+
+def recorded(
+    models: Sequence[Model],
+    *,
+    seed: int | Sequence[int | None] | None = None,
+    until: float | Sequence[float | None] | None = None,
+    names: Sequence[str] = (),
+    progress: bool = True,
+) -> Page:
+    """The page of these models' runs; seeds and stop times are of all, or of each."""
+    recordings, errors = [], list[EpicycleError]()
+    for number, model in enumerate(models):
+        own_seed = seed[number] if isinstance(seed, Sequence) else seed
+        stop = until[number] if isinstance(until, Sequence) else until
+        problems = Problems()
+        figures = figures_of(model, problems)
+        problems.raise_if_any()
+        if stop is None and model.endless:
+            complain(
+                f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or give a stop time"
+            )
+        recordings.append(Recording(model, figures, seed=own_seed, is_compared=len(models) > 1))
+        with watched(model, stop, SOON) if progress else nullcontext() as report:
+            try:
+                recordings[-1].run(until=stop, progress=report)
+            except (ActorError, LoopError) as error:  # what led to it is just what one wants to see
+                errors.append(error)
+    return Page(recordings, names if len(models) > 1 else [], errors)

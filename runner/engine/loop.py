@@ -1,0 +1,98 @@
+"""The loop of a run: which comes next, a tag of the director's agenda or an event of SimPy's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from epicycle.actors import NEVER
+
+from .errors import ActorError, LoopError, of_process
+from .pace import notice
+
+if TYPE_CHECKING:
+    from epicycle.actors import Actor
+
+    from .director import Director
+    from .pace import Pace
+
+_NOTICED = 16  # steps between two looks at what else there is
+
+
+def handle_events(
+    director: Director,
+    stop: int | None,
+    actors: list[Actor],
+    progress: Callable[[float], None] | None = None,
+    pace: Pace | None = None,
+    most: int | None = None,
+) -> str:
+    """Handle events up to and including ``stop`` (ns), until none is left, or until a stop was asked for.
+
+    Returns why it ended; nothing if that is because ``most`` steps are done, of which each is a tag or an event of
+    SimPy's.
+    """
+    environment, times, queue = director._environment, director._times, director._queue
+    last_step = NEVER if most is None else director.steps + most
+    last_time = NEVER - 1 if stop is None else stop
+    here, never = 0, NEVER
+    now = director._last.time
+    if pace is not None:
+        pace.wait_for(now)
+    if progress is not None:
+        progress(now / 1e9)
+    while director.steps < last_step:
+        instant = None if director.present is None else director._next
+        if director._stop_after is not None and director._last.tag >= director._stop_after:
+            break
+        is_of_simpy = False
+        if instant is not None:  # more of the present time
+            upcoming = instant.time
+        else:
+            upcoming = times.first()
+            if queue and queue[0][0] <= upcoming:
+                is_of_simpy = True
+                upcoming = math.ceil(min(queue[0][0], NEVER))
+            if upcoming == never:
+                break
+            if director._stop_after is not None and max(upcoming, director._last.time) > director._stop_after.time:
+                break
+        if upcoming > last_time:
+            if pace is not None:
+                pace.wait_for(last_time)
+            return "stop time"
+        if pace is not None and upcoming > now:
+            pace.wait_for(upcoming)
+        try:
+            if director._is_interrupted:
+                raise KeyboardInterrupt
+            if is_of_simpy:
+                environment.step()
+            elif instant is not None:
+                director._next = None
+                director._handle(instant)
+            else:
+                director._time = upcoming
+                if director._has_simpy:
+                    environment._now = upcoming
+                director._handle(times.pop())
+        except BaseException as error:
+            director.present = None
+            if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
+                raise
+            found, cause = of_process(error, actors, director.tag)
+            raise found from cause
+        if upcoming != now:
+            here = 0
+        elif instant is None:
+            here += 1
+        now = upcoming
+        if here > director._most_steps:
+            raise LoopError(director.tag.time, ())
+        director.steps += 1
+        if director.steps % _NOTICED == 0:
+            notice(progress, now)
+    else:
+        return ""
+    return director._reason

@@ -1,0 +1,130 @@
+"""What figures read from signals: numbers, states and positions, thinned to what a picture can show."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from epicycle.aspects import STAMP
+
+from ..results import Results, cell, leaves
+from ..text import select
+
+COLUMNS = 700  # of pixels, about, that a panel is wide
+_DENSE = 4  # samples in a column, from which on they are drawn as an envelope
+
+Floats: TypeAlias = NDArray[np.float64]
+Numbers: TypeAlias = dict[str, tuple["array[float]", "array[float]"]]  # times and values
+States: TypeAlias = dict[str, tuple["array[float]", list[str | None]]]  # times and names
+Span: TypeAlias = tuple[float, float, str]  # from when, until when, a state
+
+
+def selected(patterns: tuple[str, ...], results: Results) -> list[str]:
+    """The signals that patterns select, each once."""
+    return list(dict.fromkeys(name for pattern in patterns for name in select(pattern, results.signals)))
+
+
+def read(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
+    """All numbers and all states in tokens, by signal and place in them, but for what says of when a token is.
+
+    A state is None where there is something else; what never is one is left out.
+    """
+    numbers: Numbers = {}
+    states: States = {}
+    for name in selected(patterns, results):
+        signal = results.signals[name]
+        for tag, token in zip(signal.tags, signal.tokens, strict=True):
+            for place, leaf in leaves(token):
+                if place.rpartition(".")[2] == STAMP:
+                    continue
+                kind, value, text = cell(leaf)
+                where, state = f"{name}.{place}" if place else name, None
+                if kind in ("int", "float"):
+                    if value is not None:
+                        times, values = numbers.setdefault(where, (array("d"), array("d")))  # 16 bytes a number
+                        times.append(tag.seconds)
+                        values.append(value)
+                elif kind != "none" and (isinstance(leaf, str) or not hasattr(leaf, "__len__")):
+                    state = text if kind != "bool" else "true" if value else "false"
+                moments, found = states.setdefault(where, (array("d"), []))
+                moments.append(tag.seconds)
+                found.append(state)
+    return numbers, {where: column for where, column in states.items() if any(each is not None for each in column[1])}
+
+
+# -- thinned ----------------------------------------------------------------------------------------------------------
+
+
+class Envelope(NamedTuple):
+    """Of each column of a panel its middle, the least and the greatest value, and the mean."""
+
+    times: Floats
+    low: Floats
+    high: Floats
+    mean: Floats
+    width: float
+
+
+def envelope(times: Floats, values: Floats, begin: float, end: float, *, holds: bool) -> Envelope | None:
+    """The envelope of samples that are too many to be told apart; None if they are not.
+
+    ``holds``: a value stays until the next one, so that it counts in the columns between, and by how long it stands.
+    """
+    first, last = np.searchsorted(times, [begin, end])
+    if last - first <= _DENSE * COLUMNS or not end > begin:
+        return None
+    edges = np.linspace(begin, end, COLUMNS + 1)
+    if holds:  # a sample more at each edge: what stands there
+        edges = edges[edges >= times[0]]
+        before = np.searchsorted(times, edges[:-1], side="right") - 1
+        times, values = np.concatenate([times, edges[:-1]]), np.concatenate([values, values[before]])
+        order = np.argsort(times, kind="stable")
+        times, values = times[order], values[order]
+    inside = (times >= edges[0]) & (times <= edges[-1])
+    times, values = times[inside], values[inside]
+    column = np.minimum(np.searchsorted(edges, times, side="right") - 1, len(edges) - 2)
+    starts = np.flatnonzero(np.diff(column, prepend=-1))
+    weights = np.append(np.diff(times), max(edges[-1] - times[-1], 0.0)) if holds else np.ones(len(times))
+    whole = np.add.reduceat(weights, starts)
+    low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+    mean = np.add.reduceat(values * weights, starts) / np.where(whole > 0.0, whole, 1.0)
+    middle = (edges[:-1] + edges[1:])[column[starts]] / 2
+    # What takes no time has no mean of its own.
+    return Envelope(middle, low, high, np.where(whole > 0.0, mean, (low + high) / 2), float(edges[1] - edges[0]))
+
+
+def spans_of(times: Sequence[float], states: Sequence[str | None], end: float) -> Iterator[Span]:
+    """How long each state stands; the same one again goes on, and what takes no time is left out."""
+    last: Span | None = None
+    for since, until, state in zip(times, [*times[1:], end][: len(times)], states, strict=True):
+        if until <= since:
+            continue
+        if last is not None and last[2] == state:
+            last = last[0], until, state
+            continue
+        if last is not None:
+            yield last
+        last = None if state is None else (since, until, state)
+    if last is not None:
+        yield last
+
+
+def longest_spans(spans: Sequence[Span], begin: float, end: float) -> list[Span]:
+    """Spans that are in view; of very many, in each column of the panel the state that stands longest."""
+    seen = [(max(since, begin), min(until, end), state) for since, until, state in spans if until >= begin]
+    seen = [each for each in seen if each[0] <= each[1]]
+    if len(seen) <= _DENSE * COLUMNS:
+        return seen
+    shares: list[dict[str, float]] = [{} for _ in range(COLUMNS)]
+    width = (end - begin) / COLUMNS
+    for since, until, state in seen:
+        first, last = (min(int((at - begin) / width), COLUMNS - 1) for at in (since, until))
+        for column in range(first, last + 1):
+            share = min(until, begin + (column + 1) * width) - max(since, begin + column * width)
+            shares[column][state] = shares[column].get(state, 0.0) + share
+    times = [begin + column * width for column in range(COLUMNS)]
+    return list(spans_of(times, [max(each, key=each.__getitem__, default=None) for each in shares], end))

@@ -1,0 +1,197 @@
+"""Trajectories: paths in the plane, drawn from the signals of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from epicycle.actors import Parameter, array_parameter, texts_parameter
+
+from ..catalogue import Figure, Mark, Shape
+from ..results import Results, Signal
+from .figures import title_of
+from .samples import Floats, selected
+from .sheet import FEW, LIMIT, Sheet, band_beside, colours, legend_beside
+from .space import ellipses, positions, sights, tubes
+
+TIMES = 8  # that are written at a path
+_APART = 34.0  # pixels between times
+
+
+class Trajectories(Figure):
+    """The paths of all robots around an obstacle, in the manner of the paper's Figs. 6 and 8.
+
+    A path begins with a circle and ends with an arrowhead; a dot on it marks every second, and times are written at
+    the first one.  The ellipses are where the estimate puts the obstacle, at two standard deviations; the discs are the
+    obstacle with the distance to keep, once a second.
+    """
+
+    robots = texts_parameter(doc="signals of the robots' states (patterns); the first robot is drawn strongest")
+    obstacle = Parameter(str, "", doc="signal of the obstacle's state")
+    estimate = Parameter(str, "", doc="signal of an estimate of the obstacle")
+    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where the first robot is to arrive")
+    safe_distance = Parameter(float, 2.0, unit="m", min=0.0, doc="radius of the obstacle's disc")
+    interval = Parameter(float, 1.0, unit="s", min=1e-3, doc="time between dots, discs and ellipses")
+    plans = texts_parameter((), doc="signals of the robots' plans (patterns), which the page of a run shows as tubes")
+    sights = texts_parameter((), doc="signals of measurements (patterns), which the page shows as lines of sight")
+    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="time for which each control of a plan acts")
+    tube_initial = Parameter(float, 0.0, unit="m", min=0.0, doc="radius of a plan's tube where it begins")
+    tube_growth = Parameter(float, 0.0, unit="m", min=0.0, doc="by how much the radius grows in a period")
+
+    def signal_patterns(self) -> tuple[str, ...]:
+        return tuple(pattern for pattern in (*self.robots, self.obstacle, self.estimate) if pattern)
+
+    def mark_patterns(self) -> tuple[str, ...]:
+        return (*self.plans, *self.sights)
+
+    def marks(self, results: Results) -> Iterator[Mark]:
+        owners: dict[str, int] = {}  # the colour of what a robot sends is its own
+        for name in selected(self.robots, results):
+            owners[name.rpartition(".")[0]] = len(owners)
+
+        def made(names: Iterable[str], shape: Shape, colour: int | None, **look: float) -> Iterator[Mark]:
+            for name in names:
+                signal, path = results.signals[name], name.rpartition(".")[0]
+                times = signal.times
+                if shape == "tube":
+                    rows = tubes(signal, self.period, self.tube_initial, self.tube_growth)
+                elif shape == "line":
+                    seen, rows = sights(signal)
+                    times = times[seen]
+                else:
+                    rows = ellipses(signal) if shape == "ellipse" else positions(signal)
+                yield Mark(name, shape, times.tolist(), rows, colour=owners.get(path, colour), **look)
+
+        yield from made(selected(self.sights, results), "line", None)
+        yield from made(selected(self.plans, results), "tube", None)
+        yield from made([self.estimate] if self.estimate else [], "ellipse", None)
+        yield from made([self.obstacle] if self.obstacle else [], "body", None, radius=self.safe_distance)
+        yield from made(selected(self.robots, results), "body", 0)
+        yield Mark("goal", "goal", [0.0], np.array([self.goal], dtype=float))
+
+    def draw(self, results: Results, path: Path) -> None:
+        sheet = Sheet([title_of(results)], heights=[4.4])
+        (axes,) = sheet.axes
+        if self.obstacle:
+            self._obstacle(sheet, results.signals[self.obstacle])
+        if self.estimate:
+            self._ellipses(axes, results.signals[self.estimate])
+        robots = selected(self.robots, results)
+        shades = colours(len(robots))
+        for index, (name, shade) in enumerate(zip(robots, shades, strict=True)):
+            self._path(sheet, results.signals[name], shade, is_first=index == 0, named=len(robots) <= FEW)
+        axes.plot(*self.goal, marker="*", markersize=15, color=LIMIT, linestyle="none", label="goal", zorder=6)
+        sheet.call_axes("x (m)", "y (m)")
+        # One metre is as long in x as in y; the sheet takes the shape of what is on it.
+        axes.set_aspect("equal")
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        sheet.canvas.set_size_inches(7.0, max(2.4, min(6.5, 4.8 * (high - low) / (right - left)) + 0.8))
+        if len(robots) <= FEW:
+            legend_beside(axes)
+        else:
+            band_beside(axes, [name.rpartition(".")[0] or name for name in robots], shades)
+            axes.legend(loc="best", fontsize=7)
+        for name in robots[:1]:
+            signal = results.signals[name]
+            write_times(axes, positions(signal), signal.times, every(signal.times, self.interval), shades[0])
+        sheet.save([path])
+
+    def _path(self, sheet: Sheet, signal: Signal, shade: str, *, is_first: bool, named: bool) -> None:
+        points = positions(signal)
+        if len(points) == 0:
+            return
+        (axes,) = sheet.axes
+        label = (signal.name.rpartition(".")[0] or signal.name) if named else None
+        width, order = (2.4, 5) if is_first else (1.3, 4)
+        axes.plot(*points.T, color=shade, linewidth=width, label=label, zorder=order)
+        axes.plot(*points[every(signal.times, self.interval)].T, ".", color=shade, markersize=4 + width, zorder=order)
+        axes.plot(*points[0], "o", markersize=8, markerfacecolor="white", markeredgecolor=shade, zorder=order)
+        arrows(axes, points, shade, size=8.0 + 3.0 * width, zorder=order + 0.5)
+        tip_path(sheet, axes, signal.name, signal.times, points)
+
+    def _obstacle(self, sheet: Sheet, signal: Signal) -> None:
+        from matplotlib.patches import Circle
+
+        (axes,) = sheet.axes
+        points = positions(signal)
+        axes.plot(*points.T, "--", color="0.25", linewidth=1.2, label="obstacle" if len(points) else None, zorder=3)
+        arrows(axes, points, "0.25", zorder=3.5)
+        tip_path(sheet, axes, signal.name, signal.times, points)
+        marks = every(signal.times, self.interval)
+        for number, index in enumerate(marks, start=1):
+            label = f"{self.safe_distance:g} m around it" if number == len(marks) else None
+            look = {"color": "0.3", "alpha": 0.05 + 0.13 * number / len(marks), "linewidth": 0}
+            axes.add_patch(Circle(points[index], self.safe_distance, label=label, **look))
+
+    def _ellipses(self, axes: Any, signal: Signal) -> None:
+        from matplotlib.patches import Ellipse
+
+        label: str | None = "estimate, 2 std. dev."
+        rows = ellipses(signal)
+        for index in every(signal.times, self.interval):
+            x, y, along, across, angle = map(float, rows[index])
+            look: Any = {"fill": False, "edgecolor": LIMIT, "linewidth": 0.8, "alpha": 0.8, "zorder": 3}
+            place, turned = (x, y), float(np.degrees(angle))
+            axes.add_patch(Ellipse(place, 2.0 * along, 2.0 * across, angle=turned, label=label, **look))
+            label = None
+
+
+def every(times: Floats, interval: float) -> list[int]:
+    """Indices of the tokens that come at multiples of an interval, or first after these."""
+    steps = np.floor(np.asarray(times) / interval + 1e-9)
+    return [int(index) for index in np.unique(steps, return_index=True)[1]]
+
+
+def round_step(about: float) -> float:
+    """A time of one, two or five tenths, seconds, tens of seconds and so on, not less than another one."""
+    if not about > 0.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(about))
+    return next(power * factor for factor in (1, 2, 5, 10) if power * factor >= about * (1 - 1e-9))
+
+
+def arrows(axes: Any, points: Floats, shade: str, *, size: float = 11.0, zorder: float = 4.5) -> None:
+    """Arrowheads half way along a path and where it ends, in the direction in which it comes there."""
+    walked = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    look = {"arrowstyle": "-|>", "color": shade, "mutation_scale": size, "linewidth": 0, "shrinkA": 0, "shrinkB": 0}
+    for share in (0.5, 1.0):
+        tip = int(np.searchsorted(walked, share * walked[-1]))
+        # Not from the last step alone, which may be as short as a rounding error.
+        tail = int(np.searchsorted(walked, walked[tip] - 0.01 * walked[-1], side="right")) - 1
+        if 0 <= tail < tip:
+            axes.annotate("", points[tip], points[tail], arrowprops=look, zorder=zorder)
+
+
+def tip_path(sheet: Sheet, axes: Any, name: str, times: Floats, points: Floats, most: int = 150) -> None:
+    """Say when a path is where, at so many places at most."""
+    each = math.ceil(len(points) / most) or 1
+    texts = [f"{name}\n{time:.4g} s at ({x:.4g}, {y:.4g}) m" for time, (x, y) in zip(times, points, strict=True)]
+    sheet.tip(axes, points[::each], texts[::each])
+
+
+def write_times(axes: Any, points: Floats, times: Floats, marks: Sequence[int], shade: str) -> None:
+    """Write times at some dots of a path, to the left of its direction, where there is room between them."""
+    transform, taken = axes.transData.transform, list[Floats]()
+    for index in marks[:: math.ceil(len(marks) / TIMES) or 1]:
+        place = transform(points[index])
+        ahead = transform(points[min(index + 1, len(points) - 1)]) - transform(points[max(index - 1, 0)])
+        length = math.hypot(*ahead)
+        if any(math.dist(place, other) < _APART for other in taken):
+            continue
+        taken.append(place)
+        across, up = (-ahead[1] / length, ahead[0] / length) if length else (0.0, 1.0)
+        axes.annotate(
+            f"{times[index]:.3g} s",
+            points[index],
+            (8.0 * across, 8.0 * up),
+            textcoords="offset points",
+            ha="center" if abs(across) < 0.5 else "left" if across > 0 else "right",
+            va="center" if abs(up) < 0.5 else "bottom" if up > 0 else "top",
+            fontsize=7,
+            color=shade,
+            zorder=7,
+        )

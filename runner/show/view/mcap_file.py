@@ -1,0 +1,343 @@
+"""A run as an MCAP file, which Foxglove and Lichtblick show: JSON messages, Foxglove's schemas where it has one.
+
+Lichtblick reads a subset of JSON Schema: objects, and arrays of numbers, texts or objects.  What tokens hold beside
+these is made to fit: matrices are arrays, row by row, and what is of several types is text.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator
+from heapq import merge
+from io import BytesIO
+from itertools import chain
+from operator import itemgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from epicycle.actors import Tag
+
+from ...results import Signal, plain
+from ...shown import finite
+from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, results_of, things
+from .recording import Recording
+from .writing import ViewError, replace_file
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
+
+WORLD = "world"  # the frame in which positions are given
+INFO = 2  # level of foxglove.Log
+LINE_STRIP = 0  # type of foxglove.LinePrimitive
+FAINT = 0.25  # opacity of discs
+MOST = 65_535  # channels of a file
+SHARE = 0.012  # of the whole space is a point's diameter
+
+Schema = dict[str, Any]
+Message = tuple[int, int, Any]  # time (ns), channel, what is written as JSON
+
+
+def write_mcap(recording: Recording, path: Path) -> None:
+    """Write an MCAP file of a run; raises ``ViewError``."""
+    replace_file(path, mcap(recording))
+
+
+def require_mcap() -> type[Writer]:
+    """What writes MCAP files; raises ``ViewError`` if it is not installed."""
+    try:
+        from mcap.writer import Writer
+    except ImportError:
+        raise ViewError(
+            "an MCAP file needs the package mcap, which is not installed: pip install 'epicycle[mcap]'"
+        ) from None
+    return Writer
+
+
+def mcap(recording: Recording) -> bytes:
+    """The MCAP file of a run; equal for equal runs, with one version of the library."""
+    file = BytesIO()
+    writer = require_mcap()(file)
+    writer.start(profile="", library="epicycle")
+    writer.add_metadata("run", about(recording))
+    channels = Channels(writer)
+    placed = things(recording)
+    streams = [
+        *(_signal(signal, channels) for signal in results_of(recording).signals.values()),
+        *(_space(thing, _size(placed), channels) for thing in placed),
+        *(_frames(thing, channels) for thing in placed if thing.kind == "body"),
+        _acts(acts(recording), channels),
+        _firings(firings(recording), channels),
+    ]
+    encoder = json.JSONEncoder(separators=(",", ":"))
+    for time, channel, message in merge(*streams, key=itemgetter(0)):
+        data = encoder.encode(message).encode()
+        writer.add_message(channel, log_time=time, publish_time=time, data=data)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return file.getvalue()
+
+
+class Channels:
+    """The channels of a file, each with its schema, which is written once."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+
+    def number(self, topic: list[str], name: str, schema: Schema) -> int:
+        path = "/" + "/".join(topic)
+        if path not in self._channels:
+            if len(self._channels) == MOST:
+                raise ViewError(f"an MCAP file holds {MOST:,} channels, and the run has more signals and actors")
+            if name not in self._schemas:
+                data = json.dumps({"title": name, **schema}).encode()
+                self._schemas[name] = self._writer.register_schema(name, "jsonschema", data)
+            self._channels[path] = self._writer.register_channel(path, "json", self._schemas[name])
+        return self._channels[path]
+
+
+# -- schemas ----------------------------------------------------------------------------------------------------------
+
+
+def _object(**properties: Schema) -> Schema:
+    return {"type": "object", "properties": properties}
+
+
+def _array(items: Schema) -> Schema:
+    return {"type": "array", "items": items}
+
+
+TRUTH, NUMBER, INTEGER, TEXT = ({"type": name} for name in ("boolean", "number", "integer", "string"))
+TIME = _object(sec=INTEGER, nsec=INTEGER)
+VECTOR = _object(x=NUMBER, y=NUMBER, z=NUMBER)
+QUATERNION = _object(x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER)
+POSE = _object(position=VECTOR, orientation=QUATERNION)
+COLOUR = _object(r=NUMBER, g=NUMBER, b=NUMBER, a=NUMBER)
+SPHERE = _object(pose=POSE, size=VECTOR, color=COLOUR)
+CYLINDER = _object(pose=POSE, size=VECTOR, bottom_scale=NUMBER, top_scale=NUMBER, color=COLOUR)
+LINE = _object(
+    type=INTEGER,
+    pose=POSE,
+    thickness=NUMBER,
+    scale_invariant=TRUTH,
+    points=_array(VECTOR),
+    color=COLOUR,
+    colors=_array(COLOUR),
+    indices=_array(INTEGER),
+)
+LABEL = _object(pose=POSE, billboard=TRUTH, font_size=NUMBER, scale_invariant=TRUTH, color=COLOUR, text=TEXT)
+ENTITY = _object(
+    timestamp=TIME,
+    frame_id=TEXT,
+    id=TEXT,
+    lifetime=TIME,
+    frame_locked=TRUTH,
+    metadata=_array(_object(key=TEXT, value=TEXT)),
+    spheres=_array(SPHERE),
+    cylinders=_array(CYLINDER),
+    lines=_array(LINE),
+    texts=_array(LABEL),
+    # Nothing of a run is one of these, but a viewer may count on them.
+    **{name: _array(_object(pose=POSE)) for name in ("arrows", "cubes", "triangles", "models")},
+)
+SCENE = _object(deletions=_array(_object(timestamp=TIME, type=INTEGER, id=TEXT)), entities=_array(ENTITY))
+FRAME = _object(timestamp=TIME, parent_frame_id=TEXT, child_frame_id=TEXT, translation=VECTOR, rotation=QUATERNION)
+LOG = _object(timestamp=TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT, line=INTEGER)
+FIRING = _object(microstep=INTEGER, count=INTEGER)
+
+
+# -- signals ----------------------------------------------------------------------------------------------------------
+
+
+def _signal(signal: Signal, channels: Channels) -> Iterator[Message]:
+    schema: Schema | None = None
+    for _, token in signal:
+        schema = _common(schema, _schema(_flat(plain(token))))
+    whole = _object(microstep=INTEGER, value=_settled(schema))
+    number = channels.number(["signals", *parts(signal.name)], f"epicycle.{signal.name}", whole)
+    for tag, token in signal:
+        value = _fitted(finite(_flat(plain(token))), whole["properties"]["value"])
+        yield tag.time, number, {"microstep": tag.microstep, "value": value}
+
+
+def _flat(value: Any) -> Any:
+    """A value in which no array holds arrays: what they hold stands in one, in order."""
+    if isinstance(value, dict):
+        return {key: _flat(each) for key, each in value.items()}
+    if isinstance(value, list):
+        inner = [_flat(each) for each in value]
+        return list(chain.from_iterable(each if isinstance(each, list) else [each] for each in inner))
+    return value
+
+
+def _schema(value: Any) -> Schema | None:
+    """What a value is; None if it says nothing of what others of its kind are."""
+    if value is None:
+        return None
+    if isinstance(value, dict):
+        return {"type": "object", "properties": {key: _schema(each) for key, each in value.items()}}
+    if isinstance(value, list):
+        items: Schema | None = None
+        for each in value:
+            items = _common(items, _schema(each))
+        return {"type": "array", "items": items}
+    return TRUTH if isinstance(value, bool) else TEXT if isinstance(value, str) else NUMBER
+
+
+def _common(one: Schema | None, other: Schema | None) -> Schema | None:
+    """What both are: texts if there is nothing else."""
+    if one is None or other is None or one == other:
+        return one if other is None else other
+    if one["type"] == other["type"] == "array":
+        return {"type": "array", "items": _common(one["items"], other["items"])}
+    if one["type"] == other["type"] == "object":
+        fields, more = one["properties"], other["properties"]
+        names = dict.fromkeys((*fields, *more))
+        return {"type": "object", "properties": {name: _common(fields.get(name), more.get(name)) for name in names}}
+    return TEXT
+
+
+def _settled(schema: Schema | None) -> Schema:
+    """A schema without anything open: what never was anything is a text, what is empty an array of numbers."""
+    if schema is None:
+        return TEXT
+    if schema["type"] == "array":
+        return _array(NUMBER if schema["items"] is None else _settled(schema["items"]))
+    if schema["type"] == "object":
+        return {"type": "object", "properties": {name: _settled(each) for name, each in schema["properties"].items()}}
+    return schema
+
+
+def _fitted(value: Any, schema: Schema) -> Any:
+    """A value as its schema has it: a text where it is of another type."""
+    if schema["type"] == "string" and value is not None and not isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, dict):
+        return {key: _fitted(each, schema["properties"][key]) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_fitted(each, schema["items"]) for each in value]
+    return value
+
+
+# -- space ------------------------------------------------------------------------------------------------------------
+
+
+def _size(placed: list[Thing]) -> float:
+    """The diameter of a point (m), which is a share of the space in which points are."""
+    (left, low), (right, high) = extent(placed)
+    return SHARE * (max(right - left, high - low) or 1.0)
+
+
+def _space(thing: Thing, size: float, channels: Channels) -> Iterator[Message]:
+    number = channels.number(["space", thing.kind, *parts(thing.name)], "foxglove.SceneUpdate", SCENE)
+    for scene in thing.scenes:
+        yield scene.time, number, {"deletions": [], "entities": [_entity(thing, scene, size)]}
+
+
+def _entity(thing: Thing, scene: Scene, size: float) -> dict[str, Any]:
+    paint, cube = _paint(thing.colour), _vector(size, size, size)
+    return {
+        "timestamp": _time(scene.time),
+        "frame_id": WORLD,
+        "id": f"{thing.kind} {thing.name}",
+        "lifetime": _time(0),  # until the next one
+        "frame_locked": True,
+        "metadata": [{"key": "name", "value": thing.name}],
+        "arrows": [],
+        "cubes": [],
+        "spheres": [{"pose": _pose(point), "size": cube, "color": paint} for point in scene.points],
+        "cylinders": [_cylinder(disc, size, _paint(thing.colour, FAINT)) for disc in scene.discs],
+        "lines": [_line(path, paint) for path in scene.paths],
+        "triangles": [],
+        "texts": [_label(thing.label, point, size, paint) for point in scene.points if thing.label],
+        "models": [],
+    }
+
+
+def _cylinder(disc: Disc, size: float, paint: Schema) -> dict[str, Any]:
+    extent = _vector(2.0 * disc.along, 2.0 * disc.across, size / 10.0)
+    pose = _pose((disc.x, disc.y), disc.angle)
+    return {"pose": pose, "size": extent, "bottom_scale": 1.0, "top_scale": 1.0, "color": paint}
+
+
+def _line(path: list[Point], paint: Schema) -> dict[str, Any]:
+    return {
+        "type": LINE_STRIP,
+        "pose": _pose((0.0, 0.0)),
+        "thickness": 2.0,  # pixels
+        "scale_invariant": True,
+        "points": [_vector(x, y) for x, y in path],
+        "color": paint,
+        "colors": [],
+        "indices": [],
+    }
+
+
+def _label(text: str, point: Point, size: float, paint: Schema) -> dict[str, Any]:
+    return {
+        "pose": _pose((point[0], point[1] + 1.5 * size)),
+        "billboard": True,
+        "font_size": 14.0,  # pixels
+        "scale_invariant": True,
+        "color": paint,
+        "text": text,
+    }
+
+
+def _frames(thing: Thing, channels: Channels) -> Iterator[Message]:
+    """A frame for each body, so that a viewer can follow it."""
+    number = channels.number(["frames", *parts(thing.name)], "foxglove.FrameTransform", FRAME)
+    for scene in thing.scenes:
+        for x, y in scene.points:
+            yield (
+                scene.time,
+                number,
+                {
+                    "timestamp": _time(scene.time),
+                    "parent_frame_id": WORLD,
+                    "child_frame_id": thing.label,
+                    "translation": _vector(x, y),
+                    "rotation": _turn(0.0),
+                },
+            )
+
+
+def _vector(x: float, y: float, z: float = 0.0) -> dict[str, float]:
+    return {"x": x, "y": y, "z": z}
+
+
+def _turn(angle: float) -> dict[str, float]:
+    return {"x": 0.0, "y": 0.0, "z": math.sin(angle / 2.0), "w": math.cos(angle / 2.0)}
+
+
+def _pose(point: Point, angle: float = 0.0) -> dict[str, dict[str, float]]:
+    return {"position": _vector(*point), "orientation": _turn(angle)}
+
+
+def _paint(colour: Colour, opacity: float = 1.0) -> dict[str, float]:
+    red, green, blue = (round(each / 255.0, 4) for each in colour)
+    return {"r": red, "g": green, "b": blue, "a": opacity}
+
+
+def _time(nanoseconds: int) -> dict[str, int]:
+    seconds, rest = divmod(nanoseconds, 10**9)
+    return {"sec": seconds, "nsec": rest}
+
+
+# -- acts and firings -------------------------------------------------------------------------------------------------
+
+
+def _acts(found: Iterable[Act], channels: Channels) -> Iterator[Message]:
+    for tag, aspect, text in found:
+        number = channels.number(["aspects", aspect], "foxglove.Log", LOG)
+        message = {"timestamp": _time(tag.time), "level": INFO, "message": text, "name": aspect, "file": "", "line": 0}
+        yield tag.time, number, message
+
+
+def _firings(found: Iterable[tuple[Tag, str]], channels: Channels) -> Iterator[Message]:
+    counts: dict[str, int] = {}
+    for tag, actor in found:
+        counts[actor] = count = counts.get(actor, 0) + 1
+        number = channels.number(["firings", *parts(actor)], "epicycle.Firing", FIRING)
+        yield tag.time, number, {"microstep": tag.microstep, "count": count}

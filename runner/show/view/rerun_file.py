@@ -1,0 +1,211 @@
+"""A run as a recording of rerun: by time, and by tag, where each microstep has a place of its own."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain, islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from epicycle.actors import Tag
+from epicycle.aspects import STAMP
+
+from ...results import Signal, cell, leaves
+from ..samples import selected
+from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, results_of, things
+from .recording import Recording
+from .writing import ViewError, replace_file
+
+PIXELS = 5.0  # radius of a point
+AWAY = 1.4  # times the width of the space: from there the eye sees all of it
+THICKNESS = 1.0  # radius of a line, in pixels
+PLACES = 128  # in the tokens of a signal, of which each is an entity; further ones are left out
+LAST = 2**62  # microstep, after all others of an instant
+
+
+def write_rerun(recording: Recording, path: Path) -> None:
+    """Write a recording of rerun; raises ``ViewError``."""
+    replace_file(path, _Writer(recording).written())
+
+
+def require_rerun() -> Any:
+    """The package rerun; raises ``ViewError`` if it is not installed."""
+    try:
+        import rerun
+        from rerun.blueprint import StateTimelineView  # noqa: F401  which tells it from others of that name
+    except ImportError:
+        raise ViewError(
+            "a recording of rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'"
+        ) from None
+    return rerun
+
+
+class _Writer:
+    """Puts the parts of a run into one stream."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._rerun = require_rerun()
+        self._recording = recording
+        self._signals = list(results_of(recording).signals.values())
+        self._things, self._acts = things(recording), list(acts(recording))
+        self._fired: dict[str, list[Tag]] = {}
+        for tag, actor in firings(recording):
+            self._fired.setdefault(actor, []).append(tag)
+        told = (*(signal.tags for signal in self._signals), *self._fired.values(), [act.tag for act in self._acts])
+        self._tags = sorted(set(chain.from_iterable(told)))
+        # Neither the clock of the wall nor a random name: equal runs are equal recordings.
+        digest = results_of(recording).digest
+        self._stream = self._rerun.RecordingStream("epicycle", recording_id=digest, send_properties=False)
+
+    def written(self) -> bytes:
+        """The file."""
+        file = self._stream.binary_stream()
+        self._stream.send_blueprint(self._blueprint())
+        self._stream.log("space", self._rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._about()
+        for signal in self._signals:
+            self._signal(signal)
+        for thing in self._things:
+            self._space(thing)
+        self._act()
+        for actor, tags in self._fired.items():
+            counts = np.arange(1.0, len(tags) + 1.0)
+            self._send(["firings", *parts(actor)], tags, self._rerun.Scalars.columns(scalars=counts))
+        data: bytes = file.read()
+        self._stream.disconnect()
+        return data
+
+    def _send(self, path: list[str], tags: Sequence[Tag], columns: Iterable[Any]) -> None:
+        rerun = self._rerun
+        times = rerun.TimeColumn("time", duration=np.array([tag.time for tag in tags], dtype="m8[ns]"))
+        places = [max(0, bisect_right(self._tags, tag) - 1) for tag in tags]
+        indices = [times, rerun.TimeColumn("tag", sequence=places)]
+        self._stream.send_columns(rerun.new_entity_path(path), indices, columns, strict=True)
+
+    def _blueprint(self) -> Any:
+        """What a viewer shows at first: the space beside signals as the model's figures have them, states and acts."""
+        import rerun.blueprint as views
+
+        results, figures = results_of(self._recording), self._recording.figures.items()
+        lines = [
+            views.TimeSeriesView(name=name, origin="/signals", contents=[self._below(each) for each in shown])
+            for name, figure in figures
+            if getattr(figure, "style", "") and (shown := selected(figure.signal_patterns(), results))
+        ]
+        recorded = [self._below(name) for name in results.signals if name in self._recording.model.recorded]
+        words = [
+            views.StateTimelineView(name="states", origin="/signals", contents=recorded),
+            views.TextLogView(name="aspects", origin="/aspects"),
+            views.TextDocumentView(name="run", origin="/about"),
+        ]
+        tabs = views.Tabs(*(lines or [views.TimeSeriesView(name="signals", origin="/signals", contents=recorded)]))
+        beside = views.Vertical(tabs, views.Tabs(*words))
+        space = [self._space_from_above(views)] if self._things else []
+        return views.Blueprint(views.Horizontal(*space, beside), collapse_panels=True)
+
+    def _space_from_above(self, views: Any) -> Any:
+        (left, low), (right, high) = extent(self._things)
+        x, y, away = (left + right) / 2.0, (low + high) / 2.0, AWAY * (max(right - left, high - low) or 1.0)
+        eye = views.EyeControls3D(position=(x, y, away), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
+        return views.Spatial3DView(name="space", origin="/space", eye_controls=eye)
+
+    def _below(self, signal: str) -> str:
+        path: str = self._rerun.new_entity_path(["signals", *parts(signal)])
+        return f"{path}/**"
+
+    def _about(self) -> None:
+        rows = ("| {} | {} |".format(name, text.replace("|", "\\|")) for name, text in about(self._recording).items())
+        text = "\n".join(("| run | |", "|---|---|", *rows))
+        self._stream.log("about", self._rerun.TextDocument(text, media_type="text/markdown"), static=True)
+
+    def _signal(self, signal: Signal) -> None:
+        """Each number in the tokens over time, and each state, as far as there are such."""
+        import pyarrow
+
+        numbers: dict[str, tuple[list[Tag], list[float]]] = {}
+        states: dict[str, tuple[list[Tag], list[str | None]]] = {}
+        for tag, token in signal:
+            for place, leaf in islice(leaves(token), PLACES):
+                if place.rpartition(".")[2] == STAMP:
+                    continue
+                kind, value, text = cell(leaf)
+                if kind in ("int", "float") and value is not None:
+                    tags, values = numbers.setdefault(place, ([], []))
+                    tags.append(tag)
+                    values.append(value)
+                else:
+                    moments, found = states.setdefault(place, ([], []))
+                    moments.append(tag)
+                    found.append(text if kind != "bool" else "true" if value else "false")
+        path = ["signals", *parts(signal.name)]
+        for place, (tags, values) in numbers.items():
+            self._send([*path, *parts(place)], tags, self._rerun.Scalars.columns(scalars=values))
+        for place, (tags, found) in states.items():
+            if any(each is not None for each in found):
+                # An Arrow array: rerun would write None in a list as the text "None".
+                texts = pyarrow.array([each and encodable(each) for each in found], pyarrow.string())
+                self._send([*path, *parts(place)], tags, self._rerun.StateChange.columns(state=texts))
+
+    def _space(self, thing: Thing) -> None:
+        rerun, path = self._rerun, ["space", thing.kind, *parts(thing.name)]
+        thin, paint = rerun.Radius.ui_points(THICKNESS), [thing.colour]
+        look: dict[str, Any] = {"line_radii": thin, "colors": paint, "fill_mode": "transparentfillmajorwireframe"}
+        named = {"labels": [thing.label], "show_labels": True} if thing.label else {}
+        # Each kind of shape: how it looks, and for each scene those that it has, as columns.
+        shapes: list[tuple[Any, list[list[Any]], Callable[[Any], Any]]] = [
+            (
+                rerun.Points3D.from_fields(radii=rerun.Radius.ui_points(PIXELS), colors=paint, **named),
+                [[(x, y, 0.0) for x, y in scene.points] for scene in thing.scenes],
+                lambda points: rerun.Points3D.columns(positions=points),
+            ),
+            (
+                rerun.Cylinders3D.from_fields(**look),
+                [[disc for disc in scene.discs if disc.along == disc.across] for scene in thing.scenes],
+                self._circles,
+            ),
+            (
+                rerun.Ellipsoids3D.from_fields(**look),
+                [[disc for disc in scene.discs if disc.along != disc.across] for scene in thing.scenes],
+                self._ellipses,
+            ),
+            (
+                rerun.LineStrips3D.from_fields(radii=thin, colors=paint),
+                [[[(x, y, 0.0) for x, y in way] for way in scene.paths] for scene in thing.scenes],
+                lambda strips: rerun.LineStrips3D.columns(strips=strips),
+            ),
+        ]
+        columns: list[Any] = []
+        for style, rows, made in shapes:
+            if any(rows):
+                self._stream.log(rerun.new_entity_path(path), style, static=True)
+                columns += made([*chain.from_iterable(rows)]).partition([len(row) for row in rows])
+        if columns:
+            self._send(path, [Tag(scene.time, LAST) for scene in thing.scenes], columns)
+
+    def _circles(self, discs: list[Disc]) -> Any:
+        return self._rerun.Cylinders3D.columns(
+            centers=[(disc.x, disc.y, 0.0) for disc in discs],
+            radii=[disc.along for disc in discs],
+            lengths=[0.0] * len(discs),
+        )
+
+    def _ellipses(self, discs: list[Disc]) -> Any:
+        turns = [disc.angle / 2.0 for disc in discs]
+        return self._rerun.Ellipsoids3D.columns(
+            centers=[(disc.x, disc.y, 0.0) for disc in discs],
+            half_sizes=[(disc.along, disc.across, 0.0) for disc in discs],
+            quaternions=[(0.0, 0.0, math.sin(turn), math.cos(turn)) for turn in turns],
+        )
+
+    def _act(self) -> None:
+        told: dict[str, list[Act]] = {}
+        for act in self._acts:
+            told.setdefault(act.aspect, []).append(act)
+        for aspect, found in told.items():
+            texts = [encodable(act.text) for act in found]
+            columns = self._rerun.TextLog.columns(text=texts, level=["INFO"] * len(found))
+            self._send(["aspects", aspect], [act.tag for act in found], columns)
