@@ -41,9 +41,9 @@ def on_files(files: Files, *, config: Any) -> Files:
     shown = exhibits(PARTS / "gallery")
     files.append(File.generated(config, "gallery/index.md", content=index(shown)))
     for each in shown:
-        page = File.generated(config, f"gallery/{each.name}.md", content=each.page)
-        page.inclusion = InclusionLevel.NOT_IN_NAV  # the gallery's first page leads there
-        files.append(page)
+        shown_page = File.generated(config, f"gallery/{each.name}.md", content=each.page)
+        shown_page.inclusion = InclusionLevel.NOT_IN_NAV  # the gallery's first page leads there
+        files.append(shown_page)
         for made in sorted((PARTS / "gallery" / each.name).iterdir()):
             place = f"gallery/{each.name}/{made.name}"
             files.append(File.generated(config, place, abs_src_path=os.fspath(made)))
