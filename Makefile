@@ -5,10 +5,11 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
+DOCS := $(VENV)/installed-docs
 LINKED := $(VENV)/linked
 
 .NOTPARALLEL:
-.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference wheel clean
+.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference docs wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
@@ -17,13 +18,14 @@ help:
 	@echo "make portable  every digest under settings that stand for other machines (10 min)"
 	@echo "make core   compile the core anew, after a change of its sources"
 	@echo "make cores  100,000 random networks: does each core make the same runs? (20 min)"
-	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, the order of imports, and types"
+	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, prose, the order of imports, and types"
 	@echo "make check  lint and every test, the slow ones too"
 	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
 	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
 	@echo "make mutants 200 small changes of our sources: do the quick tests notice 90 % of them or more?"
 	@echo "make robust 100,000 problems that no scenario poses: does the solver answer each within its limits?"
 	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
+	@echo "make docs   the site of the documents, into site/ (runs every packaged model; 2 min)"
 	@echo "make wheel  build dist/epicycle-*.whl"
 	@echo "make clean  remove all that these made, except results/"
 
@@ -67,11 +69,16 @@ lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python -m tests.arithmetic
+	$(BIN)/python -m tests.prose
 	$(BIN)/python -m tests.layers
 	$(BIN)/mypy
 
 reference: $(DEV)
 	$(BIN)/python -m tests.test_reference .
+
+docs: $(DOCS)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --config-file website/mkdocs.yml
+	@echo "open site/index.html"
 
 wheel: $(DEV)
 	rm -rf build dist
@@ -79,12 +86,12 @@ wheel: $(DEV)
 	rm -rf build
 
 clean:
-	rm -rf $(VENV) build dist epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
+	rm -rf $(VENV) build dist site site-parts epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	rm -f actors/compiled.json
 	find actors aspects models runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
 	find actors aspects runner \( -name '*.so' -o -name '*.pyd' \) -exec rm -f {} +
 
-# Two stamps on one environment; both grow stale when pyproject.toml changes.
+# Three stamps on one environment; all grow stale when pyproject.toml changes.
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Epicycle needs Python 3.11 or newer: make PYTHON=python3.x")'
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
@@ -106,4 +113,9 @@ $(USE): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 $(DEV): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[dev] into $(VENV) (first time only, and when pyproject.toml changes)"
 	@$(PIP) install --editable '.[dev]'
+	@touch $(USE) $@
+
+$(DOCS): pyproject.toml setup.py | $(BIN)/python $(LINKED)
+	@echo "Installing epicycle[docs] into $(VENV) (first time only, and when pyproject.toml changes)"
+	@$(PIP) install --editable '.[docs]'
 	@touch $(USE) $@

@@ -106,7 +106,7 @@ class Integrator(Actor):
 
     input = InputPort(float, doc="the signal")
     trigger = InputPort(required=False, doc="asks for the integral at other times")
-    reset = InputPort(required=False, doc="begins anew behind this tag, after telling the integral up to now")
+    reset = InputPort(required=False, doc="starts again after this tag, once the integral up to now is sent")
     output = OutputPort(float, doc="the integral up to now")
 
     method = Parameter(str, "hold", choices=("hold", "trapezoid"), doc="what the signal does between two tokens")

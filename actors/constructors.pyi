@@ -61,7 +61,7 @@ class Accumulator(_Accumulator):
     def __init__(self, path: str, *, initial: _Number = ..., reset_by: Literal['any', 'true'] = ..., low: _Number | None = ..., high: _Number | None = ...) -> None: ...
 
 class Ackermann(_Ackermann):
-    """A car: it is told how fast to go and how far to steer."""
+    """A car, driven by speed and steering angle."""
     def __init__(self, path: str, *, steering: _Number = ..., wheelbase: _Number = ..., max_steering: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
 
 class AddSubtract(_AddSubtract):
@@ -69,11 +69,11 @@ class AddSubtract(_AddSubtract):
     def __init__(self, path: str) -> None: ...
 
 class ArqReceiver(_ArqReceiver):
-    """The receiving end of an automatic repeat request: hands on what comes by an `ArqSender`, once and in order."""
+    """The receiving end of an automatic repeat request: passes on what comes by an `ArqSender`, once and in order."""
     def __init__(self, path: str, *, repeat: Literal['all', 'one'] = ...) -> None: ...
 
 class ArqSender(_ArqSender):
-    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them anew."""
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them again."""
     def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ...) -> None: ...
 
 class Barrier(_Barrier):
@@ -121,7 +121,7 @@ class Cauchy(_Cauchy):
     def __init__(self, *, median: _Number = ..., scale: _Number = ..., cut: _Number | None = ...) -> None: ...
 
 class Changes(_Changes):
-    """Hands on the first number, and then each that differs by more than `by` from the one handed on before."""
+    """Passes on the first number, and then each that differs by more than `by` from the one handed on before."""
     def __init__(self, path: str, *, by: _Number = ...) -> None: ...
 
 class ChiSquare(_ChiSquare):
@@ -141,11 +141,11 @@ class Clock(_Clock):
     def __init__(self, path: str, *, period: _Number, offset: _Number = ..., offsets: _Row = ..., cycles: _Whole | None = ..., new_period: Literal['next cycle', 'at once'] = ..., reset_period: bool = ..., late_trigger: bool = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
 
 class Collect(_Collect):
-    """Makes a list of a token of each channel, as soon as there is one on each; others wait in the order of arrival."""
+    """Makes a list of one token from each channel, once every channel has one; others wait in the order of arrival."""
     def __init__(self, path: str, *, joined: bool = ...) -> None: ...
 
 class Commutator(_Commutator):
-    """Hands on what comes at the channels of its input in turn, `block` tokens of each; tokens wait for their turn."""
+    """Passes on what comes at the channels of its input in turn, `block` tokens of each; tokens wait for their turn."""
     def __init__(self, path: str, *, block: _Whole = ..., waits: bool = ...) -> None: ...
 
 class Comparator(_Comparator):
@@ -177,11 +177,11 @@ class DRand(_DRand):
     def __init__(self, *, seed: _Whole) -> None: ...
 
 class DeadZone(_DeadZone):
-    """Lets nothing through between two values, and beyond them what exceeds them: play, or a valve that overlaps."""
+    """Outputs zero between two values, and beyond them the excess: play, or a valve that overlaps."""
     def __init__(self, path: str, *, low: _Number, high: _Number) -> None: ...
 
 class Default(_Default):
-    """Hands on what comes at `preferred`, and otherwise, if nothing does, what comes at `alternate`."""
+    """Passes on what comes at `preferred`, and otherwise, if nothing does, what comes at `alternate`."""
     def __init__(self, path: str, *, both: bool = ...) -> None: ...
 
 class Derivative(_Derivative):
@@ -205,7 +205,7 @@ class DistanceMonitor(_DistanceMonitor):
     def __init__(self, path: str) -> None: ...
 
 class Equals(_Equals):
-    """Tells whether the tokens that come together are all equal; channels without a token do not count."""
+    """Sends whether all tokens that come together are equal; channels without a token do not count."""
     def __init__(self, path: str, *, tolerance: _Number = ...) -> None: ...
 
 class Exponential(_Exponential):
@@ -221,7 +221,7 @@ class Extreme(_Extreme):
     def __init__(self, path: str, *, take: Literal['greatest', 'least']) -> None: ...
 
 class Filter(_Filter):
-    """Hands on the tokens for which a condition holds; the others are lost."""
+    """Passes on the tokens for which a condition holds; the others are lost."""
     def __init__(self, path: str, *, condition: str | float | Formula = ...) -> None: ...
 
 class FilterPyEstimator(_FilterPyEstimator):
@@ -229,7 +229,7 @@ class FilterPyEstimator(_FilterPyEstimator):
     def __init__(self, path: str, *, filter: Literal['ExtendedKalmanFilter', 'UnscentedKalmanFilter', 'CubatureKalmanFilter', 'KalmanFilter', 'SquareRootKalmanFilter'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class FirstOfInstant(_FirstOfInstant):
-    """Hands on the first token of each instant; those that come at the same time, also at later microsteps, are lost."""
+    """Passes on the first token of each instant; those that come at the same time, also at later microsteps, are lost."""
     def __init__(self, path: str) -> None: ...
 
 class FirstOrder(_FirstOrder):
@@ -269,7 +269,7 @@ class Inform(_Inform):
     def __init__(self, *, range: _Number = ..., penalty: _Number = ..., variance: _Number = ..., unit: Literal['nat', 'bit'] = ..., joint: bool = ...) -> None: ...
 
 class Inhibit(_Inhibit):
-    """Hands on what comes unless an `inhibit` token comes with it; the opposite of a `Sampler`."""
+    """Passes on what comes unless an `inhibit` token comes with it; the opposite of a `Sampler`."""
     def __init__(self, path: str) -> None: ...
 
 class Integrator(_Integrator):
@@ -277,7 +277,7 @@ class Integrator(_Integrator):
     def __init__(self, path: str, *, method: Literal['hold', 'trapezoid'] = ..., initial: _Number = ...) -> None: ...
 
 class IsPresent(_IsPresent):
-    """Tells for each channel whether a token has come on it, whenever one has on any of them."""
+    """Sends, for each channel, whether it has a token, whenever any of them has one."""
     def __init__(self, path: str) -> None: ...
 
 class JavaRandom(_JavaRandom):
@@ -289,7 +289,7 @@ class LatestOfAll(_LatestOfAll):
     def __init__(self, path: str, *, initial: object = ...) -> None: ...
 
 class Limiter(_Limiter):
-    """Cuts a signal off at its limits, and lets it change no faster than its rates: an actuator's saturation and slew."""
+    """Limits a signal and its rates of change: an actuator's saturation and slew."""
     def __init__(self, path: str, *, low: _Number = ..., high: _Number = ..., rising: _Number | None = ..., falling: _Number | None = ..., initial: _Number | None = ...) -> None: ...
 
 class Link(_Link):
@@ -329,7 +329,7 @@ class ModalActor(_ModalActor):
     def __init__(self, path: str) -> None: ...
 
 class MostRecent(_MostRecent):
-    """Sends the latest token of each channel whenever it is triggered, as often as that happens: a zero-order hold."""
+    """Sends the latest token of each channel whenever it is triggered, even if it has not changed: a zero-order hold."""
     def __init__(self, path: str, *, initial: object = ...) -> None: ...
 
 class MovingAverage(_MovingAverage):
@@ -393,7 +393,7 @@ class Queue(_Queue):
     def __init__(self, path: str, *, capacity: _Whole | None = ..., persistent_trigger: bool = ..., one_at_a_time: bool = ...) -> None: ...
 
 class Ramp(_Ramp):
-    """Counts triggers: sends `init` for the first, and for each further one the last number plus `step`."""
+    """Counts triggers: sends `init` for the first, and then `step` more for each."""
     def __init__(self, path: str, *, init: _Number = ..., step: _Number = ..., late_step: bool = ..., limit: _Whole | None = ...) -> None: ...
 
 class Random(_Random):
@@ -405,11 +405,11 @@ class RandomInteger(_RandomInteger):
     def __init__(self, *, low: _Whole = ..., high: _Whole = ...) -> None: ...
 
 class RangeBearingSensor(_RangeBearingSensor):
-    """Measures how far away a target is, and in which direction as seen from the vehicle, with normal noise."""
+    """Measures the distance and direction of a target as seen from the vehicle, with normal noise."""
     def __init__(self, path: str, *, landmark: _Row | None = ..., bearing_deviation: _Number = ..., range_deviation: _Number = ..., max_range: _Number = ..., field_of_view: _Number = ...) -> None: ...
 
 class RangeScanner(_RangeScanner):
-    """A lidar in the plane: how far it is to what stands around, along beams from the vehicle's position, with noise."""
+    """A lidar in the plane: distances to obstacles along beams from the vehicle's position, with noise."""
     def __init__(self, path: str, *, beams: _Whole = ..., field_of_view: _Number = ..., max_range: _Number = ..., deviation: _Number = ..., walls: _Rows = ..., discs: _Rows = ..., body_radius: _Number = ...) -> None: ...
 
 class ReachGoal(_ReachGoal):
@@ -441,7 +441,7 @@ class Replay(_Replay):
     def __init__(self, path: str, *, file: str | Path, time: str = ..., columns: _Texts | None = ...) -> None: ...
 
 class ResettableTimer(_ResettableTimer):
-    """Sends a value after as many seconds as the latest token says."""
+    """Sends a value after the number of seconds in the latest token."""
     def __init__(self, path: str, *, preemptive: bool = ..., value: object = ...) -> None: ...
 
 class RobustController(_RobustController):
@@ -453,7 +453,7 @@ class Router(_Router):
     def __init__(self, path: str, *, policy: Literal['round robin', 'random', 'shortest queue', 'expression'] = ..., weights: _Row | None = ..., channel: str | float | Formula | None = ...) -> None: ...
 
 class Sampler(_Sampler):
-    """Hands on what comes at the same tag as a trigger; all other tokens are lost."""
+    """Passes on what comes at the same tag as a trigger; all other tokens are lost."""
     def __init__(self, path: str) -> None: ...
 
 class Scale(_Scale):
@@ -461,7 +461,7 @@ class Scale(_Scale):
     def __init__(self, path: str, *, factor: _Number = ..., offset: _Number = ...) -> None: ...
 
 class Select(_Select):
-    """Hands on the tokens of the channel that the latest `control` token names; those of the others are lost."""
+    """Passes on the tokens of the channel that the latest `control` token names; those of the others are lost."""
     def __init__(self, path: str, *, unread: Literal['lost', 'kept'] = ..., initial: _Whole | None = ...) -> None: ...
 
 class Sensor(_Sensor):
@@ -473,7 +473,7 @@ class SeparationMonitor(_SeparationMonitor):
     def __init__(self, path: str) -> None: ...
 
 class Sequence(_Sequence):
-    """Sends the next of its values for each trigger, and nothing when they are used up."""
+    """Sends the next of its values for each trigger, and nothing once all are used."""
     def __init__(self, path: str, *, values: abc.Sequence[object], repeat: bool = ..., hold: bool = ...) -> None: ...
 
 class Sequencer(_Sequencer):
@@ -537,7 +537,7 @@ class Test(_Test):
     def __init__(self, path: str, *, values: abc.Sequence[object], times: _Row | None = ..., tolerance: _Number = ..., complete: bool = ..., together: bool = ..., follow: bool = ..., lenient: bool = ...) -> None: ...
 
 class TextFunction(_TextFunction):
-    """Does something with a text whenever a token comes at one of its inputs, each of which keeps its latest one."""
+    """Applies a function to texts whenever one of its inputs gets a token; each input keeps its latest token."""
     def __init__(self, path: str, *, function: Literal['lower', 'upper', 'trim', 'equals', 'contains', 'starts with', 'ends with', 'find', 'find last', 'replace', 'replace first', 'split'], ignore_case: bool = ..., text: str = ..., other: str = ..., new: str = ...) -> None: ...
 
 class TimeAverage(_TimeAverage):
@@ -549,15 +549,15 @@ class TimeCompare(_TimeCompare):
     def __init__(self, path: str, *, nonnegative: bool = ...) -> None: ...
 
 class TimeDelay(_TimeDelay):
-    """Sends each token on after a delay; with delay 0 at the next microstep."""
+    """Sends each token after a delay; with delay 0 at the next microstep."""
     def __init__(self, path: str, *, delay: _Number = ..., steps: bool = ...) -> None: ...
 
 class TimeGap(_TimeGap):
-    """Sends how much time has passed since the token before; nothing for the first one."""
+    """Sends the time since the previous token; nothing for the first one."""
     def __init__(self, path: str) -> None: ...
 
 class Timer(_Timer):
-    """Sends a value after as many seconds as a token says; any number of tokens may be waiting at once."""
+    """Sends a value after the number of seconds in each token; any number of tokens may wait at the same time."""
     def __init__(self, path: str, *, one_at_a_time: bool = ..., value: object = ...) -> None: ...
 
 class TransferFunction(_TransferFunction):
@@ -573,7 +573,7 @@ class Unbatch(_Unbatch):
     def __init__(self, path: str) -> None: ...
 
 class Unicycle(_Unicycle):
-    """A vehicle that is told how fast to go and how fast to turn: one wheel, or two that are driven apart."""
+    """A vehicle driven by speed and turn rate: one wheel, or two with separate drives."""
     def __init__(self, path: str, *, turn_rate: _Number = ..., max_turn_rate: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
 
 class Uniform(_Uniform):

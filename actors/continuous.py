@@ -219,7 +219,7 @@ class ODE(Actor):
     def _plan(self) -> None:
         """Ask to be fired at the next crossing or, while none is in sight, where the search for it ends.
 
-        A wake-up that an input has overtaken is cancelled, for the solution it was found on is no more.
+        A wake-up that an input has overtaken is cancelled, because the solution it was found on no longer exists.
         """
         if self._wake is not None and not self._wake.due:
             self._wake.cancel()

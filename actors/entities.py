@@ -225,7 +225,7 @@ def _items(token: Any) -> Any:
 
 
 class Collect(Actor):
-    """Makes a list of a token of each channel, as soon as there is one on each; others wait in the order of arrival.
+    """Makes a list of one token from each channel, once every channel has one; others wait in the order of arrival.
 
     With ``joined`` the tokens are lists, and one is made of all that is in them.
     Ptolemy: ``ElementsToArray``, ``ArrayAppend`` (``joined``).

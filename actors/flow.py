@@ -65,10 +65,10 @@ class Merge(Actor):
 class Router(Actor):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or as the token says.
 
-    For ``shortest queue``, ``load`` takes what each channel leads to tells of itself, such as the ``size`` of a
-    ``Server``, in the order of the output's channels; it counts as 0 until then, and one more for each token that is
-    sent there before it tells anew.  Among equals one is drawn.  ``channel: number % 3`` is what ``expression`` goes
-    by, over the token's fields.  Ptolemy: ``Distributor``.
+    For ``shortest queue``, ``load`` takes the load of what each channel leads to, such as the ``size`` of a
+    ``Server``, in the order of the output's channels; it is 0 before the first value, plus one for each token sent
+    before the next value.  Ties are broken at random.  For ``expression``, give ``channel:
+    number % 3``, over the token's fields.  Ptolemy: ``Distributor``.
     """
 
     input = InputPort(doc="what is handed on")
@@ -203,7 +203,7 @@ class BooleanSwitch(Actor):
 
 
 class Select(Actor):
-    """Hands on the tokens of the channel that the latest ``control`` token names; those of the others are lost.
+    """Passes on the tokens of the channel that the latest ``control`` token names; those of the others are lost.
 
     If unread tokens are ``kept``, those of the others wait until they are chosen, and one goes on in each firing, which
     takes one token of ``control``; a number that names no channel chooses none.
@@ -284,7 +284,7 @@ class ByChannel(Actor):
 
 
 class Sampler(ByChannel):
-    """Hands on what comes at the same tag as a trigger; all other tokens are lost.
+    """Passes on what comes at the same tag as a trigger; all other tokens are lost.
 
     Ptolemy: ``Sampler``.
     """
@@ -299,7 +299,7 @@ class Sampler(ByChannel):
 
 
 class MostRecent(ByChannel):
-    """Sends the latest token of each channel whenever it is triggered, as often as that happens: a zero-order hold.
+    """Sends the latest token of each channel whenever it is triggered, even if it has not changed: a zero-order hold.
 
     A channel on which no token has come yet sends ``initial``, or nothing if that is not given.
     Ptolemy: ``MostRecent``, ``ZeroOrderHold``.

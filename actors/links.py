@@ -188,14 +188,14 @@ class NetworkSwitch(_Transmitting):
 
 
 class ArqSender(Actor):
-    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them anew.
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them again.
 
     A frame is ``{number, data}``, with the token that came as its data.  ``window: 1`` is stop-and-wait.  Otherwise,
-    when the oldest frame has not been acknowledged for ``timeout``, ``repeat: all`` sends all that are out anew (go
-    back N), and ``repeat: one`` each whose own time is over (selective repeat).  An acknowledgement is the number of a
-    frame: with ``all`` it acknowledges all up to this one, with ``one`` this one alone.  Frames go through a ``Link``
-    with loss to an ``ArqReceiver``, whose acknowledgements come back by another.  The output does not depend on ``ack``
-    at once.
+    when the oldest frame has not been acknowledged for ``timeout``, ``repeat: all`` sends all outstanding frames again
+    (go back N), and ``repeat: one`` each frame whose own timeout has elapsed (selective repeat).  An acknowledgement is
+    the number of a frame: with ``all`` it acknowledges all up to this one, with ``one`` this one alone.  Frames go
+    through a ``Link`` with loss to an ``ArqReceiver``, whose acknowledgements come back by another.  The output does
+    not depend on ``ack`` at once.
 
     Sources: Bertsekas and Gallager, Data Networks, 2.4; Tanenbaum, Computer Networks, 3.4.
     """
@@ -288,7 +288,7 @@ class ArqSender(Actor):
 
 
 class ArqReceiver(Actor):
-    """The receiving end of an automatic repeat request: hands on what comes by an ``ArqSender``, once and in order.
+    """The receiving end of an automatic repeat request: passes on what comes by an ``ArqSender``, once and in order.
 
     With ``repeat: all`` a frame that is not the next one is thrown away, and the last one in order is acknowledged;
     with ``one`` it is kept until its turn, and each frame is acknowledged by itself.  Sources: see ``ArqSender``.

@@ -85,7 +85,7 @@ class Comparator(Actor):
 
 
 class Equals(Actor):
-    """Tells whether the tokens that come together are all equal; channels without a token do not count.
+    """Sends whether all tokens that come together are equal; channels without a token do not count.
 
     Ptolemy: ``Equals``.
     """

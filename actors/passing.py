@@ -13,7 +13,7 @@ from .matching import matched
 
 
 class Filter(ByChannel):
-    """Hands on the tokens for which a condition holds; the others are lost.
+    """Passes on the tokens for which a condition holds; the others are lost.
 
     Ptolemy: ``EventFilter``, ``TrueGate``.
     """
@@ -31,7 +31,7 @@ class Filter(ByChannel):
 
 
 class Inhibit(ByChannel):
-    """Hands on what comes unless an ``inhibit`` token comes with it; the opposite of a ``Sampler``.
+    """Passes on what comes unless an ``inhibit`` token comes with it; the opposite of a ``Sampler``.
 
     Of several tokens of a channel at one tag, each ``inhibit`` token stops one, the first ones first.
     Ptolemy: ``Inhibit``.
@@ -47,7 +47,7 @@ class Inhibit(ByChannel):
 
 
 class FirstOfInstant(Actor):
-    """Hands on the first token of each instant; those that come at the same time, also at later microsteps, are lost.
+    """Passes on the first token of each instant; those that come at the same time, also at later microsteps, are lost.
 
     Ptolemy: ``SuppressSimultaneousEvents``.
     """
@@ -66,7 +66,7 @@ class FirstOfInstant(Actor):
 
 
 class Changes(Actor):
-    """Hands on the first number, and then each that differs by more than ``by`` from the one handed on before.
+    """Passes on the first number, and then each that differs by more than ``by`` from the one handed on before.
 
     Source: M. Miskowicz, Send-on-delta concept, Sensors 6, 2006.  Ptolemy: ``QuantizedSampler``.
     """
@@ -188,7 +188,7 @@ class BooleanSelect(Actor):
 
 
 class Commutator(Actor):
-    """Hands on what comes at the channels of its input in turn, ``block`` tokens of each; tokens wait for their turn.
+    """Passes on what comes at the channels of its input in turn, ``block`` tokens of each; tokens wait for their turn.
 
     Ptolemy: ``Commutator``, ``SingleTokenCommutator`` (``waits: false``).
     """
@@ -242,7 +242,7 @@ class Sequencer(Actor):
 
 
 class Default(Actor):
-    """Hands on what comes at ``preferred``, and otherwise, if nothing does, what comes at ``alternate``.
+    """Passes on what comes at ``preferred``, and otherwise, if nothing does, what comes at ``alternate``.
 
     Ptolemy: ``Default``.
     """
@@ -264,7 +264,7 @@ class Default(Actor):
 
 
 class IsPresent(ByChannel):
-    """Tells for each channel whether a token has come on it, whenever one has on any of them.
+    """Sends, for each channel, whether it has a token, whenever any of them has one.
 
     Ptolemy: ``IsPresent``.
     """

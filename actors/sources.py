@@ -189,7 +189,7 @@ class Clock(_Ticking):
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    A trigger lets one come at once, from which the time to the next is drawn anew.  With ``one_at_a_time``, as in
+    A trigger lets one come at once, from which the time to the next one is drawn.  With ``one_at_a_time``, as in
     Ptolemy, triggers that come together let a tick come each, and the last tick of all is the first at ``stop_time`` or
     behind it.  Ptolemy: ``PoissonClock``.
     """

@@ -31,7 +31,7 @@ _NAMES = ("text", "other", "new")
 
 
 class TextFunction(Actor):
-    """Does something with a text whenever a token comes at one of its inputs, each of which keeps its latest one.
+    """Applies a function to texts whenever one of its inputs gets a token; each input keeps its latest token.
 
     ``lower``, ``upper`` and ``trim`` are of ``text`` alone.  ``equals``, ``contains``, ``starts with`` and
     ``ends with`` tell whether it does so with ``other``, ``find`` and ``find last`` where that is in it, from 0, or -1.
@@ -40,7 +40,7 @@ class TextFunction(Actor):
     texts.
     """
 
-    output: OutputPort[Any] = OutputPort(str, doc="what comes of it")
+    output: OutputPort[Any] = OutputPort(str, doc="the result")
 
     function = Parameter(str, choices=tuple(FUNCTIONS), doc="what is done")
     ignore_case = Parameter(bool, False, doc="whether capital letters count as small ones, in both texts")

@@ -22,7 +22,7 @@ from .core import (
 
 
 class TimeDelay(Actor):
-    """Sends each token on after a delay; with delay 0 at the next microstep.
+    """Sends each token after a delay; with delay 0 at the next microstep.
 
     A token is delayed by what ``delay`` is at its own tag, so one may overtake another.  The output does not depend
     on the inputs at once: the actor may stand in a loop.  With ``steps`` a token keeps its microstep, and those that
@@ -91,7 +91,7 @@ class _Timing(Actor):
 
 
 class Timer(_Timing):
-    """Sends a value after as many seconds as a token says; any number of tokens may be waiting at once.
+    """Sends a value after the number of seconds in each token; any number of tokens may wait at the same time.
 
     With ``one_at_a_time``, as in Ptolemy, a firing sends one value; what is due as well follows in the next microsteps.
     Ptolemy: ``Timer``.
@@ -134,7 +134,7 @@ class Timer(_Timing):
 
 
 class ResettableTimer(_Timing):
-    """Sends a value after as many seconds as the latest token says.
+    """Sends a value after the number of seconds in the latest token.
 
     A further token before that starts the time again, a negative one stops it.  A token at the very tag at which the
     time is over comes too late to stop that.  If it is not ``preemptive``, times run one after the other: each begins
@@ -220,7 +220,7 @@ class TimeCompare(Actor):
 
 
 class TimeGap(Actor):
-    """Sends how much time has passed since the token before; nothing for the first one.
+    """Sends the time since the previous token; nothing for the first one.
 
     Ptolemy: ``TimeGap``.
     """

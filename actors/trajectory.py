@@ -52,7 +52,7 @@ class Trajectory:
         self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver)
 
     def begin_at(self, at: float, state: State) -> None:
-        """Start anew at a time of the present solution."""
+        """Start again at a time of the present solution."""
         moment = self.moment(at)
         self.begin(moment, self.fraction + at - (moment - self.time) / NANOSECONDS_PER_SECOND, state)
 

@@ -73,7 +73,7 @@ class Const(_Answering):
 
 
 class Ramp(_Answering):
-    """Counts triggers: sends ``init`` for the first, and for each further one the last number plus ``step``.
+    """Counts triggers: sends ``init`` for the first, and then ``step`` more for each.
 
     The numbers are integers if ``init`` and ``step`` are; then what comes for them must be one, too.
     Ptolemy: ``Ramp``.
@@ -108,7 +108,7 @@ class Ramp(_Answering):
 
 
 class Sequence(Actor):
-    """Sends the next of its values for each trigger, and nothing when they are used up.
+    """Sends the next of its values for each trigger, and nothing once all are used.
 
     If ``enable`` is connected, a value is sent only at a tag at which it is true; without ``trigger``, each true
     token of ``enable`` is a trigger.  Ptolemy: ``Sequence``.

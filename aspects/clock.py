@@ -30,7 +30,7 @@ class ClockAspect(Aspect):
 
 
 class ClockDrift(ClockAspect):
-    """Lets a clock go too fast or too slowly.
+    """Makes a clock run too fast or too slowly.
 
     After the time t of the clock around it, it has gone on by (1 + g) t, to the nanosecond below.  g is ``gain``, or
     drawn once for each clock from N(``gain``, ``deviation``^2).  A crystal oscillator is good for some ten millionths.

@@ -38,7 +38,7 @@ class Bus(_Bus):
     def __init__(self, *, factor: _Number, steps: bool = ..., medium: str | None = ..., message_length: _Number = ..., number_length: _Number = ..., length_field: str | None = ..., priority: _Number = ..., priority_field: str | None = ..., capacity: _Whole | None = ..., overflow: Literal['newest', 'oldest'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class ClockDrift(_ClockDrift):
-    """Lets a clock go too fast or too slowly."""
+    """Makes a clock run too fast or too slowly."""
     def __init__(self, *, gain: _Number = ..., deviation: _Number = ...) -> None: ...
 
 class ClockOffset(_ClockOffset):
@@ -50,7 +50,7 @@ class Corrupt(_Corrupt):
     def __init__(self, *, probability: _Number, kind: Literal['gaussian', 'bit_flip'] = ..., deviation: _Number = ..., fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Count(_Count):
-    """Counts the tokens that pass, for the summary alone: the log does not grow."""
+    """Counts the tokens that pass, in the summary only: the log does not grow."""
     def __init__(self, *, by: str | PortFormula | None = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class CrashRestart(_CrashRestart):
@@ -66,7 +66,7 @@ class Duplicate(_Duplicate):
     def __init__(self, *, probability: _Number, copies: _Whole = ..., spacing: _Number = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class ExecutionTime(_ExecutionTime):
-    """Lets the firings of an actor take time: it fires when that is over, with the tokens that came at the beginning."""
+    """Makes the firings of an actor take time: it fires at the end, with the tokens from the beginning."""
     def __init__(self, *, time: _Number | Distribution | abc.Mapping[str, object] | abc.Mapping[str, _Number | Distribution | abc.Mapping[str, object]] = ..., times: str | Path | None = ..., measure: bool = ..., scale: _Number = ..., busy: Literal['wait', 'skip'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class GilbertElliott(_GilbertElliott):
@@ -86,19 +86,19 @@ class Noise(_Noise):
     def __init__(self, *, deviation: _Number, distribution: Literal['normal', 'uniform', 'laplace'] | Distribution | abc.Mapping[str, object] = ..., fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Occlusion(_Occlusion):
-    """Lets measurements fail while another body stands in the line of sight."""
+    """Makes measurements fail while another body blocks the line of sight."""
     def __init__(self, *, radius: _Number, target: _Texts, positions: _Texts, from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class OutOfRange(_OutOfRange):
-    """Lets measurements fail while the target is farther away than the sensor sees."""
+    """Makes measurements fail while the target is out of the sensor's range."""
     def __init__(self, *, range: _Number, target: _Texts, positions: _Texts, from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Outage(_Outage):
-    """Cuts a network in parts: drops every message from a member of one group to a member of another alone."""
+    """Splits a network: drops every message from a member of one group to a member of another."""
     def __init__(self, *, sender: str | PortFormula | None = ..., groups: abc.Mapping[str, _Texts], from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Outlier(_Outlier):
-    """Adds a gross error N(0, deviation^2) now and then, to each number independently."""
+    """Adds an occasional gross error N(0, deviation^2), to each number independently."""
     def __init__(self, *, probability: _Number, deviation: _Number, fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class PacketLoss(_PacketLoss):
@@ -110,7 +110,7 @@ class Probe(_Probe):
     def __init__(self, *, from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Processor(_Processor):
-    """One processor for all the actors at which it stands: each of their firings needs it for some time."""
+    """One processor for all its actors: each of their firings needs it for some time."""
     def __init__(self, *, policy: Literal['fcfs', 'priority', 'edf'] = ..., preemptive: bool = ..., time: _Number | Distribution | abc.Mapping[str, object] | abc.Mapping[str, _Number | Distribution | abc.Mapping[str, object]] = ..., times: abc.Mapping[str, _Number | Distribution | abc.Mapping[str, object] | abc.Mapping[str, _Number | Distribution | abc.Mapping[str, object]]] = ..., priorities: abc.Mapping[str, _Number] = ..., deadlines: abc.Mapping[str, _Number] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Quantise(_Quantise):
@@ -118,11 +118,11 @@ class Quantise(_Quantise):
     def __init__(self, *, step: _Number, fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class RadioMedium(_RadioMedium):
-    """One radio channel that all stations hear: who sends while another does spoils both messages."""
+    """One radio channel that all stations hear: two that send at the same time spoil both messages."""
     def __init__(self, *, message_length: _Number = ..., number_length: _Number = ..., rate: _Number, overhead: _Number = ..., carrier_sense: bool = ..., slot: _Number = ..., window: _Whole = ..., max_window: _Whole = ..., retries: _Whole = ..., capture: _Number = ..., loss: _Number = ..., medium: str | None = ..., length_field: str | None = ..., priority: _Number = ..., priority_field: str | None = ..., capacity: _Whole | None = ..., overflow: Literal['newest', 'oldest'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class RangeLoss(_RangeLoss):
-    """Drops messages that come from afar: log-distance path loss with log-normal shadowing."""
+    """Drops messages from far away: log-distance path loss with log-normal shadowing."""
     def __init__(self, *, sender: str | PortFormula | None = ..., range: _Number, exponent: _Number = ..., shadowing: _Number = ..., correlation: _Number | None = ..., positions: _Texts, from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Reorder(_Reorder):
@@ -134,7 +134,7 @@ class Replace(_Replace):
     def __init__(self, *, to: str | PortFormula, from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Saturate(_Saturate):
-    """Cuts numbers off at what the sensor can show."""
+    """Limits numbers to what the sensor can show."""
     def __init__(self, *, low: _Number = ..., high: _Number = ..., fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class SkipFiring(_SkipFiring):

@@ -38,7 +38,7 @@ LOST, KEPT = "lost", "kept"
 
 
 class ExecutionTime(ExecutionAspect):
-    """Lets the firings of an actor take time: it fires when that is over, with the tokens that came at the beginning.
+    """Makes the firings of an actor take time: it fires at the end, with the tokens from the beginning.
 
     A firing takes ``scale`` * (``time`` + the next of the measured ``times``), if there is something to do in it: at
     ports that do not trigger an actor it only takes note of tokens, which costs nothing.  With a ``time`` for each port
@@ -176,7 +176,7 @@ class SkipFiring(ExecutionAspect):
 
 
 class Processor(ExecutionAspect):
-    """One processor for all the actors at which it stands: each of their firings needs it for some time.
+    """One processor for all its actors: each of their firings needs it for some time.
 
     An actor fires when the time that its firing needs has been worked off, with the tokens that came at the beginning.
     As in ``ExecutionTime``, tokens of which it only takes note cost nothing, and times may be given by input port.
@@ -295,7 +295,7 @@ class CrashRestart(ExecutionAspect):
     not active does not happen.  Times are those of the model.
 
     With the state ``lost`` everything is gone that the actors knew and had begun, their wake-ups included, and after
-    the repair they begin anew, as in ``initialize`` before the first tag; their random streams go on.  Actors that
+    the repair they begin again, as in ``initialize`` before the first tag; their random streams go on.  Actors that
     stand for physics, which does not crash with the software, are better left out (``!robot.vehicle``).  With the state
     ``kept`` they go on where they were: what had begun, and wake-ups that fell due meanwhile, are executed at once.
     A process that waits for an event of SimPy's own, such as a resource, is not held up by a crash that keeps the

@@ -221,7 +221,7 @@ class Replace(MeasurementAspect):
 
 
 class Outlier(Alteration):
-    """Adds a gross error N(0, deviation^2) now and then, to each number independently."""
+    """Adds an occasional gross error N(0, deviation^2), to each number independently."""
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a number is an outlier")
     deviation = Parameter(float, min=0.0, doc="standard deviation of the gross error, in the number's own unit")
@@ -241,7 +241,7 @@ class Quantise(Alteration):
 
 
 class Saturate(Alteration):
-    """Cuts numbers off at what the sensor can show."""
+    """Limits numbers to what the sensor can show."""
 
     low = Parameter(float, -math.inf, doc="smallest number, in its own unit")
     high = Parameter(float, math.inf, doc="largest number, in its own unit")

@@ -131,7 +131,7 @@ class Bus(Medium):
 
 
 class RadioMedium(Medium):
-    """One radio channel that all stations hear: who sends while another does spoils both messages.
+    """One radio channel that all stations hear: two that send at the same time spoil both messages.
 
     A *station* is the actor or composite whose port a message comes from (over the connection, for an aspect at an
     input).  It has one radio: it sends one message at a time, and its others wait, ``capacity`` of them.

@@ -28,7 +28,7 @@ class Probe(ObservationAspect):
 
 
 class Count(ObservationAspect):
-    """Counts the tokens that pass, for the summary alone: the log does not grow.
+    """Counts the tokens that pass, in the summary only: the log does not grow.
 
     Event: ``counted``; with ``by`` also ``counted VALUE`` for each value of the expression; after the hundredth all
     further values are ``counted others``.

@@ -76,7 +76,7 @@ class _SituatedLoss(LossAspect):
 
 
 class RangeLoss(_SituatedLoss, CommunicationAspect):
-    """Drops messages that come from afar: log-distance path loss with log-normal shadowing.
+    """Drops messages from far away: log-distance path loss with log-normal shadowing.
 
     At the distance d from sender to receiver the received power is 10 * exponent * log10(range / d) + X dB above what
     the receiver needs, with X ~ N(0, shadowing^2); below 0 dB the message is lost.  So the loss at d is
@@ -141,7 +141,7 @@ class _SightLoss(_SituatedLoss, MeasurementAspect):
 
 
 class OutOfRange(_SightLoss):
-    """Lets measurements fail while the target is farther away than the sensor sees.
+    """Makes measurements fail while the target is out of the sensor's range.
 
     The sensor is where the body is to which it belongs.  Before both places are known, measurements pass.  It is to
     measurements what a ``RangeLoss`` without shadowing is to messages.  Event: ``failed``.
@@ -156,7 +156,7 @@ class OutOfRange(_SightLoss):
 
 
 class Occlusion(_SightLoss):
-    """Lets measurements fail while another body stands in the line of sight.
+    """Makes measurements fail while another body blocks the line of sight.
 
     Every body that ``positions`` names but the sensor's own and the target is opaque within ``radius``: it occludes
     what it is nearer to than that, of the straight line from sensor to target.  Event: ``occluded``.
@@ -171,7 +171,7 @@ class Occlusion(_SightLoss):
 
 
 class Outage(LossAspect, CommunicationAspect):
-    """Cuts a network in parts: drops every message from a member of one group to a member of another alone.
+    """Splits a network: drops every message from a member of one group to a member of another.
 
     Who is in several groups talks with all of them; who is in none hears, and is heard by, everybody.  ``from``,
     ``until`` and ``every`` say when.  Event: ``dropped``.

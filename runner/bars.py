@@ -60,7 +60,7 @@ def _on_terminal(name: str, words: str, terminal: Console) -> Iterator[Show]:
 
 @contextmanager
 def _in_notebook(name: str) -> Iterator[Show]:
-    """Plain HTML that is written anew in its place, so that no widgets need be installed; it goes at the end."""
+    """Plain HTML that is written again in its place, so that no widgets need be installed; it goes at the end."""
     from .html import tag
 
     notebook: Any = import_module("IPython.display")

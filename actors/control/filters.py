@@ -81,7 +81,7 @@ class DiscreteFilter(Actor):
     """
 
     input = InputPort(float, doc="the samples")
-    reset = InputPort(required=False, doc="begins anew, before the samples of the tag")
+    reset = InputPort(required=False, doc="begins again, before the samples of the tag")
     output = OutputPort(float, depends_on=("input", "reset"), doc="the filtered samples")
 
     numerator: Parameter[Any] = array_parameter((None,), None, doc="coefficients of u[k], u[k-1], ...")

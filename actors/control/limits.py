@@ -9,7 +9,7 @@ from ..readings import finite_number
 
 
 class Limiter(Actor):
-    """Cuts a signal off at its limits, and lets it change no faster than its rates: an actuator's saturation and slew.
+    """Limits a signal and its rates of change: an actuator's saturation and slew.
 
     Each token gives the value that is nearest to it within the limits and within reach of what was sent before, as far
     as the time since then allows.  While the output is still on its way, a ``trigger`` sends how far it has come.
@@ -83,7 +83,7 @@ class Quantizer(Actor):
 
 
 class DeadZone(Actor):
-    """Lets nothing through between two values, and beyond them what exceeds them: play, or a valve that overlaps.
+    """Outputs zero between two values, and beyond them the excess: play, or a valve that overlaps.
 
     Source: J.-J. Slotine and W. Li, Applied Nonlinear Control, 1991, section 5.2.
     """

@@ -153,7 +153,7 @@ class _MatrixParameter(Parameter[Any]):
 class StateSpace(_LinearSystem):
     """A linear system in state space, ``dx/dt = A x + B u``, ``y = C x + D u``.
 
-    A mass on a spring, of which the position is told:
+    A mass on a spring, with its position as output:
 
         mass: {type: StateSpace, a: [[0, 1], [-4, -0.4]], b: [[0], [1]], c: [[1, 0]], initial: [1, 0]}
 

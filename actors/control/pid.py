@@ -65,7 +65,7 @@ class PID(Actor):
 
     measurement = InputPort(float, doc="y; an output is sent for each")
     feedforward = InputPort(float, required=False, triggers=False, doc="added to the output from the next one on")
-    tracking = InputPort(float, required=False, triggers=False, doc="what the actuator does, where it tells")
+    tracking = InputPort(float, required=False, triggers=False, doc="the output of the actuator, where it is measured")
     automatic = InputPort(bool, required=False, triggers=False, doc="whether it controls; true until a token comes")
     manual = InputPort(
         float, required=False, triggers=False, doc="the output while it does not; the last one until a token comes"

@@ -68,7 +68,7 @@ class Parameter(Generic[T]):
     ``type`` is ``float``, ``int``, ``bool``, ``str``, ``Path``, ``object`` (any value that YAML can write, for tokens)
     or a ``Configurable`` class (then the value is a mapping with a ``type`` key that names one of its subclasses).
     A number may come as text with a unit (``"8 m/s"``); it is converted to ``unit``, which is ``"1"`` for a pure
-    number.  A parameter without one counts in whatever the tokens count in, and what has a unit is converted to SI
+    number.  A parameter without one has the unit of the tokens, and what has a unit is converted to SI
     units; the ``unit`` of a ``Configurable`` class is that of the parameters in it that have none of their own.
     ``shape`` makes it an array of floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and
     ``object``, ``(None,)`` a tuple.  ``int | float`` is a number that stays an integer if it is one.

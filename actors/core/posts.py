@@ -55,7 +55,7 @@ class Posts:
             self._number = 0
 
     def _leave(self, around: Place) -> None:
-        """Directors in which nothing is left are posted anew the next time, but for those that are gone on with."""
+        """Directors in which nothing is left are posted again the next time, except those that continue."""
         for place in self._open:
             director = place[1]
             if place not in around and not self._waiting[director]:

@@ -22,7 +22,7 @@ class Quantity(float):
     """A float that is counted in ``unit``.
 
     Sums, differences, remainders and comparisons convert the other side, products, quotients and whole powers make a
-    new unit, a plain number counts in whatever unit is beside it.  Where no unit is asked for, ``si`` is the number.
+    new unit, a plain number takes the other side's unit.  Where no unit is asked for, ``si`` is the number.
     Raises ``UnitError`` where units do not go together.
     """
 

@@ -243,7 +243,7 @@ class _Reader:
         return self._tokens[self._next][0] if self._next < len(self._tokens) else None
 
     def _bounded(self, unit: Unit) -> Unit:
-        """Return the unit if it is of bearable size: powers of powers grow without end."""
+        """Return the unit if it is of reasonable size: powers of powers grow without end."""
         bits = max(unit.scale.numerator.bit_length(), unit.scale.denominator.bit_length())
         if bits > _MAX_BITS or max(map(abs, (unit.pi_power, *unit.dimension))) > _MAX_EXPONENT:
             raise self._unreadable("its powers are too large")

@@ -1,4 +1,4 @@
-"""A safe evaluator for expressions: arithmetic, lists, conditions and a few functions, no more.
+"""A safe evaluator for expressions: arithmetic, lists, conditions and a few functions.
 
 Python's parser reads the text; what it found is checked against a whitelist as a whole and then interpreted
 here, never by `eval`. Every cost (time, memory, depth, size of numbers) has a limit that is checked before it

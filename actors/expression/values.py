@@ -153,7 +153,7 @@ def _written(value: object) -> str:
 
 
 def _checked(result: Any, *operands: Any) -> Any:
-    """Return the result if it is a real number of bearable size, and infinite only if an operand was."""
+    """Return the result if it is a real number of reasonable size, and infinite only if an operand was."""
     if isinstance(result, complex):
         raise ValueError("the result is not a real number")
     if isinstance(result, int):
@@ -291,7 +291,7 @@ def subscript(whole: Any, index: object) -> Any:
 def _function(
     name: str, function: Callable[..., Any], least: int = 1, most: float = 1, *, of_numbers: bool = True
 ) -> Callable[..., Any]:
-    """A function that explains what it takes; of numbers, it gives a number of bearable size."""
+    """A function that explains what it takes; of numbers, it gives a number of reasonable size."""
 
     def call(*values: Any) -> Any:
         if not least <= len(values) <= most:

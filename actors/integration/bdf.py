@@ -113,7 +113,7 @@ class BDF(Stepper):
         self._equal_steps += 1
 
     def _choose_order(self, scale: list[float], error: float, safety: float) -> None:
-        """Go on with the order, of this one and its neighbours, that allows the longest step."""
+        """Continue with the order, of this one and its neighbours, that allows the longest step."""
         order = self._order
         best, best_factor = order, stretch(error, 1.0, order)
         for other in (order - 1, order + 1):

@@ -16,9 +16,9 @@ class WaitingLine(WaitingActor):
     ``order: due`` lets the earliest due date go first, ``order: work`` the shortest job, ``order: -value`` the highest
     value, ``order: channel`` what comes in by the first connection; ``discipline`` decides among equals.  A token that
     has to wait may turn away (``balking``), find no ``room``, or lose its ``patience``.  At one tag those that renege
-    go first, then tokens come in, then triggers let them out; all is told at the next microstep, so the actor may stand
-    in a loop.  With ``credits: 2``, before a ``Server`` of 2 servers whose output triggers it, it is a queue of type
-    G/G/2 with that discipline.  ``Queue`` is the plain one.  Sources: Gross and others, Fundamentals of Queueing
+    go first, then tokens come in, then triggers let them out; outputs leave at the next microstep, so the actor may
+    stand in a loop.  With ``credits: 2``, before a ``Server`` of 2 servers whose output triggers it, it is a queue of
+    type G/G/2 with that discipline.  ``Queue`` is the plain one.  Sources: Gross and others, Fundamentals of Queueing
     Theory; SimPy's ``Store`` and ``PriorityStore``.
     """
 

@@ -26,10 +26,10 @@ class Pool(WaitingActor):
     Requests wait in the order of ``order`` (the least goes first), then of ``discipline``; nobody overtakes the first,
     whose ``amount`` may be large.  With ``preemptive``, a request takes units from those whose ``order`` is greater,
     the greatest and latest first: their tokens leave by ``preempted``, they wait again at their old place, and are
-    granted anew.  So do those who hold more than there is, when ``capacity`` falls; else they keep it until they are
+    granted again.  So do those who hold more than there is, when ``capacity`` falls; else they keep it until they are
     done. Shifts are a ``Clock`` at ``capacity``: ``{period: 24 h, offsets: [8 h, 16 h], values: [3, 1]}``.
 
-    At one tag those that renege go first, then comes the capacity, then releases, then requests; all is told at the
+    At one tag those that renege go first, then comes the capacity, then releases, then requests; outputs leave at the
     next microstep, so the actor may stand in a loop.  Sources: SimPy's ``PreemptiveResource``; Pegden and others,
     Introduction to Simulation Using SIMAN (seize and release); Ptolemy: ``ResourcePool``.
     """
@@ -39,7 +39,7 @@ class Pool(WaitingActor):
     acquire = InputPort(multi=True, doc="asks for units")
     release = InputPort(multi=True, doc="returns them, or withdraws the request")
     granted = OutputPort(multi=True, depends_on=(), doc="each request when it has its units")
-    preempted = OutputPort(multi=True, depends_on=(), doc="each request that lost them and waits anew")
+    preempted = OutputPort(multi=True, depends_on=(), doc="each request that lost them and waits again")
     rejected = OutputPort(multi=True, depends_on=(), doc="the requests that found no room")
     balked = OutputPort(multi=True, depends_on=(), doc="the requests that did not care to wait")
     reneged = OutputPort(multi=True, depends_on=(), doc="the requests that lost their patience")

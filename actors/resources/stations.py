@@ -48,15 +48,15 @@ class Station(Process):
 class Machine(Process):
     """A machine that makes one part after the other, breaks down now and then, and waits to be repaired.
 
-    A breakdown interrupts the work on a part, which goes on where it was when the machine runs again.  The machine
-    tells its ``number`` when it breaks, and runs again when this number comes back.
+    A breakdown interrupts the work on a part, which resumes where it was when the machine runs again.  The machine
+    sends its ``number`` when it breaks down, and runs again when this number comes back.
     """
 
     repaired = InputPort(int, doc="numbers of machines that are repaired; others' are ignored")
     broken = OutputPort(int, depends_on=(), doc="the own number, when it breaks down")
     part = OutputPort(int, depends_on=(), doc="how many parts are made, for each that is finished")
 
-    number = Parameter(int, 0, doc="the own number, which tells it from others")
+    number = Parameter(int, 0, doc="its number, by which it is known")
     work_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long a part takes")
     time_to_failure: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long it runs until it breaks")
 

@@ -86,8 +86,8 @@ class Barrier(Solver):
         str,
         "progress",
         choices=("progress", "least_violation", "brake"),
-        doc="what answers a problem that no plan solves: the plan of least violation that gets on best, the first one "
-        "of least violation, or the hardest braking",
+        doc="the answer to a problem that no plan solves: the plan of least violation that makes the most progress, "
+        "the first one of least violation, or the hardest braking",
     )
 
     @cached_property

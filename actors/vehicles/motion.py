@@ -62,7 +62,7 @@ def within(value: float, limit: float) -> float:
 
 
 class Unicycle(_RollingVehicle):
-    """A vehicle that is told how fast to go and how fast to turn: one wheel, or two that are driven apart.
+    """A vehicle driven by speed and turn rate: one wheel, or two with separate drives.
 
     ``dx/dt = v cos h``, ``dy/dt = v sin h``, ``dh/dt = w``.  Speed and turn rate hold from token to token, so it goes
     along arcs, which are computed as such: the pose is exact, and does not depend on when it is asked for.  With a
@@ -78,7 +78,7 @@ class Unicycle(_RollingVehicle):
 
 
 class Ackermann(_RollingVehicle):
-    """A car: it is told how fast to go and how far to steer.
+    """A car, driven by speed and steering angle.
 
     The kinematic bicycle, ``dh/dt = v tan(steering) / wheelbase``; its position is the middle of the rear axle.  Speed
     and steering hold from token to token, so it goes along arcs, which are computed as such: the pose is exact, and

@@ -17,7 +17,7 @@ _EDGE: Final = 1e-9  # of a wall's length, so that no beam slips through where t
 
 
 class RangeBearingSensor(Actor):
-    """Measures how far away a target is, and in which direction as seen from the vehicle, with normal noise.
+    """Measures the distance and direction of a target as seen from the vehicle, with normal noise.
 
     The target is what moves and tells its state, or a ``landmark``.  It is seen while it is within ``max_range`` and
     the field of view.  Both errors are drawn at each pose, whether used or not, so that what is seen does not move the
@@ -69,7 +69,7 @@ def wrapped(angle: float) -> float:
 
 
 class RangeScanner(Actor):
-    """A lidar in the plane: how far it is to what stands around, along beams from the vehicle's position, with noise.
+    """A lidar in the plane: distances to obstacles along beams from the vehicle's position, with noise.
 
     The beams are evenly spread over the field of view, from the right to the left; over a full turn, the first one
     points backwards.  A beam ends at the nearest wall, disc or body, or at ``max_range``, which it then tells.  The

@@ -35,7 +35,7 @@ class Aspect(Configurable, ABC):
 
     ``at_ports`` and ``stands_at`` say where: at "input" ports, "output" ports, or both, or else at an "actor".
     ``events`` names what it may note, so that summaries show a zero where nothing happened; ``reports`` names the
-    figures that it tells at the end of a run, with their units.
+    figures that it gives at the end of a run, with their units.
     """
 
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled"})

@@ -162,7 +162,7 @@ class Keeper(Protocol):
         """Cancel the actor's wake-ups and drop its jobs; its state no longer counts."""
 
     def restart(self) -> None:
-        """Let the actor begin anew."""
+        """Let the actor begin again."""
 
 
 class ActorPoint(JoinPoint):
@@ -204,7 +204,7 @@ class Unit(ActorPoint):
             point.keeper.kill()
 
     def restart(self) -> None:
-        """Let its actors begin anew, in the order of their declaration."""
+        """Let its actors begin again, in the order of their declaration."""
         for point in self.points:
             point.keeper.restart()
 
@@ -218,7 +218,7 @@ class ExecutionAspect(JoinPointAspect[Job, ActorPoint]):
     is_processor: ClassVar[bool] = False
 
     def begin(self, unit: Unit) -> None:
-        """Called once before the first tag for all that it was aimed at: for what it does of its own accord."""
+        """Called once before the first tag for everything it was aimed at: for what it does on its own."""
 
     @abstractmethod
     def schedule(self, job: Job, point: ActorPoint) -> None:

@@ -33,7 +33,7 @@ def indices_of(text: str, array: str, count: int, value: Callable[[str], object]
 
     ``*`` is all, ``2`` one, ``-1`` the last, ``0..3`` a range with both ends, ``1..`` and ``..-2`` ranges up to an end
     of the array, ``1.., 0`` several in that order, and ``${...}`` a number, or a list of numbers, that ``value`` finds.
-    In an empty array every index stands for none, so that a model stays right when a count becomes zero.  Raises
+    In an empty array every index selects nothing, so that a model stays right when a count becomes zero.  Raises
     ``BadIndexError``.
     """
     items = [text[start:end].strip() for start, end in split(text, ",")]

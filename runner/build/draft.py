@@ -1,8 +1,8 @@
 """Draft: a graph in the making, and what it lacks for a reason that is no news.
 
-What is wrong with a model is told once, where it is found.  From there on it is a gap, of which nothing more is said: a
-part that could not be made, a port behind which anything may be, a connection that could not be understood.  So is the
-empty array of a model that is right: it may be spoken of, though nothing is there.
+What is wrong with a model is reported once, where it is found.  From there on it is a gap, of which nothing more is
+said: a part that could not be made, a port behind which anything may be, a connection that could not be understood.  So
+is the empty array of a model that is right: it may be spoken of, though nothing is there.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ class Looks(View):
     def _check_given(
         self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position | None
     ) -> None:
-        """Whether the tokens that pass the aspect have the field; of ports that lack it, the first is told."""
+        """Whether the tokens that pass the aspect have the field; of ports that lack it, the first is reported."""
         for port in ports:
             if not self._check_fields(name, f"{reference} at {port}", port, fields, position):
                 return

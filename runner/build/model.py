@@ -227,7 +227,7 @@ class Model(Scope, Tabled):
         return self.draft
 
     def adopt(self, draft: Draft, aspects: Iterable[WovenAspect], watched: Watched | None = None) -> None:
-        """Go on with a draft that came of the present one, with further aspects."""
+        """Continue with a draft that came of the present one, with further aspects."""
         self.draft = draft
         self.edit()
         self.enlist(aspects)

@@ -51,7 +51,7 @@ def raising() -> Iterator[Problems]:
 
 
 def director_of(path: str, said: Mapping[str, object], position: Position, problems: Problems) -> dict[str, Any]:
-    """What is said of a director, ``None`` for nothing; what is wrong is told and left out."""
+    """What is said of a director, ``None`` for nothing; what is wrong is reported and left out."""
     found: dict[str, Any] = {}
     for key, value in said.items():
         try:
@@ -90,7 +90,7 @@ def mistake(message: str, position: Position, *hints: str) -> ModelError:
 
 
 class Named:
-    """Finds in a graph what a program names inside of a scope; what is wrong is told at the program's line."""
+    """Finds in a graph what a program names inside of a scope; what is wrong is reported at the program's line."""
 
     def __init__(self, graph: ModelGraph, scope: str, position: Position, problems: Problems) -> None:
         self._graph = graph

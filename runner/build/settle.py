@@ -111,7 +111,7 @@ class Settler:
         self.problems.add(f"{who} needs a value for {name!r}", position, *hints, scope=path)
 
     def _setting(self, full: str) -> Setting | None:
-        """The setting for a parameter, if there is one; what is wrong with it is told for one instance of an array."""
+        """The setting for a parameter, if there is one; errors in it are reported for one instance of an array."""
         self._settable[full] = None
         try:
             found = self.settings.find(full)

@@ -1,7 +1,7 @@
 """Unfolding: from declarations to a draft with all actors, composites and ports, connected.
 
-What is wrong is told and worked around, so that one load tells it all: a wrong value becomes ``missing`` and what is
-computed from it is not judged; a part that cannot be made is a gap in the draft.
+What is wrong is reported and worked around, so that one load tells it all: a wrong value becomes ``missing`` and what
+is computed from it is not judged; a part that cannot be made is a gap in the draft.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Names = dict[str, object]
 
 
 class TooLargeError(Exception):
-    """The model has too many parts to go on; the reason has been noted."""
+    """The model has too many parts to continue; the reason has been noted."""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class Weaving(View):
     def weave(
         self, aspect: Aspect, pointcuts: Sequence[PointcutText], position_of: Callable[..., Position | None]
     ) -> WovenAspect:
-        """The aspect with its places and all that it looks at; a pointcut that selects nothing is a problem.
+        """The aspect with its places and everything it looks at; a pointcut that selects nothing is a problem.
 
         ``position_of`` tells where a parameter, or a key in it, is set in the model file.
         """

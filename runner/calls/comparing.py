@@ -132,7 +132,7 @@ def compare(
     """Run variants of a model with the same seeds, and compare their metrics in pairs of runs.
 
     A variant is what ``load`` changes in the model, or another model; a list names disturbances, of which ``none`` is
-    the model as it is.  Seeds count up from ``seed`` (default: the model's).  Runs that fail are told and left out.
+    the model as it is.  Seeds count up from ``seed`` (default: the model's).  Runs that fail are reported and left out.
 
     >>> epicycle.compare("collision_avoidance", ["none", "wifi_burst"], replications=20)
     >>> epicycle.compare("mm1", {"slow": {}, "fast": {"set": {"mean_service": 0.8}}})

@@ -192,7 +192,7 @@ def outlook(elapsed: float, now: float, end: float) -> str:
 
 @contextmanager
 def watched(model: Model, until: float | None, after: float = 0.0) -> Iterator[Callable[[float], None]]:
-    """What a run tells how far it is: a bar, and notices of what takes long."""
+    """What shows how far a run is: a bar, and notices of what takes long."""
     end = until if until is not None else model.stop
     latest = -math.inf
 

@@ -17,7 +17,7 @@ TOKENS, TIME = "tokens", "time"  # over what something is taken
 class Take:
     """A kind of metric: whether tokens count or the time that each stands, and what else may be said of it.
 
-    ``unit`` is what it counts in, if that does not hang on the tokens.
+    ``unit`` is what it counts in, if that does not depend on the tokens.
     """
 
     over: str

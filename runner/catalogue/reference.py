@@ -72,7 +72,7 @@ class ParameterReference:
 
 @dataclass(frozen=True)
 class TypeReference:
-    """A type that a model may name, and all that it declares.
+    """A type that a model may name, and everything it declares.
 
     ``has_own_ports``: an instance has further ports, which follow from its parameters.
     """

@@ -270,7 +270,7 @@ def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[Cat
 
 
 class TypesError(EpicycleError):
-    """A file from which no types can be had."""
+    """A file that gives no types."""
 
 
 def types_of_file(path: Path) -> list[type]:

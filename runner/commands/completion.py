@@ -9,7 +9,7 @@ from .options import DONE, command, option
 
 
 @command(
-    "print what completes commands in a shell",
+    "print a completion script for a shell",
     option("shell", choices=("bash", "zsh", "fish"), help="the shell"),
     imports=("catalogue",),
 )

@@ -16,11 +16,11 @@ from .options import CHANGES, DONE, JSON, MODEL, TYPES, command, load, option, o
 @command(
     "check a model or a study",
     *MODEL,
-    option("--strict", action="store_true", help="take warnings for errors"),
+    option("--strict", action="store_true", help="treat warnings as errors"),
     imports=("build",),
 )
 def validate(options: argparse.Namespace) -> int:
-    """Check a model, or a study with all that it varies, without running it."""
+    """Check a model, or a study with everything it varies, without running it."""
     from epicycle.actors import EpicycleError
 
     if _is_study(options.model):
@@ -81,7 +81,7 @@ def _validate_study(options: argparse.Namespace) -> int:
         type=whole(0),
         help="open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)",
     ),
-    option("--expand", action="store_true", help="draw every instance of an array, also where they are alike"),
+    option("--expand", action="store_true", help="draw every instance of an array, even if they are alike"),
     option("--machine", metavar="PATH", help="draw the modes of this machine or composite as a statechart"),
     imports=("build", "show.graph"),
 )
@@ -154,7 +154,7 @@ def actors(options: argparse.Namespace) -> int:
 
 
 @command(
-    "list the aspects, describe one, or show where they stand in a model",
+    "list the aspects, describe one, or show where they are attached in a model",
     option(
         "model",
         metavar="NAME or MODEL",
@@ -166,8 +166,8 @@ def actors(options: argparse.Namespace) -> int:
     imports=("show",),
 )
 def aspects(options: argparse.Namespace) -> int:
-    """List the aspects that a model may use, describe one, or show which aspects stand at the ports of a model, in the
-    order in which a token meets them."""
+    """List the aspects that a model may use, describe one, or show which aspects are attached to the ports of a model,
+    in the order in which a token meets them."""
     from epicycle.actors import EpicycleError
 
     from ..catalogue import installed, is_path, packaged_models

@@ -190,8 +190,8 @@ FILES = {  # of a package
 
 
 @command(
-    "begin a model or a package of actors",
-    option("name", metavar="NAME", help="what it is to be called, such as my_model"),
+    "start a model or a package of actors",
+    option("name", metavar="NAME", help="its name, such as my_model"),
     option(
         "--package",
         action="store_true",
@@ -200,7 +200,7 @@ FILES = {  # of a package
     imports=("text",),
 )
 def new(options: argparse.Namespace) -> int:
-    """Write NAME.yaml, a model to begin with, which runs at once; or with --package a package of actors and aspects
+    """Write NAME.yaml, a model to start from, which runs at once; or with --package a package of actors and aspects
     that models know by its entry points."""
     from keyword import iskeyword
     from string import Template

@@ -91,7 +91,7 @@ DISTURB = several(
     "--disturb",
     metavar="NAME or FILE",
     help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
-    "--aspect and --without count after it",
+    "--aspect and --without are applied after it",
 )
 CHANGES = (  # to a model
     several(
@@ -102,21 +102,20 @@ CHANGES = (  # to a model
     several(
         "--overrides",
         metavar="FILE",
-        help="set what a YAML file of lines like 'observer[*].sensor.max_range: 5 m' says; --set wins over it",
+        help="set parameters from a YAML file of lines such as 'observer[*].sensor.max_range: 5 m'; --set wins",
     ),
     DISTURB,
     several(
         "--aspect",
         metavar="NAME=TYPE,KEY=VALUE,...",
-        help="add an aspect, or put it in the place of the one of that name; may be repeated",
+        help="add an aspect, or replace the one with that name; may be repeated",
     ),
     several("--without", metavar="NAME", help="remove an aspect; may be repeated"),
     option(
         "--max-actors",
         metavar="N",
         type=whole(1, 10**9 - 1),
-        help="how many actors and composites are not taken for a mistake, and a fifth of how many connections "
-        "(default: 20,000)",
+        help="limit for actors and composites, and a fifth of the limit for connections (default: 20,000)",
     ),
     TYPES,
 )

@@ -33,7 +33,7 @@ def factor(text: str) -> float:
         type=factor,
         nargs="?",
         const=1.0,
-        help="let FACTOR seconds of model time pass in a second of the wall clock (default: 1), and no more",
+        help="limit model time to FACTOR seconds per second of the wall clock (default: 1)",
     ),
     option(
         "--out",
@@ -45,14 +45,14 @@ def factor(text: str) -> float:
     several(
         "--log-where",
         metavar="COLUMN=PATTERN",
-        help="write only what fits, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
-        "actor='observer[*].**' or port=plan; of several for one column one must fit, and each column",
+        help="write only some records, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
+        "actor='observer[*].**' or port=plan; of several for one column, one must match, and every column must",
     ),
     option("--json", action="store_true", help="print one JSON object instead of the table"),
     imports=("calls.running", "show"),
 )
 def run(options: argparse.Namespace) -> int:
-    """Run a model once and report what came of it."""
+    """Run a model once and report the results."""
     from epicycle.actors import EpicycleError
 
     from ..calls import perform, seconds

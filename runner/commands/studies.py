@@ -1,4 +1,4 @@
-"""The commands of studies: run one, go on with it, say how far it is, repeat one of its runs, report."""
+"""The commands of studies: run one, continue with it, say how far it is, repeat one of its runs, report."""
 
 from __future__ import annotations
 
@@ -50,22 +50,22 @@ SESSION = (
         "--executor",
         choices=("local", "dask"),
         default="local",
-        help="where runs are made: in processes of this machine, or by workers of Dask (default: local)",
+        help="where to make runs: in processes on this machine, or on Dask workers (default: local)",
     ),
     option(
         "--scheduler",
         type=address,
         metavar="ADDRESS",
-        help="the Dask scheduler whose workers make the runs (default: one of its own, with --jobs workers here)",
+        help="the Dask scheduler whose workers make the runs (default: start one here, with --jobs workers)",
     ),
-    option("--jobs", type=COUNT, metavar="N", help="processes at a time (default: one for each core)"),
+    option("--jobs", type=COUNT, metavar="N", help="processes at a time (default: one per core)"),
     option(
         "--run-timeout",
         type=positive_seconds,
         metavar="S",
-        help="seconds of real time after which a run is ended, and counts as failed (default: none)",
+        help="real time in seconds after which a run is ended and counts as failed (default: no limit)",
     ),
-    option("--retry", action="store_true", help="make runs anew that took too long, or whose process was killed"),
+    option("--retry", action="store_true", help="repeat runs that took too long, or whose process was killed"),
 )
 
 
@@ -82,13 +82,13 @@ SESSION = (
     ),
     option("--seed", type=first_seed, metavar="N", help="seed of the first replication (default: the study's)"),
     option("--out", metavar="DIR", type=Path, help="results folder (default: results/STUDY)"),
-    option("--yes", action="store_true", help="do not ask back whether so many runs are meant"),
+    option("--yes", action="store_true", help="do not ask for confirmation of many runs"),
     TYPES,
     *SESSION,
     imports=("show.report", "study"),
 )
 def study(options: argparse.Namespace) -> int:
-    """Make all runs of a study that are not in its results folder yet."""
+    """Make all runs of a study that are not yet in its results folder."""
     from ..language import read_study
     from ..show.report import check_figures
     from ..study import Plan, available_cores, check_size
@@ -112,7 +112,7 @@ def study(options: argparse.Namespace) -> int:
 
 @command("resume a study", FOLDER, *SESSION, imports=("study",))
 def resume(options: argparse.Namespace) -> int:
-    """Make the runs that are missing in the results folder of a study."""
+    """Make the runs that are missing from the results folder of a study."""
     from ..study import plan_of_folder
 
     _check_session(options)
@@ -202,14 +202,14 @@ def _about_others(results: StudyResults) -> Iterator[str]:
 
 
 @command(
-    "say how far a study is",
+    "show the progress of a study",
     FOLDER,
     option("--conditions", action="store_true", help="for each condition"),
     option("--json", action="store_true", help="print one JSON object"),
     imports=("study",),
 )
 def status(options: argparse.Namespace) -> int:
-    """Say how far a study is, also while it is running."""
+    """Show the progress of a study, also while it is running."""
     from ..study import is_running, open_study
 
     def counted(statuses: Counter[str]) -> str:
@@ -254,7 +254,7 @@ def status(options: argparse.Namespace) -> int:
     imports=("build", "show", "study"),
 )
 def replay(options: argparse.Namespace) -> int:
-    """Repeat one run of a study alone, with its event log, all recorded signals and figures."""
+    """Repeat one run of a study, with its event log, all recorded signals and figures."""
     from ..build import figures_of
     from ..results import write_log
     from ..show import check_folder, draw_figures, summary_table, write_folder
@@ -286,14 +286,14 @@ def replay(options: argparse.Namespace) -> int:
 
 
 @command(
-    "draw and write up what a study has found",
+    "write the report of a study",
     FOLDER_OF_STUDY,
     option("--out", metavar="DIR", type=Path, help="where to write (default: the results folder)"),
-    option("--jobs", metavar="N", type=COUNT, help="runs that are repeated at once (default: one a core)"),
+    option("--jobs", metavar="N", type=COUNT, help="runs to repeat at the same time (default: one per core)"),
     imports=("show.report", "study"),
 )
 def report(options: argparse.Namespace) -> int:
-    """Write report.html, one file that holds all, and its figures; the study need not be finished."""
+    """Write report.html, a single self-contained file, and its figures; the study need not be finished."""
     from rich.progress import Progress
 
     from ..show.report import write_report

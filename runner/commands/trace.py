@@ -1,4 +1,4 @@
-"""say who fired when, and why"""
+"""show which actors fired when, and why"""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WIDEST = 80  # characters of a token
 
 
 @command(
-    "say who fired when, and why",
+    "show which actors fired when, and why",
     *MODEL,
     several(
         "--actor",
@@ -29,9 +29,9 @@ WIDEST = 80  # characters of a token
         help="actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)",
     ),
     SEED,
-    option("--from", dest="start", metavar="TIME", help="begin there, such as 30 or '500 ms'"),
-    option("--to", metavar="TIME", help="end there (default: the end of the run)"),
-    option("--json", action="store_true", help="print one JSON object a line"),
+    option("--from", dest="start", metavar="TIME", help="start of what is printed, such as 30 or '500 ms'"),
+    option("--to", metavar="TIME", help="end of what is printed (default: the end of the run)"),
+    option("--json", action="store_true", help="print one JSON object per line"),
     imports=("calls.running",),
 )
 def trace(options: argparse.Namespace) -> int:

@@ -210,7 +210,7 @@ class Copies:
                 put(made, name, value)  # one by one, see ``_Port.bind``
 
     def _by_protocol(self, thing: Any) -> Any:
-        """As ``copy.deepcopy`` does, for what says itself how it is to be copied."""
+        """As ``copy.deepcopy`` does, for what defines how it is copied."""
         if _is_global(thing):
             return thing
         try:

@@ -108,7 +108,7 @@ class Directors:
         return refinement is not None and refinement.conductor.machine.catches
 
     def _begin_anew(self, refinement: str) -> None:
-        """Let all that is in a refinement begin anew."""
+        """Let all that is in a refinement begin again."""
         for path, passage in self.passages.items():
             if is_within(path, refinement):
                 passage.clear()

@@ -197,7 +197,7 @@ class Execution:
         self.forget()
 
     def restart(self) -> None:
-        """Let the actor begin anew."""
+        """Let the actor begin again."""
         self._call(self.actor.restart, "restart()")
 
     def _call(self, method: Callable[[], None], name: str) -> None:

@@ -317,7 +317,7 @@ cdef class RecorderForm(Native):
 # What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
 SOURCES = (
     ("accumulation.py", "Counter", "3bd9c254af082445"),
-    ("accumulation.py", "Integrator", "a12ab980076fc006"),
+    ("accumulation.py", "Integrator", "27ce6720551b6cf5"),
     ("arithmetic.py", "AddSubtract", "208b5fc20a1e18d8"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),
     ("distributions.py", "Gamma", "561c0e5a4a78963b"),

@@ -139,12 +139,12 @@ class Refinement:
         self.is_active = False
 
     def resume(self) -> None:
-        """Its time goes on where it stood."""
+        """Its time resumes where it stood."""
         self._lag += self._outer.time - self._stood
         self.is_active = True
 
     def begin(self) -> None:
-        """It begins anew, with the time around it, and with nothing to do."""
+        """It begins again, with the time around it, and with nothing to do."""
         for _, _, what, *_ in self._agenda:
             if isinstance(what, Wake):
                 what.cancel()
@@ -233,7 +233,7 @@ class Conductor(Actor):
     # -- for the machine ------------------------------------------------------------------------------------------
 
     def begin(self, mode: str) -> None:
-        """The run begins, or begins anew, in a mode."""
+        """The run begins, or begins again, in a mode."""
         for name, refinement in self.refinements.items():
             refinement.begin()
             if name != mode:
@@ -242,7 +242,7 @@ class Conductor(Actor):
         self._active = self.refinements.get(mode)
 
     def go(self, mode: str, *, history: bool) -> None:
-        """Leave the present mode's refinement, and enter the other's: where it was left, or anew."""
+        """Leave the present mode's refinement, and enter the other's: where it was left, or from the beginning."""
         if self._active is not None:
             self._active.suspend()
         if self._wake is not None:
@@ -260,7 +260,7 @@ class Conductor(Actor):
         self.plan()
 
     def fail(self, error: ActorError) -> None:
-        """Something in the active refinement has failed: the machine says what comes of it."""
+        """Something in the active refinement has failed: the machine says what follows."""
         if not self.machine.catches:
             raise error
         self.failure = error

@@ -164,7 +164,7 @@ class Run:
         return first
 
     def finish(self) -> Results:
-        """End the run; what has come of it."""
+        """End the run; its results."""
         late = self.end()
         results = self.results(self.stopped or "the program")
         late = late or self._unreported
@@ -222,7 +222,7 @@ class Run:
         return figures
 
     def _report(self, woven: WovenAspect) -> dict[str, float | None]:
-        """What an aspect reports; if it fails, that is told when all results are there."""
+        """What an aspect reports; if it fails, that is reported when all results are there."""
         try:
             return dict(woven.aspect.report(self._ways.shared(woven), self.director.last.time))
         except Exception as error:

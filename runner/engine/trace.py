@@ -1,6 +1,6 @@
 """Trace: who fired when, and why.
 
-A traced run has a director and a log that tell a ``Tracer`` what they do; it is otherwise the same, to the bit.
+The director and the log of a traced run report to a ``Tracer`` what they do; it is otherwise the same, to the bit.
 """
 
 from __future__ import annotations

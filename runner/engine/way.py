@@ -46,7 +46,7 @@ class Fork(Way):
 
 
 class Guarded(Way):
-    """Hands each token, or job, to an aspect at a join point; an error in it is told with what it was doing."""
+    """Hands each token, or job, to an aspect at a join point; an error in it is reported with what it was doing."""
 
     __slots__ = ("act", "doing", "holds", "pass_by", "point", "tell")
 

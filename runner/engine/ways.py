@@ -302,7 +302,7 @@ class Ways:
     def _guarded(
         self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
     ) -> Guarded:
-        """What an aspect does with all that comes to a join point; an error in it is told with its ``name``."""
+        """What an aspect does with all that comes to a join point; an error in it is reported with its ``name``."""
         holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
         return Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
 

@@ -46,7 +46,7 @@ class Postings:
 
 
 def postings(graph: ModelGraph) -> Postings | None:
-    """What there is to be known of posts, if ties are posted anywhere."""
+    """What can be known of posts, if ties are posted anywhere."""
     if not any(rules.are_posted for rules in graph.rules.values()):
         return None
     rules = {path: graph.rules_at(path) for path in graph.actors}
@@ -133,8 +133,8 @@ def _acts(graph: ModelGraph, director: str, region: Region, port: str) -> bool:
     """Whether what enters a composite by a port makes a difference within the tag.
 
     If so, the composite can do nothing before it is there, or some of the actors inside would fire with a part of
-    their tokens; so all that it sends depends on it.  If not, it goes to actors alone that send it, or what comes of
-    it, later.
+    their tokens; so everything it sends depends on it.  If not, it only goes to actors that send it, or a result of it,
+    later.
     """
     _, borders = graph.borders(director)
     waiting, seen = [port], {port}

@@ -34,7 +34,7 @@ class Rules:
     like: str = "epicycle"
 
     def inside(self, ties: str | None, like: str | None) -> Rules:
-        """The rules of a director within, which are these unless it says otherwise; ``like`` says which ties go."""
+        """The rules of a director within, which are these unless it overrides them; ``like`` says which ties go."""
         if ties is None:
             ties = self.ties if like is None else POSTED if like == PTOLEMY else "declared"
         return Rules(ties, like or self.like)

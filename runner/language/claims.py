@@ -75,7 +75,7 @@ class Guideline:
 
 @dataclass(frozen=True)
 class Questions:
-    """All that a study asks; ``apart`` are the factors for each level of which the claims are judged anew."""
+    """All that a study asks; ``apart`` are the factors for each level of which the claims are judged again."""
 
     claims: tuple[Claim, ...] = ()
     guideline: Guideline | None = None

@@ -172,7 +172,7 @@ class Construct:
         return reader.entries(node, what, tuple(self.keys))
 
     def values(self, reader: NodeReader, entries: Mapping[str, Entry], what: str, at: Position) -> dict[str, Any]:
-        """What its keys say, by attribute; what is missing is told ``at`` a place, what cannot be read is left out."""
+        """What its keys say, by attribute; missing ones are reported ``at`` a place, unreadable ones left out."""
         found = {}
         for key, each in self.keys.items():
             if key in entries and not (each.missing and is_empty(entries[key].value)):

@@ -32,7 +32,7 @@ def named_file(said: Text, folder: Path, kind: str, problems: Problems, who: str
 
 
 def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
-    """What a model's file declares, and the composite classes of it and of all that it includes."""
+    """What a model's file declares, and the composite classes of it and of everything it includes."""
     path, text = find(name, "model", problems), None
     node = None if path is None else read(path, problems)
     if isinstance(node, Mapping) and "study" in node.entries:
@@ -47,7 +47,7 @@ def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, Comp
 
 
 def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeText]:
-    """The composite classes of a file, as given or else among the packaged ones, and of all that it includes."""
+    """The composite classes of a file, as given or else among the packaged ones, and of everything it includes."""
     path = Path(file)
     candidates = (path, *(folder / path for folder in model_folders()))
     path = next((each for each in candidates if each.is_file()), path)

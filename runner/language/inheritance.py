@@ -2,8 +2,8 @@
 
 What a class says comes on top of what its base says, name by name:
 
-- a parameter or port of the base's stays; the keys that are given anew (a default, a bound, a type) replace the old;
-- an actor or aspect with the same ``type``, or none, keeps its values but for those given anew; another ``type`` drops
+- a parameter or port of the base's stays; the keys that are given again (a default, a bound, a type) replace the old;
+- an actor or aspect with the same ``type``, or none, keeps its values but for those given again; another ``type`` drops
   the old values and keeps its place: ``count``, ``priority``, ``at``, ``enabled``, ``tags``; ``name: null`` takes it
   away, with the base's connections to it and the pointcuts at it;
 - connections are added; ``remove: a.out -> b.in`` takes one of the base's away.

@@ -37,7 +37,7 @@ def levels_of(dimensions: Iterable[Dimension], factor: str) -> list[Factor]:
 
 
 class QuestionReader(NodeReader):
-    """Reads ``claims`` and ``guideline`` of a study; what is misshapen or not in the study is told and left out.
+    """Reads ``claims`` and ``guideline`` of a study; what is misshapen or not in the study is reported and left out.
 
     ``kinds`` are the factors and what they hold, ``folder`` that of the study's file; ``factors_of`` says what another
     study varies, from its text's node and file.

@@ -110,7 +110,7 @@ def _nodes(part: object) -> Iterator[Node]:
 
 
 def _names(nodes: Iterable[Node]) -> frozenset[str]:
-    """The names that expressions ask for, at any depth; what is wrong with an expression is told elsewhere."""
+    """The names that expressions ask for, at any depth; what is wrong with an expression is reported elsewhere."""
     found: set[str] = set()
     waiting = list(nodes)
     while waiting:

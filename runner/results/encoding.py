@@ -1,7 +1,7 @@
 """Tokens as plain data and as canonical bytes, for the event log and its digest.
 
 A token may be a number, a text, None, a list or tuple, a set, a mapping with text keys, a NumPy array, or a dataclass
-of these.  Anything else is logged by its ``repr``; if that tells an address instead of a value, it is refused.
+of these.  Anything else is logged by its ``repr``; if that shows an address instead of a value, it is refused.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class LogFile:
     """Parquet, CSV or JSON lines, by the ending of the file's name; raises ``LogError``.
 
     What it has been given is in the file when it is closed, however the run has ended.  A file that cannot be written
-    any more, as on a full disk, does not end the run: this is told when it is closed.
+    any more, as on a full disk, does not end the run: this is reported when it is closed.
 
     >>> with LogFile(Path("log.csv")) as file:
     ...     Simulation(model, keep_log=True, log_to=file.add).run()

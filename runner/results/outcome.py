@@ -51,7 +51,7 @@ class Outcome:
         return show(self.value) + (f" ± {self.interval.half:.2g}" if self.interval is not None else "")
 
     def plain(self) -> dict[str, Any]:
-        """What there is to say beside the value, for programs."""
+        """What to add to the value, for programs."""
         found: dict[str, Any] = {"after": self.after} if self.after else {}
         found |= {key: said for key, said in (("missing", self.missing), ("unsure", self.unsure)) if said}
         return found if self.interval is None else {**found, **asdict(self.interval)}

@@ -1,4 +1,4 @@
-"""A session of a study: what is not there yet is made, and what there is then is told."""
+"""A session of a study: what is not there yet is made, and what there is then is reported."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def run_study(
 
     A run that raises gets a row with the status ``failed``, one that takes longer than ``timeout`` seconds a row
     ``timeout``.  One whose process dies is tried again, and after three times gets a row ``killed``; ``retry`` makes
-    both of these anew.  ``tell`` is called now and then.  ``executor``: ``local``, or ``dask`` for the workers of the
+    both of these again.  ``tell`` is called now and then.  ``executor``: ``local``, or ``dask`` for the workers of the
     Dask ``scheduler`` at that address, or for a cluster of its own on this machine.
     Raises ``StoreError`` and ``WorkerError``, and ``EpicycleError`` where Dask is wanted and not installed.
     """

@@ -1,4 +1,4 @@
-"""How large a model may be before it is taken for a mistake."""
+"""How large a model may be before it counts as a mistake."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class _ForEachActor:
 class Limits:
     """``actors`` counts composites as well.
 
-    A model as large as this loads in seconds and takes about 200 MB.  A slip of the pen that asks for a million is told
-    before it has filled the memory; who wants a million says so.
+    A model as large as this loads in seconds and takes about 200 MB.  A slip of the pen that asks for a million is
+    refused before it has filled the memory; who wants a million says so.
     """
 
     actors: int = 20_000

@@ -1,4 +1,4 @@
-"""What is wrong with a model, said so that it can be mended: where, what, and what would be right."""
+"""What is wrong with a model, said so that it can be fixed: where, what, and what would be right."""
 
 import unicodedata
 from collections.abc import Iterable
@@ -73,9 +73,9 @@ class ModelError(EpicycleError):
 class Problems:
     """Collects problems, so that one run shows them all; identical ones count once, and after 100 it is enough.
 
-    What is wrong in an array is told for the first instance: ``about`` is what a problem is about in all of them, where
-    the message names one.  A fault of a composite class is told for its first use: ``scope`` is the path of the
-    instance that has it, and what stands at one place is told for the first of them.
+    What is wrong in an array is reported for the first instance: ``about`` is what a problem is about in all of them,
+    where the message names one.  A fault of a composite class is reported for its first use: ``scope`` is the path of
+    the instance that has it, and what stands at one place is reported for the first of them.
     """
 
     def __init__(self) -> None:

@@ -25,7 +25,7 @@ RESAMPLES = 9_999
 
 @dataclass(frozen=True)
 class Option:
-    """A level that could be chosen: its mean, how much worse it is than the best, and what speaks against it."""
+    """A level that could be chosen: its mean, how much worse it is than the best, and the reasons against it."""
 
     level: Factor
     estimate: Estimate
@@ -118,7 +118,7 @@ def _is_not_worse(index: int, fit: list[int], costs: list[dict[int, float]]) -> 
 
 
 def _confidence(costs: list[dict[int, float]]) -> list[float]:
-    """How often each is the best if the replications that all of them have are drawn anew; ties are shared."""
+    """How often each is the best if the replications that all of them have are drawn again; ties are shared."""
     common = sorted(set.intersection(*(set(each) for each in costs))) if costs else []
     if not common:
         return [0.0] * len(costs)

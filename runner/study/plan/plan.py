@@ -228,7 +228,7 @@ class Plan:
         return index if self.condition(index).key == key else None
 
     def seed(self, condition: Condition, replication: int) -> int:
-        """The same for all conditions if they are paired, otherwise one that hangs on the condition, too."""
+        """The same for all conditions if they are paired, otherwise one that depends on the condition, too."""
         if self.study.paired:
             return self.study.seed + replication
         return int(_hash([self.study.seed, condition.key, replication])[:15], 16)

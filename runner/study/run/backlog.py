@@ -39,7 +39,7 @@ class Backlog:
     """Hands out the runs of a plan that are not there yet, condition by condition.
 
     With ``until``, a condition gets its replications in batches, and is looked at only between batches: what is run
-    hangs on neither the number of workers nor their speed.
+    depends on neither the number of workers nor their speed.
     """
 
     def __init__(self, plan: Plan, known: Mapping[str, Done]) -> None:

@@ -45,7 +45,7 @@ class Runner:
         return model if isinstance(model, str) else None
 
     def make(self, task: Task) -> Row:
-        """The row of a run; whatever it raises is told there."""
+        """The row of a run; whatever it raises is reported there."""
         condition, model = self._loaded(task.condition)
         row = empty_row(self.plan, condition, task)
         started = time.perf_counter()

@@ -10,13 +10,13 @@
     lock                   held by the process that writes
     damaged/               files that were not any more what was written
 
-A run counts as finished when its line is in a journal, that is before anybody is told: the line is handed to the
+A run counts as finished when its line is in a journal, that is before anybody hears of it: the line is handed to the
 operating system at once, where no ``kill`` can reach it, and brought to the disk at most once a second.  The next to
 open the folder makes a part of every journal that was left behind.  A row that is in two places is one row.
 
 The manifest has a checksum in it, a part in its name, a row of a journal before it, and no byte is believed before its
-checksum is seen to be right.  Who only reads is told of damage; who goes on with the study puts the damaged file aside,
-and makes the runs that are not there any more.
+checksum is seen to be right.  Who only reads is told of damage; who continues with the study puts the damaged file
+aside, and makes the runs that are not there any more.
 """
 
 from __future__ import annotations

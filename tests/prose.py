@@ -1,0 +1,110 @@
+"""Finds phrases that are hard to read: ``python -m tests.prose`` says where, with exit code 1.
+
+The phrases are in ``prose.yaml``.  Looked at are documents, docstrings, and the texts that declarations carry (``doc``,
+``help``).  Messages of errors are a later step, as tests assert them whole; so are the folders in ``LATER``.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("actors", "aspects", "runner")
+LATER = ("actors/modes", "runner/moml", "runner/show")  # being worked on by others
+MADE = ("docs/reference.md",)  # of what declarations say, which are looked at where they stand
+TEXTS = ("doc", "help", "description", "epilog")  # keywords whose texts people read
+
+
+class Prose(NamedTuple):
+    """A piece of text, and the line at which it begins."""
+
+    line: int
+    text: str
+
+
+class Finding(NamedTuple):
+    """A phrase that should be another."""
+
+    path: str
+    line: int
+    phrase: str
+    instead: str
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: '{self.phrase}': {self.instead}"
+
+
+def phrases() -> dict[re.Pattern[str], str]:
+    """The expressions to look for, and what to write instead of what they match."""
+    listed = yaml.safe_load((ROOT / "tests" / "prose.yaml").read_text(encoding="utf-8"))
+    return {re.compile(each.replace(" ", r"\s+"), re.I): instead for each, instead in listed.items()}
+
+
+def of_markdown(document: str) -> Iterator[Prose]:
+    """The document without code, its lines where they were."""
+
+    def blank(found: re.Match[str]) -> str:
+        return re.sub(r"[^\n]", " ", found[0])
+
+    document = re.sub(r"^ *(```+).*?^ *\1$|<!--.*?-->", blank, document, flags=re.M | re.S)
+    yield Prose(1, re.sub(r"`[^`\n]*`", lambda found: "x" * len(found[0]), document))
+
+
+def of_python(source: str) -> Iterator[Prose]:
+    """Docstrings, and the texts of declarations."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
+            first = node.body[0] if node.body else None
+            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and ast.get_docstring(node):
+                yield Prose(first.lineno, str(first.value.value))
+        elif isinstance(node, ast.keyword) and node.arg in TEXTS:
+            yield from (
+                Prose(part.lineno, part.value)
+                for part in ast.walk(node.value)
+                if isinstance(part, ast.Constant) and isinstance(part.value, str)
+            )
+
+
+def sources() -> Iterator[Path]:
+    """The files that are looked at."""
+    yield from (ROOT / name for name in ("README.md", "CONTRIBUTING.md"))
+    for path in sorted((ROOT / "docs").rglob("*.md")):
+        if path.relative_to(ROOT).as_posix() not in (*MADE, "docs/style.md"):  # which shows what is to be avoided
+            yield path
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            if not path.relative_to(ROOT).as_posix().startswith(LATER):
+                yield path
+
+
+def findings(text: str, path: str, listed: dict[re.Pattern[str], str]) -> Iterator[Finding]:
+    """What is found in the text of a file."""
+    for piece in of_python(text) if path.endswith(".py") else of_markdown(text):
+        for pattern, instead in listed.items():
+            for found in pattern.finditer(piece.text):
+                line = piece.line + piece.text.count("\n", 0, found.start())
+                yield Finding(path, line, " ".join(found[0].split()), instead)
+
+
+def main() -> int:
+    """Print what is found; exit code 1 if that is something."""
+    listed = phrases()
+    found = [
+        each
+        for path in sources()
+        for each in findings(path.read_text(encoding="utf-8"), path.relative_to(ROOT).as_posix(), listed)
+    ]
+    for each in sorted(found):
+        print(each)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

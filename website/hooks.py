@@ -1,0 +1,72 @@
+"""What MkDocs asks for while it builds the site: pages from files outside docs/, and the gallery."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files, InclusionLevel
+
+from website.gallery import exhibits, index
+from website.notebook import page as notebook_page
+
+ROOT = Path(__file__).parents[1]
+PARTS = ROOT / "site-parts"  # what is made on the way; mkdocs.yml names it, too
+ABOVE = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+
+
+def on_startup(*, command: str, dirty: bool) -> None:
+    """Make the package as mkdocstrings looks for it: `epicycle`, with our folders in it."""
+    del command, dirty
+    shutil.rmtree(PARTS, ignore_errors=True)
+    package = PARTS / "epicycle"
+    package.mkdir(parents=True)
+    (package / "__init__.py").symlink_to(ROOT / "api" / "__init__.py")
+    for folder in ("actors", "aspects", "runner"):
+        (package / folder).symlink_to(ROOT / folder, target_is_directory=True)
+
+
+def on_files(files: Files, *, config: Any) -> Files:
+    """Add the documents above docs/, and the gallery."""
+    for source, page in ABOVE.items():
+        files.append(File.generated(config, page, content=as_page((ROOT / source).read_text(encoding="utf-8"))))
+    for notebook in sorted((ROOT / "docs").rglob("*.ipynb")):
+        place = notebook.relative_to(ROOT / "docs").as_posix()
+        files.remove(files.src_uris[place])
+        content = notebook_page(notebook)
+        files.append(File.generated(config, place.replace(".ipynb", ".md"), content=content))
+    shown = exhibits(PARTS / "gallery")
+    files.append(File.generated(config, "gallery/index.md", content=index(shown)))
+    for each in shown:
+        shown_page = File.generated(config, f"gallery/{each.name}.md", content=each.page)
+        shown_page.inclusion = InclusionLevel.NOT_IN_NAV  # the gallery's first page leads there
+        files.append(shown_page)
+        for made in sorted((PARTS / "gallery" / each.name).iterdir()):
+            place = f"gallery/{each.name}/{made.name}"
+            files.append(File.generated(config, place, abs_src_path=os.fspath(made)))
+    return files
+
+
+def on_post_build(config: Any) -> None:
+    """Remove what was made on the way."""
+    shutil.rmtree(PARTS, ignore_errors=True)
+
+
+def as_page(document: str) -> str:
+    """A document of the root with the links that it has as a page of the site."""
+    for source, page in ABOVE.items():
+        document = document.replace(f"]({source}", f"]({page}")
+    return linked(re.sub(r"\]\(docs/", "](", document))
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """A notebook is a page like all others."""
+    return linked(markdown)
+
+
+def linked(document: str) -> str:
+    """The document with links to the pages that notebooks become."""
+    return re.sub(r"(\]\([\w./-]+)\.ipynb\)", r"\1.md)", document)
