@@ -48,11 +48,11 @@ def lanes(results: Results, figures: Iterable[Figure]) -> list[Lane]:
 
 
 def _line(name: str, times: Floats, values: Floats, asked: dict[str, bool]) -> Lane:
-    kept = np.arange(len(times)) if len(times) <= POINTS else envelope(times, values, POINTS // 4)
+    kept = np.arange(len(times)) if len(times) <= POINTS else turning_points(times, values, POINTS // 4)
     return Lane(name, times[kept], values[kept], None, asked.get(name, False), name in asked, len(times) - len(kept))
 
 
-def envelope(times: Floats, values: Floats, parts: int) -> NDArray[np.int64]:
+def turning_points(times: Floats, values: Floats, parts: int) -> NDArray[np.int64]:
     """Which samples show what a line does: the first, lowest, highest and last in each of so many parts of the time."""
     span = (times[-1] - times[0]) or 1.0
     starts = np.flatnonzero(np.diff(np.minimum((times - times[0]) / span * parts, parts - 1).astype(int), prepend=-1))
