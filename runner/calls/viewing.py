@@ -24,10 +24,15 @@ from .running import Changes, loaded, seconds, watched
 class Page:
     """A page that shows one run or two, in a notebook, a browser or a file; it needs no network.
 
-    A run that failed is shown up to there: ``errors`` say why.
+    A run that failed or was interrupted is shown up to there: ``errors`` say why.
     """
 
-    def __init__(self, recordings: Sequence[Recording], names: Sequence[str], errors: Sequence[EpicycleError]) -> None:
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        names: Sequence[str],
+        errors: Sequence[EpicycleError | KeyboardInterrupt],
+    ) -> None:
         self.recordings = recordings
         self.names = names
         self.errors = errors
@@ -87,7 +92,7 @@ def recorded(
     progress: bool = True,
 ) -> Page:
     """The page of these models' runs; seeds and stop times are of all, or of each."""
-    recordings, errors = [], list[EpicycleError]()
+    recordings, errors = [], list[EpicycleError | KeyboardInterrupt]()
     for number, model in enumerate(models):
         own_seed = seed[number] if isinstance(seed, Sequence) else seed
         stop = until[number] if isinstance(until, Sequence) else until
@@ -104,4 +109,7 @@ def recorded(
                 recordings[-1].run(until=stop, progress=report)
             except (ActorError, LoopError) as error:  # what led to it is just what one wants to see
                 errors.append(error)
-    return Page(recordings, names if len(models) > 1 else [], errors)
+            except KeyboardInterrupt as error:  # what was recorded is kept, and nothing else begun
+                errors.append(error)
+                break
+    return Page(recordings, names if len(recordings) > 1 else [], errors)

@@ -79,9 +79,13 @@ def compare(options: argparse.Namespace) -> int:
         tell(str(found))
     if options.out is not None:
         until, names = seconds("--until", options.until), list(models)[:2]
-        recorded([models[name] for name in names], seed=found.seeds[0], until=until, names=names).save(options.out)
+        page = recorded([models[name] for name in names], seed=found.seeds[0], until=until, names=names)
+        page.save(options.out)
         if not options.json:
             tell(f"wrote {options.out}")
+        for error in page.errors:
+            if isinstance(error, KeyboardInterrupt):  # failures are told below
+                raise error
     for (name, seed), error in found.failures.items():
         complain(f"error: {name}, seed {seed}: {error}")
     return FAILED if found.failures else DONE

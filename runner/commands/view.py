@@ -63,8 +63,8 @@ def view(options: argparse.Namespace) -> int:
         until=[seconds("--until", one.until) for one in each],
         names=[Path(name).name.removesuffix(".yaml") for name in options.model],
     )
-    for name, digest, recording in zip(options.model, digests, made.recordings, strict=True):
-        if digest and recording.results is not None and digest != recording.results.digest:
+    for name, digest, recording in zip(options.model, digests, made.recordings, strict=False):
+        if digest and not made.errors and recording.results is not None and digest != recording.results.digest:
             complain(f"{name} was made by another version of the model or of Epicycle: the run is no longer the same")
     for path, write in exports:
         write(made.recordings[0], path)
@@ -76,8 +76,8 @@ def view(options: argparse.Namespace) -> int:
     if page is not None:
         made.save(page)
         tell(f"wrote {page}")
-    for error in made.errors:
-        raise error
+    if made.errors:
+        raise made.errors[0]
     if page is not None and options.out is None:
         webbrowser.open(page.resolve().as_uri())
     return DONE

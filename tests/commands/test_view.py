@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from epicycle.runner import Results, Simulation
 from epicycle.runner.cli import main
 
 MODEL = """
@@ -183,3 +185,15 @@ def test_files_for_other_viewers_that_cannot_be_written(line: str, capsys: pytes
     name = "x" * 255
     message = f"error: {name} cannot be written: File name too long\n"
     assert said(capsys, line, "--mcap", name, code=2) == message
+
+
+def test_a_run_that_is_interrupted_is_shown_up_to_there(
+    line: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(simulation: Simulation, **given: Any) -> Results:
+        simulation.advance(1.0)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Simulation, "run", interrupted)
+    assert said(capsys, line, line, "-o", "page.html", code=130) == "wrote page.html\ninterrupted\n"
+    assert Path("page.html").stat().st_size > 30_000

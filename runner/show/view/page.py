@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 from epicycle.actors import shortened, to_nanoseconds
 
 from ...catalogue import Figure
+from ...graph import ModelGraph
 from ...html import Html, tag
 from ...results import Results
 from ...shown import in_words, short
@@ -82,6 +83,9 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
     if results is None:
         raise ViewError("a page shows a run that has been made: call Recording.run first")
     figures = recording.figures.values()
+    actors = [path for path in model.graph.actors if path not in recording.places]  # that never fired, but may have to
+    places = [*recording.places, *actors]
+    numbers = {path: number for number, path in enumerate(places)}
     return {
         "name": name,
         "model": model.name,
@@ -95,8 +99,8 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "firings": recording.firings,
         "records": recording.records,
         "gaps": recording.gaps(),
-        "places": list(recording.places),
-        "ports": [_port(recording, *port) for port in recording.ports],
+        "places": places,
+        "ports": [_port(model.graph, places[place], name, numbers) for place, name in recording.ports],
         "events": list(recording.events),
         "aspects": list(recording.aspects),
         "columns": {column: pack.whole(values) for column, values in kept.columns.items()},
@@ -132,9 +136,8 @@ def _four(value: Any) -> str:
     return in_words(value, digits=4, nothing="–")
 
 
-def _port(recording: Recording, place: int, name: str) -> dict[str, Any]:
-    """A port, and the actors to whose inputs its tokens lead within connections."""
-    graph, path = recording.model.graph, list(recording.places)[place]
+def _port(graph: ModelGraph, path: str, name: str, numbers: Mapping[str, int]) -> dict[str, Any]:
+    """A port, and the actors to whose inputs its tokens lead; ``numbers`` are those of the places."""
     actor = graph.actors.get(path)
     port = None if actor is None else {**actor.inputs, **actor.outputs}.get(name)
     leads: dict[str, None] = {}
@@ -148,10 +151,10 @@ def _port(recording: Recording, place: int, name: str) -> dict[str, Any]:
             seen.add(here)
             waiting += [hop.destination for hop in graph.outgoing(here)]
     return {
-        "place": place,
+        "place": numbers[path],
         "name": name,
         "multi": port is not None and port.multi,
-        "leads": [recording.places[owner] for owner in leads],
+        "leads": [numbers[owner] for owner in leads],
     }
 
 
@@ -189,14 +192,15 @@ def _difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
         return None
     return {
         "records": [each.kept_record(same) for each in recordings],
-        "texts": [_said(each, each.kept_record(same)) for each in recordings],
+        "texts": [_said(each, same) for each in recordings],
     }
 
 
-def _said(recording: Recording, number: int) -> str:
-    """A kept record in words."""
+def _said(recording: Recording, record: int) -> str:
+    """A record of the log in words."""
+    number = recording.kept_record(record)
     if number < 0:
-        return "nothing more, the run is over"
+        return "nothing more, the run is over" if record >= recording.records else "a record that this page leaves out"
     columns, tags, texts = recording.kept()
     place, name = list(recording.ports)[columns["record_port"][number]]
     event, aspect = list(recording.events)[columns["record_event"][number]], columns["record_aspect"][number]

@@ -102,6 +102,9 @@ class Recording:
         self._stride = 1  # of so many stretches one is kept
         self._stretches: list[Stretch] = []
         self._last: Stretch | None = None
+        self._passing: list[
+            tuple[tuple[int, int, int], int, int]
+        ] = []  # acts at outputs, before what they pass is sent
         patterns = [pattern for figure in figures.values() for pattern in figure.mark_patterns()]
         outputs = [path for path in model.graph.ports if model.graph.direction(path) == "output"]
         recorded = model.recorded
@@ -129,24 +132,43 @@ class Recording:
             kept.add("arrival", number, self.ports[actor, arrival.port], arrival.channel, arrival.number)
         for asked in firing.wakes:
             kept.add("wake", number, NOTHING if asked is None else kept.tags[asked])
+        self._passing.clear()
         self.firings += 1
 
     def _seen(self, record: Record, is_own: bool, about: int) -> None:
         kept = self._stretch()
+        port = self.ports[self.places[record.actor], record.port]
+        channel = NOTHING if record.channel is None else record.channel
+        aspect = self.aspects[record.aspect] if record.aspect else NOTHING
+        if is_own:
+            self._pass(kept, port, channel, aspect)
         kept.add(
             "record",
             kept.tags[record.tag],
             self.firings if is_own else NOTHING,
-            self.ports[self.places[record.actor], record.port],
-            NOTHING if record.channel is None else record.channel,
+            port,
+            channel,
             self.events[record.event],
-            self.aspects[record.aspect] if record.aspect else NOTHING,
+            aspect,
             kept.texts[_text(record.value)],
             NOTHING if about == self.records else about,
         )
         if self._is_compared:
             self.hashes.append(hash(record.encoded()))
         self.records += 1
+
+    def _pass(self, kept: Stretch, port: int, channel: int, aspect: int) -> None:
+        """Find out what acts at an output are about: the send that follows; none, if the aspect acts anew before."""
+        own = (port, channel)
+        if aspect != NOTHING:
+            if any((*own, aspect) == key for key, _, _ in self._passing):
+                self._passing = [each for each in self._passing if each[0][:2] != own]
+            self._passing.append(((*own, aspect), kept.firing, kept.count("record")))
+            return
+        for key, firing, row in self._passing:
+            if key[:2] == own and firing == kept.firing:
+                kept.columns["record_about"][row] = self.records
+        self._passing = [each for each in self._passing if each[0][:2] != own]
 
     def _stretch(self) -> Stretch:
         """The stretch to which what happens now belongs."""

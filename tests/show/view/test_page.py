@@ -182,6 +182,36 @@ def test_tokens_travel_along_their_wires(wifi: Path, opened: Open) -> None:
     assert [name for name, fits in routes.items() if not fits] == []
 
 
+ALL_LOST = """
+model: all_lost
+actors:
+  clock: {type: Clock, period: 1 s}
+  noisy: {type: Scale, factor: 2.0}
+  heard: {type: Recorder}
+  deaf: {type: Recorder}
+connections: [clock.output -> noisy.input, noisy.output -> heard.input, noisy.output -> deaf.input]
+aspects:
+  noise: {type: Noise, deviation: 0.1, at: noisy.output}
+  lost: {type: PacketLoss, probability: 1, at: deaf.input}
+run: {stop: 5 s}
+"""
+
+
+def test_noise_loses_nothing_and_who_gets_nothing_never_fires(tmp_path: Path, opened: Open) -> None:
+    model = tmp_path / "all_lost.yaml"
+    model.write_text(ALL_LOST)
+    page = opened(written(tmp_path / "page.html", (str(model), {})))
+    losses = page.do("""
+        const {run} = state;
+        return run.losses.map(({record, actor}) => [run.events[run.record_event[record]], run.places[actor]]);
+    """)
+    assert losses == [["dropped", "deaf"]] * 6
+    page.do("state.goTo({run: 0, firing: -1, record: state.run.losses[2].record})")
+    words = page.words()
+    assert words.startswith("dropped by lost\nat deaf.input, 2 s\n")
+    assert "had to do without it" not in words  # it has never fired
+
+
 def test_two_runs_are_shown_side_by_side_with_their_first_difference(pair: Path, opened: Open) -> None:
     page = opened(pair)
     page.do("state.setTime(2e9)")

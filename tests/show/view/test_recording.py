@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,39 @@ def test_acts_are_about_the_send_that_they_concern() -> None:
         assert events[columns["record_event"][about]] == "send"
         assert texts[columns["record_text"][about]] == texts[columns["record_text"][row]]
         assert tags[columns["record_tag"][about]] <= tags[columns["record_tag"][row]]
+
+
+DISTURBED = """
+model: disturbed
+actors:
+  clock: {type: Clock, period: 1 s, values: [1.0, 2.0, 3.0]}
+  scale: {type: Scale, factor: 2.0}
+  sink: {type: Recorder}
+connections: [clock.output -> scale.input, scale.output -> sink.input]
+aspects:
+  noise: {type: Noise, deviation: 0.1, at: scale.output}
+  gone: {type: MeasurementFailure, probability: 0.4, at: scale.output}
+run: {stop: 100 s, seed: 2}
+"""
+
+
+def test_acts_at_outputs_are_about_the_send_that_follows_if_one_does(tmp_path: Path) -> None:
+    path = tmp_path / "disturbed.yaml"
+    path.write_text(DISTURBED, encoding="utf-8")
+    recording = recorded(load_model(path))
+    columns, _, _ = recording.kept()
+    events, firings = list(recording.events), columns["record_firing"]
+    found: dict[int, dict[str, int]] = {}
+    for row, event in enumerate(columns["record_event"]):
+        if columns["record_aspect"][row] != NOTHING or columns["record_about"][row] == NOTHING:
+            found.setdefault(firings[row], {})[events[event]] = row
+    of_scale = [each for each in found.values() if "replaced" in each]
+    assert len(of_scale) == 101
+    about = columns["record_about"]
+    assert [each.get("send", NOTHING) for each in of_scale] == [about[each["replaced"]] for each in of_scale]
+    lost = [each for each in of_scale if "failed" in each]
+    assert 20 < len(lost) < 60
+    assert all("send" not in each and about[each["failed"]] == NOTHING for each in lost)
 
 
 def test_a_long_run_is_thinned_to_stretches_that_are_whole() -> None:

@@ -122,18 +122,32 @@ class Run {
     });
   }
 
-  // A token is lost to an actor if an aspect did something to it on the way there, and it never arrived.
+  // A token is lost to an actor by the last act on its way there, if it never arrived.
   findLosses() {
-    this.losses = []; // {record, actor}, in order
+    const last = new Map(); // what acts are about, and the actor -> the last of them
+    const unsent = new Map(); // of acts at an output about nothing that was sent: aspects that one token has met
     for (const record of this.acts) {
       const about = this.record_about[record];
       if (about === MISSING) continue;
+      let key = `${about}`;
+      if (about === NOTHING) {
+        const place = [this.record_firing[record], this.record_port[record], this.record_channel[record]].join(" ");
+        const met = unsent.get(place) ?? { tokens: 0, aspects: new Set() }, aspect = this.record_aspect[record];
+        if (met.aspects.has(aspect)) {
+          met.tokens++;
+          met.aspects.clear();
+        }
+        met.aspects.add(aspect);
+        unsent.set(place, met);
+        key = `${place} ${met.tokens}`;
+      }
       for (const actor of this.ports[this.record_port[record]].leads) {
         const arrives = about >= 0 && this.arrivalsFrom.of(about).some(
           (arrival) => this.firing_actor[this.arrival_firing[arrival]] === actor);
-        if (!arrives) this.losses.push({ record, actor });
+        if (!arrives) last.set(`${key} ${actor}`, { record, actor });
       }
     }
+    this.losses = [...last.values()].sort((one, other) => one.record - other.record);
     this.isLoss = new Set(this.losses.map((loss) => loss.record));
     this.lossesOf = new Map();
     for (const loss of this.losses) {
