@@ -19,8 +19,9 @@ class Part:
 
     port = Input(doc="begins anew", name="anew")
 
-    def fire(self):
-        raise ValueError("the model is no more")
+    def fire(self):  # by and by
+        raise ValueError(f"{self} is told "
+                         "with it")
 '''
 DOCUMENT = """# Anew
 `anew`, and
@@ -35,11 +36,13 @@ def found(text: str, path: str) -> list[str]:
     return [str(each) for each in sorted(findings(text, path, phrases()))]
 
 
-def test_docstrings_and_declared_texts_are_looked_at_and_messages_are_not() -> None:
+def test_texts_and_comments_are_looked_at_and_names_are_not() -> None:
     assert found(SOURCE, "part.py") == [
         "part.py:1: 'What speaks least': give the reason",
         "part.py:6: 'hangs on': depends on",
         "part.py:10: 'anew': again",
+        "part.py:12: 'by and by': gradually",
+        "part.py:13: 'is told': is reported, is shown",
     ]
 
 
