@@ -109,6 +109,15 @@ class MetricText:
 
 
 @dataclass(frozen=True)
+class MonitorText:
+    """A property that a run is to have; ``values`` are those of a ``Requirement``."""
+
+    name: str
+    values: dict[str, Entry]
+    position: Position
+
+
+@dataclass(frozen=True)
 class CompositeText:
     """A composite class, or the model itself, which is the outermost one."""
 
@@ -142,4 +151,5 @@ class ModelText:
     composites: dict[str, CompositeText] = field(default_factory=dict)
     run: dict[str, Entry] = field(default_factory=dict)
     metrics: tuple[MetricText, ...] = ()
+    monitors: tuple[MonitorText, ...] = ()
     figures: dict[str, PartText] = field(default_factory=dict)

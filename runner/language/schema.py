@@ -43,6 +43,7 @@ from .models import (
     RUN,
     composite_schema,
 )
+from .monitors import MONITOR
 from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
 from .questions import CLAIM, GUIDELINE
 from .study import METRIC as METRIC_OF_STUDY
@@ -97,6 +98,7 @@ def json_schema(
         "parameter": PARAMETER.schema,
         "connection": connection_schema(),
         "metric": METRIC.schema,
+        "monitor": MONITOR.schema,
         "run": RUN.schema,
         "claim": CLAIM.schema,
         "dimension": dimension_schema(),

@@ -15,6 +15,7 @@ from .encoding import cell, leaves
 from .log import EventLog
 from .outcome import Interval, Outcome
 from .signal import Signal, SignalError
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas
@@ -45,6 +46,7 @@ class Results(Tabled):
     wall_time: float  # s
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
     outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
+    monitors: dict[str, Verdict] = field(default_factory=dict)
     figures: dict[str, Any] = field(default_factory=dict)  # that the model declares, as it declares them
 
     @property
