@@ -13,6 +13,7 @@ from epicycle.actors import EpicycleError, Stop, Tag, counted, declared_paramete
 from ..catalogue import MetricOptions, TakeName, take_problem
 from ..collection import without_collection
 from ..graph import (
+    ActName,
     Like,
     Metric,
     ModelGraph,
@@ -92,6 +93,7 @@ class Model(Scope, Tabled):
         self.recorded: list[str] = []
         self.metrics: list[Metric] = []
         self.monitors: list[Monitor] = []
+        self.exactly: frozenset[ActName] | None = None  # the only acts of aspects that happen
         self.figures: dict[str, DeclaredFigure] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
@@ -145,8 +147,10 @@ class Model(Scope, Tabled):
         """
         from .disturbance import disturb
 
-        draft, found = disturb(self, str(disturbance), set or {}, types, call_site())
+        draft, found, acts = disturb(self, str(disturbance), set or {}, types, call_site())
         self.adopt(draft, found)
+        if acts is not None:
+            self.exactly = (self.exactly or frozenset()) | acts
         return found
 
     # -- what is watched ------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from ..graph import WovenAspect
 from ..interrupt import between_steps
 from ..results import EventLog, Record, Results, Signal
 from ..text import describe, raised_at
+from .acts import Acts
 from .copies import Copies
 from .director import Director
 from .errors import ActorError
@@ -46,6 +47,7 @@ class Run:
         keeps: Keeps | None = None,
         log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
+        acts: Acts | None = None,
     ) -> None:
         self.model = model
         self.seed = seed
@@ -53,6 +55,9 @@ class Run:
         self.is_begun = self.is_over = False
         self.stopped = ""  # why there is nothing more to do, once there is not
         self._tracer = tracer
+        if acts is None and model.exactly is not None:
+            acts = Acts(model.exactly)
+        self.acts = acts  # of aspects, where they have names
         self._stop: int | None = None  # until when (ns) it has been let go on
         self._spent = 0.0  # s of the wall clock
         self._initialized: list[Actor] = []
@@ -77,7 +82,7 @@ class Run:
                 self.aspects = [replace(woven, aspect=copies.of(woven.aspect)) for woven in model.aspects]
                 listeners = self._listeners()
                 self._ways = Ways(
-                    model.graph, self.actors, self.aspects, self.director, self.log, listeners, self.signals
+                    model.graph, self.actors, self.aspects, self.director, self.log, listeners, self.signals, self.acts
                 )
         except ActorError as error:  # of a clock that is wrong in a way that cannot be told
             raise self._placed(error) from _cause(error)
@@ -220,6 +225,7 @@ class Run:
             outcomes=outcomes,
             figures=dict(self.model.figures),
             monitors=verdicts,
+            acts=[] if self.acts is None else self.acts.noted,
         )
 
     def _call(self, actor: Actor, method: str) -> None:

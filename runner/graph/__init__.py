@@ -1,5 +1,6 @@
 """The frozen model: actors, composites, ports and connections, aspects at their places, what is watched, and ranks."""
 
+from .acts import Act, ActName
 from .clock import Clock
 from .digraph import find_loop, in_order
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
@@ -12,6 +13,8 @@ __all__ = [
     "LIKE",
     "PTOLEMY",
     "TIES",
+    "Act",
+    "ActName",
     "AspectModel",
     "Clock",
     "Detour",

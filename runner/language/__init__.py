@@ -2,6 +2,7 @@
 
 from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Selection
 from .declarations import (
+    ActText,
     CompositeText,
     ConnectionText,
     MetricText,
@@ -45,6 +46,7 @@ __all__ = [
     "RESERVED",
     "RISES",
     "SIGNALS",
+    "ActText",
     "Claim",
     "CompositeText",
     "ConnectionText",

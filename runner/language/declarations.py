@@ -118,6 +118,16 @@ class MonitorText:
 
 
 @dataclass(frozen=True)
+class ActText:
+    """A single act of an aspect: at which token, counted from 1, that passes it at a place."""
+
+    aspect: Text
+    at: Text
+    token: int
+    position: Position
+
+
+@dataclass(frozen=True)
 class CompositeText:
     """A composite class, or the model itself, which is the outermost one."""
 
@@ -152,4 +162,5 @@ class ModelText:
     run: dict[str, Entry] = field(default_factory=dict)
     metrics: tuple[MetricText, ...] = ()
     monitors: tuple[MonitorText, ...] = ()
+    exactly: tuple[ActText, ...] | None = None  # the only acts of aspects that happen
     figures: dict[str, PartText] = field(default_factory=dict)

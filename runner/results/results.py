@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, did_you_mean, to_seconds
 
+from ..graph import Act
 from ..shown import short
 from ..tables import Table, Tabled, pandas_module
 from .encoding import cell, leaves
@@ -47,6 +48,7 @@ class Results(Tabled):
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
     outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
     monitors: dict[str, Verdict] = field(default_factory=dict)
+    acts: list[Act] = field(default_factory=list)  # of aspects, if they were to be noted
     figures: dict[str, Any] = field(default_factory=dict)  # that the model declares, as it declares them
 
     @property

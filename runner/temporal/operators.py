@@ -125,8 +125,11 @@ class Window:
             until = min(self._back[0].end - self._start, self._front[0].end - self._end, known)
             if self._ends:
                 until = min(until, self._ends[0][0] - self._start)
+            is_cut = self._last is not None and now + self._end > self._last
+            if self._last is not None and not is_cut:
+                until = min(until, self._last - self._end)
             pieces = self._extreme(now, until)
-            if self._last is not None and now + self._end > self._last:
+            if is_cut:
                 pieces = [part for each in pieces for part in _deciding(*each, self._any)]
             found += pieces
             self._next = until + 1
