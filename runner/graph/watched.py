@@ -11,29 +11,29 @@ from .model_graph import is_within
 
 @dataclass(frozen=True)
 class Metric:
-    """A number taken from what some ports send together."""
+    """A number computed from what some ports send together."""
 
     name: str
     ports: list[str]
     measure: Measure
 
     def without(self, path: str) -> Metric:
-        """The metric when a part of the model is taken out that it watched, too."""
+        """The metric after the removal of a part of the model that it may have watched."""
         return replace(self, ports=[port for port in self.ports if not is_within(port, path)])
 
     @property
     def unit(self) -> str:
-        """What it counts in."""
+        """Its unit."""
         return self.measure.to or self.measure.own_unit
 
 
 @dataclass
 class Watched:
-    """What is said about a run of a model: when it ends, and what is kept of it."""
+    """What a model declares about a run: when it ends, and what is kept of it."""
 
     stop_time: int | None = None  # ns
     seed: int = 0
     recorded: list[str] = field(default_factory=list)
     stop_ports: list[str] = field(default_factory=list)
     metrics: list[Metric] = field(default_factory=list)
-    stop_position: Position | None = None  # of what was said of ``stop_ports`` last
+    stop_position: Position | None = None  # where ``stop_ports`` were last declared

@@ -1,4 +1,4 @@
-"""Disturbances: aspects in files of their own, which are added to a model from outside."""
+"""Disturbances: aspects in separate files, which are added to a model from outside."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Disturbance:
 
 
 T = TypeVar("T", CompositeText, ParameterText)
-PARAMETER_THERE, COMPOSITE_THERE = "the model has a parameter {!r} already", "there is a composite {!r} already"
+PARAMETER_THERE, COMPOSITE_THERE = "the model already has a parameter {!r}", "there is already a composite {!r}"
 
-# Its aspects may take over the ports of those whose places they take.
+# Its aspects may take over the ports of the aspects that they replace.
 DISTURBANCE = Construct(
-    "Aspects in a file of their own, to be added to a model.",
+    "Aspects in a separate file, to be added to a model.",
     {
         "disturbance": Key(
             NAMED,
@@ -58,7 +58,7 @@ def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
 
 
 def _declared(node: Node, problems: Problems) -> Disturbance | None:
-    """What a file declares; whatever is misshapen is a problem and left out."""
+    """What a file declares; anything malformed is reported and left out."""
     if isinstance(node, Mapping) and "model" in node.entries and "disturbance" not in node.entries:
         hint = "a disturbance begins with a line like 'disturbance: my_disturbance'"
         problems.add(f"{node.position.file} is a model, not a disturbance", node.entries["model"].key.position, hint)
@@ -90,10 +90,10 @@ def load_disturbances(names: Iterable[str], problems: Problems) -> list[Disturba
 def add_disturbances(
     text: ModelText, disturbances: Iterable[Disturbance], problems: Problems
 ) -> tuple[ModelText, list[Setting]]:
-    """A model with what disturbances hold, and what they set of the model's own parameters.
+    """A model with the contents of disturbances, and the values that they set for the model's parameters.
 
-    Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
-    after the model's own, but one that has the name of another stands in its place.
+    Their parameters join the model's, so that ``--set`` and expressions can use their names.  Their aspects come after
+    the model's own, but an aspect with the name of another replaces it.
     """
     settings: list[Setting] = []
     for disturbance in disturbances:
@@ -106,7 +106,7 @@ def add_disturbances(
 
 
 def joined(known: dict[str, T], more: dict[str, T], message: str, problems: Problems) -> dict[str, T]:
-    """What two files declare; of two things of one name the first one counts, and the second is a problem."""
+    """What two files declare; if both declare a name, the first counts and the second is a problem."""
     for name, second in more.items():
         if (first := known.get(name)) is not None:
             hint = f"it is declared at {first.position.file}:{first.position.line}; give this one another name"

@@ -106,7 +106,7 @@ def test_type_is_imported_when_a_model_names_it(site: Path) -> None:
         (
             GOOD.replace("Lidar", "Radar"),
             "acme_a:Radar",
-            "the class is called Radar, and its entry point must be, too",
+            "the class is called Radar, and its entry point must have the same name",
         ),
     ],
 )

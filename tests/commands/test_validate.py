@@ -47,7 +47,7 @@ def test_overrides(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "over.yaml").write_text("clock.period: 2 s\n'*.factor': 3\nidle.fcator: 4\n")
     assert main(["validate", "m.yaml", "--overrides", "over.yaml"]) == 2
     assert capsys.readouterr().err == (
-        "over.yaml:3:1: error: 'idle.fcator' sets no parameter, did you mean 'idle.factor'?\n"
+        "over.yaml:3:1: error: 'idle.fcator' matches no parameter, did you mean 'idle.factor'?\n"
         "    3 | idle.fcator: 4\n"
         "      | ^^^^^^^^^^^\n"
     )

@@ -142,7 +142,7 @@ def test_parameters_from_outside() -> None:
     with pytest.raises(ModelError) as caught:
         load(YAML.format("Sensor"), types=TYPES, set=["s[0].noise.deviation=-1", "s[0].noise.deviatoin=1"])
     assert [problem.message for problem in caught.value.problems] == [
-        "'s[0].noise.deviatoin' sets no parameter, did you mean 's[0].noise.deviation'?",
+        "'s[0].noise.deviatoin' matches no parameter, did you mean 's[0].noise.deviation'?",
         "s[0].noise.deviation: -1 is out of bounds, expected a number >= 0",
     ]
 
@@ -167,7 +167,7 @@ def test_the_command_line_shows_them(tmp_path: Path, capsys: pytest.CaptureFixtu
         (lambda: ExecutionTime(time=1).at("input"), "ExecutionTime stands at actors: write at() without ports"),
         (
             lambda: Noise(deviation=1).at("output", name="2nd"),
-            "'2nd' is not a name: use letters, digits and _, no digit first",
+            "'2nd' is not a name: use letters, digits and _, and no digit at the start",
         ),
         (
             lambda: Noise(deviation=1).at("outptu")(Fresh),

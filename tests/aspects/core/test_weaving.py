@@ -161,7 +161,7 @@ def test_windows_can_be_set_from_outside() -> None:
         (
             "type: PacketLoss, probability: 1, at: {port: input}",
             (
-                "m.yaml:16:48: error: a pointcut chooses by pattern, by type or by tag\n"
+                "m.yaml:16:48: error: a pointcut selects by pattern, type or tag\n"
                 "   help: write {at: ...}, {type: ..., port: ...} or {tag: ...}"
             ),
         ),
@@ -174,7 +174,7 @@ def test_windows_can_be_set_from_outside() -> None:
         ),
         (
             "type: Bias, by: 1, at: 't.output -> b.input'",
-            "m.yaml:16:33: error: aspect loss: Bias stands at output ports, not on connections",
+            "m.yaml:16:33: error: aspect loss: Bias attaches to output ports, not to connections",
         ),
         (
             "type: PacketLoss, probability: 1, at: ['a.input', '!b.inptu']",
@@ -185,17 +185,17 @@ def test_windows_can_be_set_from_outside() -> None:
         ),
         (
             "type: PacketLoss, probability: 1, at: '!a.input'",
-            "m.yaml:16:48: error: aspect loss: 'at' says only where it does not stand",
+            "m.yaml:16:48: error: aspect loss: 'at' has only exclusions",
         ),
         (
             "type: PacketLoss, probability: 1, at: ['a.input', '!*.input']",
-            "m.yaml:16:49: error: aspect loss: all that 'at' selects is left out",
+            "m.yaml:16:49: error: aspect loss: 'at' excludes everything that it selects",
         ),
         (
             "type: PacketLoss, probability: 1, at: ['*.input', '!t.output -> a.input']",
             (
-                "m.yaml:16:60: error: aspect loss: '!t.output -> a.input' leaves out no connection that is selected\n"
-                "   help: ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'"
+                "m.yaml:16:60: error: aspect loss: '!t.output -> a.input' excludes no selected connection\n"
+                "   help: exclude ports from ports and connections from connections: select some, as in '*.out -> b.in'"
             ),
         ),
         (
@@ -243,7 +243,7 @@ def test_no_port_of_the_kind() -> None:
     with pytest.raises(ModelError) as caught:
         load(PARTS.replace("a: {{type: Scale", "a: {{type: Recorder").format("type: Bias, by: 1, at: {type: Recorder}"))
     assert str(caught.value).partition("\n")[0].partition("error: ")[2] == (
-        "aspect loss: Bias stands at output ports, but no actor of type 'Recorder' has one"
+        "aspect loss: Bias attaches to output ports, but no actor of type 'Recorder' has one"
     )
 
 

@@ -128,7 +128,7 @@ metrics:
         "walks.yaml:10:27: error: metric b: there is no unit that could be converted to km\n"
         "   10 |   b: {value: highest, to: km}\n"
         "      |                           ^^\n"
-        "   help: add 'unit: ...', what it counts in before\n"
+        "   help: add 'unit: ...', the unit of the tokens\n"
         "\n"
         "walks.yaml:11:25: error: metric c: '1 m' is a length, expected a time in s\n"
         "   11 |   c: {value: place, to: s}\n"
