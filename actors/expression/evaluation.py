@@ -64,7 +64,7 @@ def interpolate(text: str, names: Mapping[str, object], budget: Budget | None = 
             parts.append(_as_text(source, _as_read(value, pieces[number + 1 :])))
     whole = "".join(parts)
     if len(whole) > MAX_TEXT and len(pieces) > 1:
-        raise ExpressionError(f"the text would be longer than {MAX_TEXT:,} characters", 0, len(text))
+        raise ExpressionError(f"the text becomes longer than {MAX_TEXT:,} characters", 0, len(text))
     return whole
 
 

@@ -269,7 +269,7 @@ def subscript(whole: Any, index: object) -> Any:
     """Return `whole[index]`: an element of a list, a character of a text, or the value of a key."""
     if isinstance(whole, dict):
         if not isinstance(index, str):
-            raise TypeError(f"the keys of a dict are texts, not {kind_of(index)}")
+            raise TypeError(f"a dict is indexed by a text, not by {kind_of(index)}")
         if index not in whole:
             keys = [str(key) for key in whole]
             guess = did_you_mean(index, keys) or ","

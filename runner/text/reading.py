@@ -13,7 +13,7 @@ from .problems import Position, Problems
 
 SURE = 0.75  # how similar a key must be to the valid one that it is read as
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
-NAMES_HAVE = "use letters, digits and _, and no digit at the start"
+NAMES_HAVE = "use letters, digits and _, and no digit first"
 
 
 @dataclass(frozen=True, slots=True)

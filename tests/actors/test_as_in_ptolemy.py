@@ -329,7 +329,7 @@ def test_checks(test: str, feeds: Feeds, message: str) -> None:
         ("BlockExpression, expression: 'block[0]', items: true", [("input", [[0, 1]])],
          "'block[0]' gives 1, which is not a list of items to send"),
         ("TextFunction, function: replace, other: a", [("text", [[0, "a" * 200]]), ("new", [[0, "b" * 1000]])],
-         "the text would be longer than 100,000 characters"),
+         "the text becomes longer than 100,000 characters"),
         ("Ramp", [("trigger", [[0, 0], [1, 0], [2, 0]]), ("step", [[0, 0.5]])],
          ("init and step are whole numbers, and so is what is sent, but a step of 0.5 has come; write 'init: 0.0' for "
           "numbers that are not whole")),

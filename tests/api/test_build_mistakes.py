@@ -37,10 +37,10 @@ MISTAKES: dict[str, tuple[Callable[[Model], Any], str]] = {
     ),
     "wrong way round": (
         lambda m: m.connect(m["sum"].input, m["late"].output),
-        """error: sum.input is an input of Adder, nothing can come from it
+        """error: sum.input is an input of Adder, so nothing can come from it
    help: valid output ports: output, enough
 
-error: late.output is an output of Noisy, nothing can go to it
+error: late.output is an output of Noisy, so nothing can go to it
    help: valid input ports: input
 2 errors""",
     ),
@@ -65,7 +65,7 @@ error: late.output is an output of Noisy, nothing can go to it
     ),
     "array": (
         lambda m: m.connect("robot.position -> sum.input"),
-        """error: robot is an array of 3: say which
+        """error: robot is an array of 3: give an index
    help: write robot[*].position for all, or robot[0].position for the first""",
     ),
     "through a wall": (
@@ -126,7 +126,7 @@ error: late.output is an output of Noisy, nothing can go to it
     "dotted name": (
         lambda m: m.add(Adder("robot.sum")),
         """error: 'robot.sum' is not a name
-   help: use letters, digits and _, and no digit at the start; an element of an array is called 'name[0]'
+   help: use letters, digits and _, and no digit first; an element of an array is called 'name[0]'
    help: add parts of a composite to the composite""",
     ),
     "single and array": (
@@ -165,7 +165,7 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
     "own port": (
         lambda m: m["robot[0]"].connect("positon -> inner.trigger"),
         """error: robot[0] has no input port 'positon' of its own
-   help: own input ports: trigger
+   help: its own input ports: trigger
    help: a port of an actor is written 'actor.port'""",
     ),
     "path": (lambda m: m["robot[0]"]["iner"], "error: there is no 'robot[0].iner', did you mean 'robot[0].inner'?"),
@@ -191,7 +191,7 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
     ),
     "aspect's side": (
         lambda m: m.weave("loss", PacketLoss(probability=0.1), at=m["sum"].output),
-        "error: aspect loss: PacketLoss stands at input ports, but sum.output is an output port",
+        "error: aspect loss: PacketLoss attaches to input ports, but sum.output is an output port",
     ),
     "no aspect": (
         lambda m: m.unweave("failures"),

@@ -181,7 +181,7 @@ def test_an_actor_that_was_refused_can_be_added_elsewhere() -> None:
         assert (actor.path, actor.is_part, actor.input.path) == ("misfit", False, "misfit.input")
     clock = Clock("clock", period=1)
     inner.add(clock)
-    with pytest.raises(ModelError, match="is part of a model already"):
+    with pytest.raises(ModelError, match="is already part of a model"):
         model.add(clock)
     assert clock.path == "inner.clock"
 

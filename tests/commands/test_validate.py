@@ -20,10 +20,10 @@ connections:
   - {from: "also[0].output", to: idle.input, delay: 1}
 run: {stop: 1 s}
 """
-WARNING = """m.yaml:6:3: {}: also[0] can never fire: it is no source, and only the loop also[0], also[1] feeds it
+WARNING = """m.yaml:6:3: {}: also[0] can never fire: it is not a source, and only the loop also[0], also[1] feeds it
     6 |   also: {{type: Merge, count: 2}}
       |   ^^^^
-   help: nor can what it feeds: idle
+   help: nor can the actors that it feeds: idle
 """
 
 

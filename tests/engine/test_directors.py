@@ -344,7 +344,7 @@ def test_a_composite_cannot_feed_itself_within_the_tag() -> None:
         "      |     ^^^^^^^\n"
         "   help: c1.tick -> c1.port (m.yaml:12)\n"
         "   help: c1 has its own director: it fires as one actor, when all inputs that act in the tag have come\n"
-        "   help: give one of these connections a delay, best the one that leads back: "
+        "   help: give one of these connections a delay, preferably the one that leads back: "
         "{from: c1.tick, to: c1.port, delay: ...}"
     )
     simulation, _ = simulate(LOOP.replace("    director: {}\n", ""), until=1, types=TYPES)  # transparent, it can

@@ -47,7 +47,7 @@ def test_the_user_may_name_any_file(folder: Path) -> None:
     assert load(folder, "data/a.csv", f"reader.file={folder.parent / 'secret.csv'}").read_text() == "2"
 
 
-OUTSIDE = "cannot be read: a file named in a model lies in or below the folder of its YAML file"
+OUTSIDE = "cannot be read: a file named in a model must be in or below the folder of its YAML file"
 
 
 @pytest.mark.parametrize(

@@ -110,8 +110,8 @@ def test_a_wake_up_is_called_off() -> None:
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        (("1a",), "'1a' cannot be the name of a port: use letters, digits and _, and no digit at the start"),
-        (("ä",), "'ä' cannot be the name of a port: use letters, digits and _, and no digit at the start"),
+        (("1a",), "'1a' cannot be the name of a port: use letters, digits and _, no digit first"),
+        (("ä",), "'ä' cannot be the name of a port: use letters, digits and _, no digit first"),
     ],
 )
 def test_names_of_own_ports(monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], message: str) -> None:

@@ -192,7 +192,7 @@ FUNCTION_LIST = ", ".join(sorted(FUNCTIONS))
             "starts[flag]: a list is indexed by a whole number, not by a truth value",
             "starts[flag]",
         ),
-        ("robot[0]", "robot[0]: a dict is asked by a text, not by a number", "robot[0]"),
+        ("robot[0]", "robot[0]: a dict is indexed by a text, not by a number", "robot[0]"),
         (
             "robot['sped']",
             "robot['sped']: there is no key 'sped', did you mean 'speed'? known keys: name, speed",
@@ -209,7 +209,7 @@ FUNCTION_LIST = ", ".join(sorted(FUNCTIONS))
             "a list comprehension needs plain names between 'for' and 'in'",
             "robot['a']",
         ),
-        ("{1: 2}", "a key must be a text, this one is a number", "1"),
+        ("{1: 2}", "a key must be a text, but this one is a number", "1"),
         ("{'a': 1, 'a': 2}", "duplicate key 'a'", "'a'"),
         ("abs(1, 2)", "abs(1, 2): abs takes 1 value, not 2", "abs(1, 2)"),
         ("max()", "max(): max takes at least 1 value, not 0", "max()"),
@@ -331,7 +331,7 @@ def test_interpolate(text: str, value: object) -> None:
         ("a ${} b", "the expression is empty", 4, 0),
         ("${n} ${ 1 / 0 }", "1 / 0 divides by zero", 8, 5),
         ("é ${y}", f"unknown name 'y', known names: {KNOWN}", 4, 1),
-        ("${'a' * 9999} ${'b' * 9999}", "the text would be longer than 10,000 characters", 0, 27),
+        ("${'a' * 9999} ${'b' * 9999}", "the text becomes longer than 10,000 characters", 0, 27),
         ("-${['a' * 9999, 'bb']}", LONG_TEXT, 3, 18),
     ],
 )

@@ -66,7 +66,7 @@ def test_a_weaving_that_fails_changes_nothing(tmp_path: Path) -> None:
     model = python_pair()
     for at, message in (
         ("a.inptu", "'a.inptu' matches no port"),
-        ("net.server.input", "it cannot stand inside of itself"),
+        ("net.server.input", "it cannot attach to its own inside"),
     ):
         with pytest.raises(ModelError, match=message):
             model.weave("net", desk("net"), at=at)

@@ -42,7 +42,7 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
         ),
         (
             "net: {type: PacketLoss, probability: 0, at: {at: a.input, request: east}}",
-            "m.yaml:33:78: error: aspect net: PacketLoss is no composite, so a pointcut of it has no 'request'",
+            "m.yaml:33:78: error: aspect net: PacketLoss is not a composite, so its pointcuts have no 'request'",
         ),
         (
             "net: {type: Desk, at: {at: a.input, type: Scale}}",
@@ -67,13 +67,13 @@ or these by input port""",
         ),
         (
             "net: {type: Desk, at: {at: a, time: {inptu: 1}}}",
-            """m.yaml:33:48: error: aspect net: time: no actor that this is for has an input 'inptu', did you mean \
+            """m.yaml:33:48: error: aspect net: time: no actor that this applies to has an input 'inptu', did you mean \
 'input'?
    help: their inputs: input""",
         ),
         (
             "net: {type: PacketLoss, probability: 0, at: {at: a.input, time: 1}}",
-            "m.yaml:33:75: error: aspect net: PacketLoss is no composite, so a pointcut of it has no 'time'",
+            "m.yaml:33:75: error: aspect net: PacketLoss is not a composite, so its pointcuts have no 'time'",
         ),
         (
             "one: {type: Desk, at: {at: a, time: 1}}, two: {type: Desk, at: {at: '*', time: 1}}",
@@ -82,7 +82,7 @@ or these by input port""",
         ),
         (
             "net: {type: Desk, at: {at: net.server, time: 1}}",
-            "m.yaml:33:38: error: aspect net: it cannot stand inside of itself, at net.server",
+            "m.yaml:33:38: error: aspect net: it cannot attach to its own inside, at net.server",
         ),
         (
             "a: {type: Desk, at: b.input}",
@@ -91,7 +91,7 @@ or these by input port""",
         ),
         (
             "net: {type: Desk, at: net.server.input}",
-            "m.yaml:33:33: error: aspect net: it cannot stand inside of itself, at net.server.input",
+            "m.yaml:33:33: error: aspect net: it cannot attach to its own inside, at net.server.input",
         ),
         (
             "net: {type: Desk, at: a}",
@@ -114,7 +114,7 @@ m.yaml:33:29: error: net: Desk has no parameter 'tiem', did you mean 'time'?
             """m.yaml:33:11: error: a loop without delay: a -> net.negate -> a
    help: a.output -> net.request -> net.negate.input (m.yaml:33, m.yaml:12)
    help: net.negate.output -> net.response -> a.input (m.yaml:12, m.yaml:33)
-   help: the aspect net sends the tokens of all its ports through one model: let it stand at fewer of them, or give \
+   help: the aspect net sends the tokens of all its ports through one model: attach it to fewer of them, or give \
 that model a delay""",
         ),
         (
@@ -149,7 +149,7 @@ m.yaml:31:33: error: aspect net: Wire has no input
         (
             WIRE,
             WIRE.replace("[request]", "{request: float}", 1),
-            """m.yaml:5:14: error: aspect net: request of Wire is for float, but aspects pass requests
+            """m.yaml:5:14: error: aspect net: request of Wire has the type float, but aspects pass requests
    help: leave out its type: the actors inside receive requests, which contain the tokens""",
         ),
         (
@@ -172,7 +172,7 @@ m.yaml:8:43: error: net.scale.output sends float, but net.response takes Request
         (
             "t.output -> b.input,",
             "t.output -> b.input, t.output -> net.request,",
-            """m.yaml:32:57: error: aspect net: net.request is for the tokens of this aspect, and nothing else can be \
+            """m.yaml:32:57: error: aspect net: net.request takes the tokens of this aspect, so nothing else can be \
 connected to it
    help: add another input for other tokens""",
         ),
@@ -188,14 +188,14 @@ def test_wrong_classes(old: str, new: str, message: str) -> None:
         (
             "{}",
             "{net: {type: Desk, at: 'twin[0].scale.input'}}",
-            """error: aspect net: twin[0].scale.input is inside of twin[0], which has its own director
-   help: declare it inside of twin[0], or let it stand at the ports of twin[0]""",
+            """error: aspect net: twin[0].scale.input is inside twin[0], which has its own director
+   help: declare it inside twin[0], or attach it to the ports of twin[0]""",
         ),
         (
             "{net: {type: Desk, at: go}}",
             "{}",
-            """error: aspect twin[0].net: twin[0].go is outside of twin[0], which has its own director
-   help: declare it outside of twin[0]""",
+            """error: aspect twin[0].net: twin[0].go is outside twin[0], which has its own director
+   help: declare it outside twin[0]""",
         ),
     ],
 )

@@ -167,7 +167,7 @@ def test_the_command_line_shows_them(tmp_path: Path, capsys: pytest.CaptureFixtu
         (lambda: ExecutionTime(time=1).at("input"), "ExecutionTime stands at actors: write at() without ports"),
         (
             lambda: Noise(deviation=1).at("output", name="2nd"),
-            "'2nd' is not a name: use letters, digits and _, and no digit at the start",
+            "'2nd' is not a name: use letters, digits and _, no digit first",
         ),
         (
             lambda: Noise(deviation=1).at("outptu")(Fresh),

@@ -141,14 +141,14 @@ def test_windows_can_be_set_from_outside() -> None:
             "type: PacketLoss, probability: 1, at: {type: Scales}",
             (
                 "m.yaml:16:55: error: aspect loss: there is no actor of type 'Scales', did you mean 'Scale'?\n"
-                "   help: types in it: Scale, Ticker, Twin"
+                "   help: types here: Scale, Ticker, Twin"
             ),
         ),
         (
             "type: PacketLoss, probability: 1, at: {tag: radios}",
             (
                 "m.yaml:16:54: error: aspect loss: there is no actor with the tag 'radios', did you mean 'radio'?\n"
-                "   help: tags in it: radio, spare"
+                "   help: tags here: radio, spare"
             ),
         ),
         (
@@ -201,7 +201,7 @@ def test_windows_can_be_set_from_outside() -> None:
         (
             "type: PacketLoss, probability: 1, at: 'a.input, b.input'",
             (
-                "m.yaml:16:48: error: aspect loss: 'a.input, b.input' is no pointcut: 'input, b' is not a name, "
+                "m.yaml:16:48: error: aspect loss: 'a.input, b.input' is not a pointcut: 'input, b' is not a name, "
                 "a name with an index, '*' or '**'\n"
                 "   help: for several pointcuts, write a list: [a.in, b.in]"
             ),
@@ -218,7 +218,7 @@ def test_windows_can_be_set_from_outside() -> None:
             "type: PacketLoss, probability: 1, at: a.input, when: x > 3",
             (
                 "m.yaml:16:63: error: aspect loss.when: 'x > 3' is not an expression over ports: "
-                "the name 'x' is unknown: a port is written 'actor.port'"
+                "unknown name 'x': a port is written 'actor.port'"
             ),
         ),
         (
@@ -262,7 +262,7 @@ def test_conditions_on_fields() -> None:
     assert formula([[1.0, 5.0], "x.y"]) is True
     with pytest.raises(EpicycleError, match=r"a\.state\.position"):
         formula(["text", "x.y"])
-    with pytest.raises(ExpressionError, match=r"no port is named in it: write a port as 'actor.port'"):
+    with pytest.raises(ExpressionError, match=r"it names no port: write a port as 'actor.port'"):
         PortFormula("1 < 2")
 
 

@@ -76,11 +76,11 @@ def test_pointcuts(at: str, actors: dict[str, str]) -> None:
         ),
         (
             "type: SkipFiring, probability: 1, at: a..b",
-            "'a..b' is no pointcut: '' is not a name, a name with an index, '*' or '**'",
+            "'a..b' is not a pointcut: '' is not a name, a name with an index, '*' or '**'",
         ),
         (
             "type: SkipFiring, probability: 1, at: {type: Scael}",
-            "there is no actor of type 'Scael', did you mean 'Scale'?\n   help: types in it: Pair, Scale, Ticker",
+            "there is no actor of type 'Scael', did you mean 'Scale'?\n   help: types here: Pair, Scale, Ticker",
         ),
         (
             "type: PacketLoss, probability: 1, at: a",

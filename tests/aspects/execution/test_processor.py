@@ -286,7 +286,7 @@ run: {{stop: 1 s}}
         ),
         (
             "more: {type: Processor, at: a, times: {a: {trigger: 1}}}",
-            """7:46: error: aspect more: times: a: no actor that this is for has an input 'trigger'
+            """7:46: error: aspect more: times: a: no actor that this applies to has an input 'trigger'
    help: their inputs: input""",
         ),
         (

@@ -125,7 +125,7 @@ metrics:
         "      |                           ^\n"
         "   help: leave 'unit' out; 'to: ...' converts\n"
         "\n"
-        "walks.yaml:10:27: error: metric b: there is no unit that could be converted to km\n"
+        "walks.yaml:10:27: error: metric b: without a unit, it cannot be converted to km\n"
         "   10 |   b: {value: highest, to: km}\n"
         "      |                           ^^\n"
         "   help: add 'unit: ...', the unit of the tokens\n"
