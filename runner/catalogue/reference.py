@@ -214,7 +214,7 @@ TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     ),
     "flow": ("Routing, merging, filtering and storing tokens", ("flow", "passing", "variables")),
     "time": ("Delays and timers", ("timing",)),
-    "queues and resources": ("Waiting, and what is waited for", ("queues", "resources")),
+    "queues and resources": ("Queues, servers and resources with units", ("queues", "resources")),
     "entities": ("Tokens with fields, and lists of tokens", ("entities",)),
     "networks": ("Links, switches, repeats", ("links",)),
     "modes": ("State machines", ("modes",)),
@@ -226,7 +226,7 @@ TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "measurement": ("At output ports: what a sensor seems to have measured", ("measurement",)),
     "situation": ("What depends on where bodies are: distance, range, line of sight, partition", ("situation",)),
     "execution": ("At actors: firings that take time or do not happen, crashes, clocks", ("clock", "execution")),
-    "observation": ("At any port: observation without changes", ("observation",)),
+    "observation": ("At any port: observers that change nothing", ("observation",)),
 }
 
 

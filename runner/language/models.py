@@ -231,7 +231,7 @@ DIRECTOR = Construct(
         "drift": Key(
             node_as(computed("number", unit="1")), "The rate of local time; 1 is as fast as the time outside."
         ),
-        **_rules(ties="as around it", like="as around it"),
+        **_rules(ties="as outside", like="as outside"),
     },
 )
 DOC = Key(TEXT, "What it shows or does.")
