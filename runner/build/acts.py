@@ -25,7 +25,7 @@ def acts_of(texts: Iterable[ActText], aspects: Iterable[WovenAspect], problems: 
         elif place not in places[aspect]:
             known = places[aspect]
             rest = f" and {len(known) - _FEW} more" if len(known) > _FEW else ""
-            message = f"exactly: aspect {aspect} does not stand at {place!r}{did_you_mean(place, known)}"
+            message = f"exactly: aspect {aspect} does not attach to {place!r}{did_you_mean(place, known)}"
             problems.add(message, each.at.position, f"it attaches to {', '.join(known[:_FEW])}{rest}")
         else:
             found.add(ActName(aspect, place, each.token))

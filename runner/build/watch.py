@@ -147,7 +147,7 @@ class Watching:
         self._watched += len(found.ports)
         for metric in found.metrics:
             if any(each.name == metric.name for each in self.found.metrics):
-                message = f"monitor {name}: there is a metric {metric.name!r}, but its result needs that name"
+                message = f"monitor {name}: its result needs the name {metric.name!r}, which a metric has"
                 self.problems.add(message, position, "rename one of the two")
         self.found.monitors.append(found)
         self.found.metrics += found.metrics

@@ -1,6 +1,4 @@
-"""What is set for a model from outside: ``--set path=value``, ``--overrides file``, ``--aspect name=Type,...``,
-``--without name``.
-"""
+"""Settings from outside: ``--set path=value``, ``--overrides file``, ``--aspect name=Type,...``, ``--without name``."""
 
 from __future__ import annotations
 

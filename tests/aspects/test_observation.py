@@ -118,7 +118,7 @@ def test_assert_that_fails() -> None:
         (
             "{type: Assert, at: a.input, that: 1 < 3}",
             (
-                "aspect x.that: '1 < 3' is not an expression over ports: nothing is named in it: "
+                "aspect x.that: '1 < 3' is not an expression over ports: it names nothing: "
                 "write 'token' or a port as 'actor.port'"
             ),
         ),
