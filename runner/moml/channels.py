@@ -1,6 +1,6 @@
 """Converts publishers and subscribers, which share a channel name, to wires.
 
-A channel reaches all transparent composites under one director. A ``global`` channel reaches the whole model.
+A channel reaches all transparent composites under one director.  A ``global`` channel reaches the whole model.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ class PortSaid:
 class ParameterSaid:
     """A parameter of Ptolemy's: its counterpart, the kind of its value, and the value it has if the file omits it.
 
-    A default is given only where ours differs or is missing. The kinds: ``value``, ``list``, ``number``, ``whole``,
+    A default is given only where ours differs or is missing.  The kinds: ``value``, ``list``, ``number``, ``whole``,
     ``flag``, ``time`` (s), ``times``, ``text``; ``nothing`` makes no difference to a run, ``none`` has no counterpart.
     """
 

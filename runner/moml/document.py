@@ -1,6 +1,6 @@
 """Reading MoML: an XML file as a tree of elements with their lines; nothing is fetched or expanded.
 
-A file of Ptolemy II names its DTD on the line before the first element. That line is blanked, and any other part of a
+A file of Ptolemy II names its DTD on the line before the first element.  That line is blanked, and any other part of a
 DTD is refused, so a file can neither define nor request entities.
 """
 
@@ -89,7 +89,7 @@ def parse_document(data: bytes, name: str) -> Element:
 
 
 def _decodable(data: bytes) -> bytes:
-    """The bytes as UTF-8. Files that declare no encoding and are not UTF-8 are in Latin-1, as Java wrote some."""
+    """The bytes as UTF-8.  Files that declare no encoding and are not UTF-8 are in Latin-1, as Java wrote some."""
     if data.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_BE, codecs.BOM_UTF16_LE)) or _ENCODING.match(data):
         return data
     try:

@@ -1,7 +1,7 @@
 """Builds the model of a MoML file: entities with ports, relations and links; classes are expanded in their instances.
 
-MoML is a list of instructions: an element creates what it names, or changes it if it exists. An instance of a class
-that the file defines starts as a copy of it. The result therefore has no classes; an entity only keeps the name of its
+MoML is a list of instructions: an element creates what it names, or changes it if it exists.  An instance of a class
+that the file defines starts as a copy of it.  The result therefore has no classes; an entity only keeps the name of its
 class.
 """
 

@@ -40,7 +40,7 @@ class Imported:
 def import_moml(path: Path, load: Callable[[Path], object] | None = None, types: Iterable[type] = ()) -> Imported:
     """Import a file; raises ``MomlError`` with everything that prevents it.
 
-    ``load`` is called with a file that holds the result, and must raise its errors. ``types`` are the user's actors:
+    ``load`` is called with a file that holds the result, and must raise its errors.  ``types`` are the user's actors:
     one with the name of a Java class replaces it.
     """
     notes = Notes()

@@ -1,8 +1,8 @@
 """The table of counterparts: which of our actors replaces which of Ptolemy II's.
 
 ``"input* name=ours | output"`` lists inputs and outputs; ``*`` marks a multiport; a name without ``=`` is ours in snake
-case. A parameter states its kind, then ``:ours`` if the name differs, and ``=default`` if Ptolemy's default differs or
-ours has none. All rows assume a model with ``like: ptolemy``.
+case.  A parameter states its kind, then ``:ours`` if the name differs, and ``=default`` if Ptolemy's default differs or
+ours has none.  All rows assume a model with ``like: ptolemy``.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ class Words:
     """The names of a state machine, and the guards and actions that use them.
 
     In Ptolemy, the name of an input, with or without ``_isPresent``, refers to its last channel, or to the one whose
-    number follows. Here, each channel is a separate port.
+    number follows.  Here, each channel is a separate port.
     """
 
     def __init__(

@@ -70,10 +70,7 @@ def test_what_is_no_model(tmp_path: Path, text: str, message: str) -> None:
 
 
 def test_what_is_too_large(tmp_path: Path) -> None:
-    assert (
-        refusal(tmp_path, b" " * 20_000_001)
-        == "m.xml is larger than the maximum of 20,000,000 bytes"
-    )
+    assert refusal(tmp_path, b" " * 20_000_001) == "m.xml is larger than the maximum of 20,000,000 bytes"
     many = '<entity name="m">' + "<a/>" * 300_000 + "</entity>"
     assert refusal(tmp_path, many) == "m.xml: more than the maximum of 300,000 elements"
 

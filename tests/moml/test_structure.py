@@ -147,7 +147,9 @@ def test_a_thread_of_its_own_is_a_delay(tmp_path: Path) -> None:
     )
     assert values(tmp_path, text) == [(0.5, 3), (1.5, 6)]
     late = text.replace('value="0.5"', 'value="UNDEFINED"')
-    assert notes(tmp_path, late) == ["T: in Ptolemy, it sends when its thread has finished; here, at the next microstep"]
+    assert notes(tmp_path, late) == [
+        "T: in Ptolemy, it sends when its thread has finished; here, at the next microstep"
+    ]
 
 
 def case(control: str) -> str:
