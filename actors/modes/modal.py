@@ -176,7 +176,7 @@ class ModalActor(Actor):
                     near = did_you_mean(name, self.inputs)
                     raise ParameterError(f"{rule}: there is no input {name!r}{near}; inputs: {valid}")
 
-    # -- what a transition comes to -------------------------------------------------------------------------------
+    # -- parts of a transition ------------------------------------------------------------------------------------
 
     def is_present(self, port: str) -> bool:
         """Whether an input has a token in this reaction."""

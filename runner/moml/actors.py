@@ -73,7 +73,7 @@ class Actor:
     arrays: frozenset[str] = frozenset()  # ports that receive only arrays
     reads: dict[str, Changing] = field(default_factory=dict)  # our ports that are connected to variables
 
-    # -- what is said in the file ---------------------------------------------------------------------------------
+    # -- reading the file -----------------------------------------------------------------------------------------
 
     def said(self, name: str) -> Property | None:
         """A parameter that the file sets; None if it keeps its default."""
@@ -103,7 +103,7 @@ class Actor:
             text = text[1:-1]
         return self.scope.filled(text)
 
-    # -- what is written ------------------------------------------------------------------------------------------
+    # -- writing --------------------------------------------------------------------------------------------------
 
     def convert(self) -> None:
         """Find the values of all parameters."""

@@ -67,7 +67,7 @@ class Conversion:
         found = own.get(kind(entity))
         return counterpart_of(entity.java) if found is None else counterpart_of_type(found)
 
-    # -- what wires need ------------------------------------------------------------------------------------------
+    # -- for wiring -----------------------------------------------------------------------------------------------
 
     def face(self, entity: Entity, port: str) -> PortFace | None:
         """The direction of a port, and whether it is a multiport; None if nothing is wired to it."""

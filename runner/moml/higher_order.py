@@ -53,7 +53,7 @@ class _Rewriting:
         made.properties = {key: Property(key, _PARAMETER, value) for key, value in parameters.items()}
         return name
 
-    # -- a thread of its own ----------------------------------------------------------------------------------------
+    # -- threads ----------------------------------------------------------------------------------------------------
 
     def _threaded(self, child: Entity, scope: Scope, ports: Iterable[str]) -> None:
         """The inner actor fires at once; its outputs leave after the delay."""
@@ -97,7 +97,7 @@ class _Rewriting:
                 port.properties.setdefault(flag, Property(flag, value="true"))
         return face
 
-    # -- one of several ---------------------------------------------------------------------------------------------
+    # -- cases ------------------------------------------------------------------------------------------------------
 
     def _case(self, child: Entity, scope: Scope, *, is_fed: bool) -> None:
         """Inputs go to the refinement with the name that ``control`` gives."""

@@ -127,7 +127,7 @@ class _Machine:
     def tell(self, text: str) -> None:
         self.conversion.notes.note(f"{self.path}: {text}")
 
-    # -- what is written ------------------------------------------------------------------------------------------
+    # -- writing --------------------------------------------------------------------------------------------------
 
     def written(self) -> dict[str, Any]:
         """The sections for modes and transitions."""

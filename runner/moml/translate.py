@@ -216,7 +216,7 @@ class _Translation:
                 return "[" + ", ".join(lines) + "]", _ATOM
         raise ExpressionError("it has an operator that is not supported")
 
-    # -- functions that the model defines -------------------------------------------------------------------------
+    # -- functions defined in the model ---------------------------------------------------------------------------
 
     def _made(self, tree: Tree) -> _Made | None:
         """A function, if the model defines it."""

@@ -56,7 +56,7 @@ def read(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
     return numbers, {where: column for where, column in states.items() if any(each is not None for each in column[1])}
 
 
-# -- thinned ----------------------------------------------------------------------------------------------------------
+# -- thinning ---------------------------------------------------------------------------------------------------------
 
 
 class Envelope(NamedTuple):

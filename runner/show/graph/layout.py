@@ -67,9 +67,7 @@ class Wire:
 
 @dataclass(frozen=True)
 class Pill:
-    """A badge on a line: an aspect where it is attached, or the label of a connection (``aspect`` is empty) with its
-    delay.
-    """
+    """A badge on a line: an aspect where it is attached, or a connection's label (``aspect`` is empty) with its delay."""
 
     text: str
     aspect: str

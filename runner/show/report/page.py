@@ -112,7 +112,7 @@ def _at_most(data: Data) -> str:
     return "" if data.plan.study.until is None else "at most "
 
 
-# -- what was asked, and of what --------------------------------------------------------------------------------------
+# -- the study and its runs -------------------------------------------------------------------------------------------
 
 
 def _what(data: Data) -> Iterable[Html]:
@@ -228,9 +228,7 @@ def _shown(svg: bytes, what: str) -> Html:
 
 
 def _means(data: Data) -> Iterable[Html]:
-    """A table for each metric with the levels of the last factor as columns, or one table with a row for each
-    condition.
-    """
+    """A table for each metric with the levels of the last factor as columns, or one with a row per condition."""
     metrics, factors = data.results.metrics, data.results.factors
     if not data.conditions or not metrics:
         return

@@ -122,7 +122,7 @@ class Recording:
             raise
         return self.results
 
-    # -- what the tracer tells --------------------------------------------------------------------------------------
+    # -- events from the tracer -------------------------------------------------------------------------------------
 
     def _fired(self, firing: Firing) -> None:
         kept, number, actor = self._stretch(), self.firings, self.places[firing.actor]
@@ -181,7 +181,7 @@ class Recording:
                 self._stretches = [each for each in self._stretches if each.firing // STRETCH % self._stride == 0]
         return self._last
 
-    # -- what is left -------------------------------------------------------------------------------------------------
+    # -- kept data ----------------------------------------------------------------------------------------------------
 
     def kept(self) -> Kept:
         """Everything that was kept: firings and records are renumbered, tags are in order."""

@@ -36,7 +36,7 @@ def require_rerun() -> Any:
     """The rerun package; raises ``ViewError`` if it is not installed."""
     try:
         import rerun
-        from rerun.blueprint import StateTimelineView  # noqa: F401  which tells it from others of that name
+        from rerun.blueprint import StateTimelineView  # noqa: F401  other packages of this name do not have it
     except ImportError:
         raise ViewError(
             "a recording for rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'"
