@@ -36,7 +36,7 @@ _LETTERS = 30  # per line at a vertical axis
 
 
 class TimeSeries(Figure):
-    """Signals over time: a line for each number in their tokens, a strip of states for each text, truth value or enum.
+    """Signals over time: a line for each number in their tokens, a strip for each text, truth value or enumeration.
 
     The colour of a strip shows the current state; None leaves a gap, as does any value that is not a state.  If there
     are more values than a line can show, a band spans all of them, and the line is their mean.

@@ -104,8 +104,7 @@ def check_folder(folder: Path, model: str, command: list[str]) -> str:
 def write_folder(folder: Path, results: Results, command: Iterable[str], error: str = "") -> list[Path]:
     """Write ``manifest.json`` and ``signals.parquet``; returns the paths.
 
-    Each file is written aside and then moved
-    into place, so a folder never holds half a file.
+    Each file is written aside and then moved into place, so a folder never holds half a file.
     """
     folder.mkdir(parents=True, exist_ok=True)
     signals, manifest = folder / "signals.parquet", folder / "manifest.json"

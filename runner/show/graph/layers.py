@@ -198,7 +198,7 @@ def _restore(ordered: list[list[Any]], state: list[list[Any]]) -> None:
 
 
 def _joints(layers: Layers, number: int, runs: list[Run]) -> list[tuple[Pin, Pin]]:
-    """The pairs of pins that the runs to the right of a layer join; where one turns round, a cell reserves its place."""
+    """The pairs of pins that the runs to the right of a layer join; where one turns round, a cell keeps its place."""
     pairs: list[tuple[Pin, Pin]] = []
     for run in runs:
         ends = []

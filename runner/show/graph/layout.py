@@ -67,7 +67,7 @@ class Wire:
 
 @dataclass(frozen=True)
 class Pill:
-    """A badge on a line: an aspect where it is attached, or a connection's label (``aspect`` is empty) with its delay."""
+    """A badge on a line: an aspect where it is attached, or a connection's label with its delay (``aspect`` is "")."""
 
     text: str
     aspect: str

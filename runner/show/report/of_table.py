@@ -288,7 +288,7 @@ class _Axis:
         return self._of(condition.values[self._factor]) if self._factor else 0.0
 
     def dress(self, axes: Any, columns: int, *, is_log: bool) -> None:
-        """Set ticks at the levels; for numbers, only if they are few and not scattered like the points of a hypercube."""
+        """Set ticks at the levels; for numbers, only if few and not scattered like the points of a hypercube."""
         if is_log and not self.is_numeric:
             raise EpicycleError("the levels along the axis are not numbers, so it cannot be logarithmic")
         if is_log:
