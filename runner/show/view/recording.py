@@ -103,7 +103,7 @@ class Recording:
         self._stride = 1  # one stretch in so many is kept
         self._stretches: list[Stretch] = []
         self._last: Stretch | None = None
-        self._passing: list[tuple[tuple[int, int, int], int, int]] = []  # acts at outputs whose token has not been sent yet
+        self._passing: list[tuple[tuple[int, int, int], int, int]] = []  # acts at outputs before their token is sent
         patterns = [pattern for figure in figures.values() for pattern in figure.mark_patterns()]
         outputs = [path for path in model.graph.ports if model.graph.direction(path) == "output"]
         recorded = model.recorded
