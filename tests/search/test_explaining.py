@@ -39,6 +39,9 @@ monitors:
 """
 
 
+TOO_SHORT = "monitor property cannot be judged in this run of relay (the run was too short to tell): there is nothing to explain"
+
+
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
     file = tmp_path / "relay.yaml"
@@ -121,11 +124,7 @@ def test_a_model_that_breaks_by_itself(model: Path) -> None:
     ("monitor", "message"),
     [
         ("aliv", "relay has no monitor 'aliv', did you mean 'alive'?\n   help: its monitors: heard, alive"),
-        (
-            "eventually within 1 min double.output < 0",
-            "monitor property cannot be judged in this run of relay (the run was too short to tell): there is nothing to "
-            "explain",
-        ),
+        ("eventually within 1 min double.output < 0", TOO_SHORT),
     ],
 )
 def test_mistakes(model: Path, monitor: str, message: str) -> None:
