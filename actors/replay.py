@@ -35,7 +35,7 @@ class Replay(Actor):
     output = OutputPort(doc="the value of a row, or a mapping of its values")
 
     file = Parameter(Path, doc="a .csv file with a header line, or a .parquet file")
-    time = Parameter(str, "time", doc="the column of times, in s, ascending from 0 on")
+    time = Parameter(str, "time", doc="the column of times, in s, ascending and >= 0")
     columns: Parameter[Any] = texts_parameter(None, doc="the columns to send; all except the time if left out")
 
     def check(self) -> None:

@@ -119,7 +119,7 @@ class PID(Actor):
 
     def check(self) -> None:
         if self.low > self.high:
-            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must not be above high")
         if self.tracking_time is not None and self.anti_windup != "back_calculation":
             raise ParameterError(
                 f"tracking_time: it is for 'anti_windup: back_calculation', but anti_windup is {self.anti_windup}"

@@ -144,7 +144,7 @@ def weibull(bits: Bits, a: float) -> float:
 
 
 def pareto(bits: Bits, a: float) -> float:
-    """Lomax (Pareto II) with shape ``a``, from 0 on; add 1 for the classical law from 1 on."""
+    """Lomax (Pareto II) over [0, inf) with shape ``a``; add 1 for the classical Pareto law over [1, inf)."""
     _positive(a=a)
     return expm1(standard_exponential(bits) / a)
 
