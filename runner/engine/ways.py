@@ -31,6 +31,7 @@ from epicycle.aspects import (
 from ..graph import Clock, Hop, ModelGraph, WovenAspect
 from ..results import EventLog, Signal
 from ..text import describe
+from .acts import Acts, Named
 from .aspect_context import EngineContext
 from .director import Director
 from .directors import Directors
@@ -54,7 +55,7 @@ class Ways:
 
     ``actors`` and ``aspects`` are those of the run; of the ``graph`` nothing is changed.
     ``listeners`` are told of every token that leaves the port of their path, be it an actor's or a composite's.
-    ``signals`` is where aspects record what they see.
+    ``signals`` is where aspects record what they see, ``acts`` what they do if that is to have names.
     """
 
     def __init__(
@@ -66,8 +67,10 @@ class Ways:
         log: EventLog,
         listeners: dict[str, list[Deliver | Way]],
         signals: dict[str, Signal],
+        acts: Acts | None = None,
     ) -> None:
         self.graph = graph
+        self.acts = acts
         self.actors = actors
         self.director = director
         self.log = log
@@ -287,7 +290,7 @@ class Ways:
         aspect = woven.aspect
         assert isinstance(aspect, PortAspect)
         point = self._point(JoinPoint, woven, aspect, path, onward.go, place or path, source)
-        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()")
+        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()", place or path)
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
         """``onward`` with the aspects that stand at an actor before it, the first declared outermost."""
@@ -296,15 +299,22 @@ class Ways:
             assert isinstance(aspect, ExecutionAspect)
             point = self._point(ActorPoint, woven, aspect, path, onward, path)
             self._join(point, woven, aspect)
-            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()").go
+            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()", path).go
         return onward
 
     def _guarded(
-        self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
-    ) -> Guarded:
+        self,
+        woven: WovenAspect,
+        aspect: JoinPointAspect[T, P],
+        act: Callable[[T, P], None],
+        point: P,
+        name: str,
+        place: str,
+    ) -> Way:
         """What an aspect does with all that comes to a join point; an error in it is reported with its ``name``."""
         holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
-        return Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
+        guarded = Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
+        return guarded if self.acts is None else Named(guarded, self.acts, place)
 
     def _is_active(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
         return aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)
