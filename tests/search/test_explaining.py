@@ -39,7 +39,10 @@ monitors:
 """
 
 
-TOO_SHORT = "monitor property cannot be judged in this run of relay (the run was too short to tell): there is nothing to explain"
+TOO_SHORT = (
+    "monitor property cannot be judged in this run of relay (the run was too short to tell): there is nothing "
+    "to explain"
+)
 
 
 @pytest.fixture
