@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -42,14 +42,16 @@ class Backlog:
     depends on neither the number of workers nor their speed.
     """
 
-    def __init__(self, plan: Plan, known: Mapping[str, Done]) -> None:
+    def __init__(self, plan: Plan, known: Mapping[str, Done], chosen: Iterable[Task] | None = None) -> None:
+        """``chosen`` runs are made instead of all."""
         self.plan = plan
         self.known = known
         self.there: Counter[str] = Counter()  # the runs that were there already, by status
         self.made: Counter[str] = Counter()  # and those that were made
         self.stopped_early = 0  # runs that were not needed
-        self._conditions = iter(plan)  # that are still to come
-        self._open: dict[int, Iterator[Task | None]] = {}  # the runs of conditions that are begun
+        # The conditions that are still to come, and the runs of those that are begun.
+        self._conditions = iter(plan if chosen is None else ())
+        self._open: dict[int, Iterator[Task | None]] = {} if chosen is None else {-1: iter(chosen)}
         self._running: Counter[int] = Counter()  # how many, by condition
         self._values: dict[int, list[float]] = {}  # of the metric that decides, by condition
         self._again: deque[Task] = deque()
