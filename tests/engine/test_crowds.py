@@ -49,7 +49,7 @@ def test_duplicates_one_upon_the_other() -> None:
         "actors:\n  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\n"
         f"aspects:\n{stack}"
     )
-    most = "more than 10,000 tokens that are on their way, most of them at aspect d2"
+    most = "more than 10,000 tokens on their way, most of them at aspect d2"
     assert told == f"too much at (0 s, 3): {most}; {RAISE_IT}"
 
 
@@ -62,7 +62,7 @@ def test_duplicates_that_come_apart_in_time() -> None:
         "actors:\n  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\n"
         f"aspects:\n{stack}"
     )
-    most = "more than 50,000 tokens that are on their way, to all times, most of them at aspect d4"
+    most = "more than 50,000 tokens on their way, over all times, most of them at aspect d4"
     assert told == f"too much at (2e-09 s, 1): {most}; {RAISE_IT}"
 
 

@@ -72,7 +72,7 @@ def test_the_real_clock() -> None:
 def test_a_pace_that_is_none(factor: float) -> None:
     with pytest.raises(ValueError, match="a pace is") as caught:
         Pace(factor)
-    message = f"a pace is a number of model seconds in a second, 1e-09 or more, not {factor:g}"
+    message = f"a pace is a number of model seconds per second, 1e-09 or more, not {factor:g}"
     assert str(caught.value) == message
 
 
