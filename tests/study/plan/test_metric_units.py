@@ -120,7 +120,7 @@ metrics:
         "3 errors in walks.yaml"
     )
     assert problems_of(path, "\n".join(line for line in study.splitlines() if line[:4] not in ("  e:", "  f:"))) == (
-        "walks.yaml:9:27: error: metric a: place counts in m, not in s\n"
+        "walks.yaml:9:27: error: metric a: place has the unit m, not s\n"
         "    9 |   a: {value: place, unit: s}\n"
         "      |                           ^\n"
         "   help: leave 'unit' out; 'to: ...' converts\n"

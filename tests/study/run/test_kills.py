@@ -116,7 +116,7 @@ def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert said == f"interrupted; what was finished is kept: 'epicycle resume {out}' goes on\n"
+    assert said == f"interrupted; finished runs are kept: 'epicycle resume {out}' continues\n"
     assert 0 < len(rows(out)) < 10
     deadline = time.monotonic() + 30
     while members(process.pid) and time.monotonic() < deadline:
