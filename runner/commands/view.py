@@ -24,14 +24,16 @@ if TYPE_CHECKING:
 
 @command(
     "show a run in a browser: space, graph, signals, and what caused what",
-    option(
-        "model", metavar="MODEL or RESULTS", nargs="+", help="one or two models, or folders that runs were written to"
-    ),
+    option("model", metavar="MODEL or RESULTS", nargs="+", help="one or two models, or results folders of runs"),
     *CHANGES,
     SEED,
     option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
     option(
-        "-o", "--out", metavar="FILE", type=Path, help="the page (default: results/MODEL/view.html, which is opened)"
+        "-o",
+        "--out",
+        metavar="FILE",
+        type=Path,
+        help="write the page to FILE (default: results/MODEL/view.html, which is opened in the browser)",
     ),
     option("--mcap", metavar="FILE", type=Path, help="write the run for Foxglove or Lichtblick; no page without -o"),
     option("--rerun", metavar="FILE", type=Path, help="write the run for rerun; no page without -o"),
@@ -40,8 +42,8 @@ if TYPE_CHECKING:
 def view(options: argparse.Namespace) -> int:
     """Run a model and write a page that shows the run: it needs no network, and any browser opens it.
 
-    For a folder of results the run is made again, as its manifest says.  Two runs are shown side by side, with the
-    first difference between them.  --mcap and --rerun write the run for other viewers.
+    For a results folder, the run recorded in its manifest is repeated.  Two runs are shown side by side, with the first
+    difference between them.  --mcap and --rerun write the run for other viewers.
     """
     from epicycle.actors import EpicycleError
 
@@ -84,7 +86,7 @@ def view(options: argparse.Namespace) -> int:
 
 
 def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recording, Path], None]]]:
-    """The files for other viewers, and what writes them; what stands against that is said before a run."""
+    """The files for other viewers and the functions that write them; obstacles are reported before a run."""
     from epicycle.actors import EpicycleError
 
     from ..show.view import require_mcap, require_rerun, write_mcap, write_rerun
@@ -105,9 +107,9 @@ def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recordin
 
 
 def _as_before(options: argparse.Namespace) -> str:
-    """Make options those of the run of which a folder holds the results; the digest of that run.
+    """Set the options to those of the run whose results are in the folder; the digest of that run.
 
-    What is said beside the folder counts on top.
+    Options given beside the folder are added.
     """
     from epicycle.actors import EpicycleError, read_regular
 
@@ -116,9 +118,9 @@ def _as_before(options: argparse.Namespace) -> str:
         manifest = json.loads(read_regular(path))
         before, digest = [str(each) for each in manifest["command"]], str(manifest["digest"])
     except FileNotFoundError:
-        raise EpicycleError(f"{options.model} holds no results of a run: there is no manifest.json in it") from None
+        raise EpicycleError(f"{options.model} holds no results of a run: it has no manifest.json") from None
     except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
-        raise EpicycleError(f"{path} is no manifest of a run: {error}") from None
+        raise EpicycleError(f"{path} is not the manifest of a run: {error}") from None
     if before[1:2] != ["run"]:
         raise EpicycleError(f"{options.model} holds results of 'epicycle {' '.join(before[1:2])}', not of a run")
     known = argparse.ArgumentParser(exit_on_error=False)
@@ -128,10 +130,12 @@ def _as_before(options: argparse.Namespace) -> str:
         with redirect_stderr(StringIO()):
             given, _ = known.parse_known_args(before[2:])
     except (argparse.ArgumentError, SystemExit):
-        raise EpicycleError(f"{path} names a command that this version does not know: {shlex.join(before)}") from None
-    if given.types and not options.types:  # code, which nobody but the caller asks for
+        raise EpicycleError(f"{path} names a command that is unknown to this version: {shlex.join(before)}") from None
+    if given.types and not options.types:  # they are code, which only the caller may allow to run
         files = " ".join(f"--types {shlex.quote(file)}" for file in given.types)
-        raise EpicycleError(f"the run in {options.model} used types of its own\n   help: add {files}")
+        raise EpicycleError(
+            f"the run in {options.model} used types of its own\n   help: to let their code run, add {files}"
+        )
     is_same = True
     for name in ("set", "overrides", "disturb", "aspect", "without"):
         is_same &= not getattr(options, name)

@@ -95,7 +95,7 @@ def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> No
     assert process.returncode == 130
     assert said == (
         f"{NO_END}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until\n"
-        "what was recorded until then is in out\ninterrupted\n"
+        "what was recorded before is in out\ninterrupted\n"
     )
     manifest = json.loads((folder / "out" / "manifest.json").read_text())
     assert (manifest["stopped"], manifest["error"]) == ("interrupted", "interrupted")
@@ -108,7 +108,7 @@ def test_a_study_of_a_model_without_an_end_is_warned_of(folder: Path, caplog: py
     (folder / "s.yaml").write_text("study: s\nmodel: ./tick.yaml\nmetrics: {number: events}\n")
     assert main(["validate", "s.yaml"]) == 0
     assert [record.getMessage() for record in caplog.records] == [
-        f"warning: {NO_END}\n   help: set 'stop' in its section 'run'; --run-timeout gives up runs"
+        f"warning: {NO_END}\n   help: set 'stop' in its section 'run'; --run-timeout ends runs that take too long"
     ]
 
 

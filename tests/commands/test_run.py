@@ -164,16 +164,16 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
         ),
         (
             ("run", "collision_avoidance", "--log", "log.txt"),
-            "error: log.txt is no log file: its name must end in .parquet, .csv, .jsonl\n",
+            "error: log.txt is not a log file: its name must end in .parquet, .csv, .jsonl\n",
         ),
         (
             ("run", "collision_avoidance", "--log-where", "aspect=packet_loss"),
-            "error: --log-where aspect=packet_loss needs --log FILE, to which the log is written\n",
+            "error: --log-where aspect=packet_loss needs --log FILE, the file to write the log to\n",
         ),
         (
             ("run", "collision_avoidance", "--log", "log.csv", "--log-where", "aspect=packet_los"),
             (
-                "error: aspect=packet_los fits no aspect of the model, did you mean 'packet_loss'?; "
+                "error: aspect=packet_los matches no aspect of the model, did you mean 'packet_loss'?; "
                 "aspects: plans_due, plans_heard, packet_loss, measurement_failure\n"
             ),
         ),

@@ -46,12 +46,12 @@ def test_trace_in_columns(model: str, capsys: pytest.CaptureFixture[str]) -> Non
     assert (
         capsys.readouterr().out
         == """\
-(0 s, 1)           clock      <- wake-up                       asked for in initialize
+(0 s, 1)           clock      <- wake-up                       requested in initialize
                               -> output                        0
 (0.1 s, 1)         room.merge <- input[0]   clock.output       0  sent at (0 s, 1)
                               -> output                        0
 (0.35 s, 1)        sink       <- input[0]   room.merge.output  0  sent at (0.1 s, 1)
-(0.5 s, 1)         clock      <- wake-up                       asked for at (0 s, 1)
+(0.5 s, 1)         clock      <- wake-up                       requested at (0 s, 1)
                               -> output                        1
 (0.6 s, 1)         room.merge <- input[0]   clock.output       1  sent at (0.5 s, 1)
                               -> output                        1
@@ -129,7 +129,7 @@ def test_an_interrupted_run_keeps_what_it_recorded(
     monkeypatch.setattr(Pace, "wait_for", wait_for)
     folder, log = tmp_path / "out", tmp_path / "log.jsonl"
     assert main(["run", model, "--realtime", "--out", str(folder), "--log", str(log)]) == 130
-    assert capsys.readouterr().err == f"what was recorded until then is in {folder}\ninterrupted\n"
+    assert capsys.readouterr().err == f"what was recorded before is in {folder}\ninterrupted\n"
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     assert (manifest["stopped"], manifest["error"], manifest["end"]) == ("interrupted", "interrupted", 0.5)
     assert len(log.read_text(encoding="utf-8").splitlines()) == manifest["events"] > 0

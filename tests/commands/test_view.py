@@ -90,23 +90,23 @@ def test_a_run_that_fails_is_shown_up_to_there(capsys: pytest.CaptureFixture[str
 
 def test_what_is_no_result_of_a_run(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("empty").mkdir()
-    message = "error: empty holds no results of a run: there is no manifest.json in it\n"
+    message = "error: empty holds no results of a run: it has no manifest.json\n"
     assert said(capsys, "empty", code=2) == message
     (Path("empty") / "manifest.json").write_text("{", encoding="utf-8")
     broken = said(capsys, "empty", code=2)
-    assert broken.startswith("error: empty/manifest.json is no manifest of a run: Expecting property name")
+    assert broken.startswith("error: empty/manifest.json is not the manifest of a run: Expecting property name")
     told = {"command": ["epicycle", "study", "table_1"], "digest": ""}
     (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
     assert said(capsys, "empty", code=2) == "error: empty holds results of 'epicycle study', not of a run\n"
     told = {"command": ["epicycle", "run", line, "--types", "own.py"], "digest": ""}
     (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
     assert said(capsys, "empty", code=2) == (
-        "error: the run in empty used types of its own\n   help: add --types own.py\n"
+        "error: the run in empty used types of its own\n   help: to let their code run, add --types own.py\n"
     )
     told = {"command": ["epicycle", "run", line, "--unheard", "--seed"], "digest": ""}
     (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
     assert said(capsys, "empty", code=2) == (
-        "error: empty/manifest.json names a command that this version does not know: "
+        "error: empty/manifest.json names a command that is unknown to this version: "
         "epicycle run line.yaml --unheard --seed\n"
     )
 
