@@ -49,7 +49,7 @@ def table(
     class_: str | None = None,
     scopes: bool = True,
 ) -> Html:
-    """A table whose first ``names`` columns are headers of its rows; with ``scopes``, screen readers are told."""
+    """A table whose first ``names`` columns are headers of its rows; with ``scopes``, screen readers know them."""
 
     def heading(cell: Content, scope: str) -> Html:
         return tag("th", cell, scope=scope if scopes else None)
