@@ -16,7 +16,7 @@ from .printing import complain, complain_traceback, open_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input."""
+    """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input, 3 a monitor is broken."""
     if arguments is None:  # run as a program, not called by one
         return leave(_run(sys.argv[1:], is_program=True))
     return _run(arguments, is_program=False)

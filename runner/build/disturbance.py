@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
 
 from ..catalogue import installed
-from ..graph import WovenAspect
+from ..graph import ActName, WovenAspect
 from ..language import (
     PARAMETER_THERE,
     CompositeText,
@@ -18,6 +18,7 @@ from ..language import (
     settings_in,
 )
 from ..text import Mapping, Position, Problems, node_of
+from .acts import acts_of
 from .draft import Draft
 from .scope import Building
 from .settle import Settler
@@ -27,8 +28,8 @@ from .weave_all import weave_all
 
 def disturb(
     model: Building, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
-) -> tuple[Draft, list[WovenAspect]]:
-    """The model's draft with the aspects of a disturbance, and these; raises ``ModelError``."""
+) -> tuple[Draft, list[WovenAspect], frozenset[ActName] | None]:
+    """The model's draft with the aspects of a disturbance, these, and the only acts; raises ``ModelError``."""
     problems = Problems()
     disturbance = load_disturbance(name, problems)
     problems.raise_if_any()
@@ -54,5 +55,7 @@ def disturb(
     made.body("", root, settler.parameters("", root, {}, {}, None))
     found = weave_all(made)
     settler.check_unused(made.draft)
+    exactly = disturbance.exactly
+    acts = None if exactly is None else acts_of(exactly, [*model.aspects, *found], problems)
     problems.raise_if_any()
-    return made.draft, found
+    return made.draft, found, acts

@@ -30,6 +30,7 @@ from ..language import (
 )
 from ..text import NORMAL, Limits, Problems, call_site, node_of
 from ..text import Mapping as MappingNode
+from .acts import acts_of
 from .checks import check
 from .draft import Draft
 from .figures import figures_of
@@ -117,6 +118,8 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         settler.check_unused(made.draft)
         check(made.draft, problems)
         check_processors(woven, made.draft.graph, problems)
+        if text.exactly is not None:
+            model.exactly = acts_of(text.exactly, woven, problems)
         model.adopt(made.draft, woven, Watching(made.draft, values, problems).read(text, names))
         # Numbers are plain ones, in the units that the model declares.
         model.parameters = {

@@ -48,7 +48,7 @@ class Looks(View):
                 if isinstance(parameter, PortsParameter):
                     reads += [port for ports_found in found.values() for port in ports_found]
             elif isinstance(value, PortFormula):
-                readings[value] = [self._reading(name, each, position) for each in value.references]
+                readings[value] = [self.reading(name, each, position) for each in value.references]
                 for reference, fields in value.given_fields:
                     self._check_given(name, reference, fields, ports, position)
         asked = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
@@ -77,7 +77,7 @@ class Looks(View):
             self._problem(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
         return fitting
 
-    def _reading(self, name: str, reference: str, position: Position | None) -> Reading:
+    def reading(self, name: str, reference: str, position: Position | None) -> Reading:
         """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
         parts = self._full(reference).split(".")
         for length in range(len(parts), 1, -1):

@@ -13,9 +13,11 @@ from epicycle.actors import EpicycleError, Stop, Tag, counted, declared_paramete
 from ..catalogue import MetricOptions, TakeName, take_problem
 from ..collection import without_collection
 from ..graph import (
+    ActName,
     Like,
     Metric,
     ModelGraph,
+    Monitor,
     Postings,
     Rules,
     Ties,
@@ -29,6 +31,7 @@ from ..graph import (
 from ..language import ParameterText, Values
 from ..shown import short
 from ..tables import Table, Tabled
+from ..temporal import RequirementOptions
 from ..text import NAME, NAMES_HAVE, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
@@ -89,6 +92,8 @@ class Model(Scope, Tabled):
         self.seed = checked_seed(seed)
         self.recorded: list[str] = []
         self.metrics: list[Metric] = []
+        self.monitors: list[Monitor] = []
+        self.exactly: frozenset[ActName] | None = None  # the only acts of aspects that happen
         self.figures: dict[str, DeclaredFigure] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
         self.is_checked = False  # since the last change
@@ -142,8 +147,10 @@ class Model(Scope, Tabled):
         """
         from .disturbance import disturb
 
-        draft, found = disturb(self, str(disturbance), set or {}, types, call_site())
+        draft, found, acts = disturb(self, str(disturbance), set or {}, types, call_site())
         self.adopt(draft, found)
+        if acts is not None:
+            self.exactly = (self.exactly or frozenset()) | acts
         return found
 
     # -- what is watched ------------------------------------------------------------------------------------------
@@ -172,6 +179,22 @@ class Model(Scope, Tabled):
         problems.raise_if_any()
         values = {"take": take, **options}
         self._watch([of], lambda watching, text: watching.metric(name, text, values, position))
+
+    def monitor(self, name: str, property: str, **options: Unpack[RequirementOptions]) -> None:
+        """A property that every run is to have; docs/language.md says how one is written.
+
+        >>> model.monitor("safe", "always clearance.distance >= 2 m", stop=True)
+        """
+        position = call_site()
+        with raising() as problems:
+            if not NAME.match(name):
+                problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
+            watching = Watching(self.draft, Values(problems), problems)
+            for metric in (name, f"{name}_robustness"):
+                if any(each.name == metric for each in self.metrics):
+                    problems.add(f"there is a metric {metric!r} already", position, "give the monitor another name")
+            watching.monitor(name, {"property": property, **options}, position)
+        self._add(watching.found)
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
         """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
@@ -244,6 +267,7 @@ class Model(Scope, Tabled):
         self.recorded = [*self.recorded, *watched.recorded]
         self.stop_ports = [*self.stop_ports, *watched.stop_ports]
         self.metrics = [*self.metrics, *watched.metrics]
+        self.monitors = [*self.monitors, *watched.monitors]
 
     def scope(self, path: str) -> Composite:
         return self._scopes.setdefault(path, Composite(self, path))
@@ -258,7 +282,9 @@ class Model(Scope, Tabled):
         ]
         self.recorded = [port for port in self.recorded if not is_within(port, path)]
         self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
-        self.metrics = [metric.without(path) for metric in self.metrics]
+        gone = {each.name for each in self.monitors if any(is_within(port, path) for port in each.ports)}
+        self.monitors = [each for each in self.monitors if each.name not in gone]
+        self.metrics = [metric.without(path) for metric in self.metrics if metric.monitor not in gone]
 
     # -- for people -----------------------------------------------------------------------------------------------
 

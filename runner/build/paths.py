@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from ..graph import ModelGraph
@@ -45,13 +45,14 @@ class Paths:
 
 @dataclass
 class View:
-    """A model as one aspect sees it: names are relative to ``scope``, the composite that declares the aspect."""
+    """A model as one aspect or monitor sees it: names are relative to ``scope``, the composite that declares it."""
 
     draft: Draft
     paths: Paths
     name: str
     scope: str
     problems: Problems
+    called: str = field(default="aspect", kw_only=True)
 
     @property
     def graph(self) -> ModelGraph:
@@ -68,4 +69,4 @@ class View:
         self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
     ) -> None:
         position = where.position if isinstance(where, (PointcutText, Text)) else where
-        self.problems.add(f"aspect {self.name}: {message}", position, *hints, scope=self.scope, about=about)
+        self.problems.add(f"{self.called} {self.name}: {message}", position, *hints, scope=self.scope, about=about)

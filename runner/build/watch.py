@@ -9,7 +9,7 @@ from epicycle.actors import Parameter, ParameterError, accepts, declared_paramet
 
 from ..catalogue import Measure
 from ..graph import Metric, Watched
-from ..language import MetricText, ModelText, Values
+from ..language import MetricText, ModelText, MonitorText, Values
 from ..text import (
     MAX_SEED,
     RAISE_IT,
@@ -26,6 +26,7 @@ from ..text import (
     plain,
 )
 from .draft import Draft
+from .monitors import monitor_of
 from .settle import converted, nanoseconds
 
 # Larger seeds could not be told apart in the int64 columns of result files.
@@ -63,6 +64,8 @@ class Watching:
                 setattr(self.found, "stop_time" if key == "stop" else "seed", value)
         for metric in text.metrics:
             self._read_metric(metric, names)
+        for monitor in text.monitors:
+            self._read_monitor(monitor, names)
         return self.found
 
     def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
@@ -76,6 +79,14 @@ class Watching:
         places = {key: entry.value.position for key, entry in text.values.items()}
         if self.values.missing not in values.values():
             self.metric(text.name, text.port, values, text.position, places)
+
+    def _read_monitor(self, text: MonitorText, names: dict[str, object]) -> None:
+        values: dict[str, object] = {}
+        for key, entry in text.values.items():
+            values[key] = self.values.of(entry.value, names, f"monitor {text.name}, {key}")
+        places = {key: entry.value.position for key, entry in text.values.items()}
+        if self.values.missing not in values.values():
+            self.monitor(text.name, values, text.position, places)
 
     def record(self, text: Text) -> None:
         """Keep what the ports behind a pattern send."""
@@ -123,6 +134,21 @@ class Watching:
                     message = f"{what}: {path} sends {type_name(port.type)}, of which there is no {measure.take!r}"
                     self.problems.add(message, of.position, "name a port that sends numbers, or take 'count'")
                     return
+
+    def monitor(
+        self, name: str, values: Mapping[str, object], position: Position, places: Mapping[str, Position] | None = None
+    ) -> None:
+        """Judge the runs by a property; ``places``: where what is said of it stands."""
+        found = monitor_of(self.draft, name, values, places or {}, position, self.problems)
+        if found is None:
+            return
+        self._watched += len(found.ports)
+        for metric in found.metrics:
+            if any(each.name == metric.name for each in self.found.metrics):
+                message = f"monitor {name}: there is a metric {metric.name!r}, as which its results would be known"
+                self.problems.add(message, position, "rename one of the two")
+        self.found.monitors.append(found)
+        self.found.metrics += found.metrics
 
     def _measure(
         self, what: str, options: Mapping[str, object], position: Position, places: Mapping[str, Position]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from ..build import Model
 
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
 
 Option = Callable[[argparse.ArgumentParser], object]
 Run = Callable[[argparse.Namespace], int]

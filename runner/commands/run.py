@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from ..printing import console, tell, tell_json
-from .options import MODEL, SEED, command, complain_of, load, number, option, several
+from .options import BROKEN, MODEL, SEED, command, complain_of, load, number, option, several
 
 
 def factor(text: str) -> float:
@@ -50,6 +50,7 @@ def factor(text: str) -> float:
         "each column that has any",
     ),
     option("--json", action="store_true", help="print one JSON object instead of the table"),
+    option("--check", action="store_true", help="exit with code 3 if a monitor of the model is broken"),
     imports=("calls.running", "show"),
 )
 def run(options: argparse.Namespace) -> int:
@@ -84,4 +85,6 @@ def run(options: argparse.Namespace) -> int:
         console().print(summary_table(model, done.results))
         for path in done.written:
             tell(f"wrote {path}")
-    return complain_of(done.failed, options)
+    code = complain_of(done.failed, options)
+    broken = any(verdict.holds is False for verdict in done.results.monitors.values())
+    return BROKEN if options.check and broken and not code else code

@@ -27,6 +27,7 @@ token; and tokens that an actor does not read do not stay in the port, unless it
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from epicycle.actors import InputPort, Moment, Posts, Process, Ranks, Tag, Times, Wake, Way, new_wake
@@ -53,6 +54,7 @@ class Director:
         "_all_at_once", "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
         "_most_times", "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent",
         "_stop_after", "_time", "_times", "_turns", "crowd", "firings", "posters", "present", "ranks", "seed", "steps",
+        "watch",
     )  # fmt: skip
 
     def __init__(
@@ -88,6 +90,8 @@ class Director:
         self._reason = "no events left"
         self._recent: list[str] | None = None  # actors that fire while time seems to stand still
         self._is_interrupted = False
+        # Called with the time (ns) before it advances there; true if the run is to end instead.
+        self.watch: Callable[[int], bool] | None = None
         self._most_microsteps = errors.MAX_MICROSTEPS
         self._most_steps = errors.MAX_STEPS  # of SimPy at one instant
 

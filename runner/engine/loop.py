@@ -61,8 +61,11 @@ def handle_events(
             if pace is not None:
                 pace.wait_for(last_time)
             return "stop time"
-        if pace is not None and upcoming > now:
-            pace.wait_for(upcoming)
+        if upcoming > now:
+            if director.watch is not None and director.watch(upcoming):
+                break
+            if pace is not None:
+                pace.wait_for(upcoming)
         try:
             if director._is_interrupted:
                 raise KeyboardInterrupt

@@ -17,6 +17,7 @@ from ..graph import WovenAspect
 from ..interrupt import between_steps
 from ..results import EventLog, Record, Results, Signal
 from ..text import describe, raised_at
+from .acts import Acts
 from .copies import Copies
 from .director import Director
 from .errors import ActorError
@@ -24,6 +25,7 @@ from .forms import attach
 from .listeners import Measuring, Recording
 from .loop import handle_events
 from .measurement import Measurement
+from .monitoring import Listening, Monitoring
 from .pace import Pace
 from .trace import Tracer, TracingDirector, TracingLog
 from .way import Deliver
@@ -45,6 +47,7 @@ class Run:
         keeps: Keeps | None = None,
         log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
+        acts: Acts | None = None,
     ) -> None:
         self.model = model
         self.seed = seed
@@ -52,6 +55,9 @@ class Run:
         self.is_begun = self.is_over = False
         self.stopped = ""  # why the run is over, once it is
         self._tracer = tracer
+        if acts is None and model.exactly is not None:
+            acts = Acts(model.exactly)
+        self.acts = acts  # of aspects, where they have names
         self._stop: int | None = None  # the time (ns) up to which it has been allowed to run
         self._spent = 0.0  # s of the wall clock
         self._initialized: list[Actor] = []
@@ -66,7 +72,8 @@ class Run:
         self.log.crowd = self.director.crowd.add
         self.signals = {name: Signal(name) for name in model.recorded}
         self._units = {metric.name: metric.unit for metric in model.metrics}
-        self._measurements = {metric.name: Measurement(metric) for metric in model.metrics}
+        self._measurements = {metric.name: Measurement(metric) for metric in model.metrics if not metric.monitor}
+        self._monitorings = {monitor.name: Monitoring(monitor) for monitor in model.monitors}
         try:
             with without_collection():
                 self.outside: list[object] = [model, model.graph]  # with everything else that leads there
@@ -75,7 +82,7 @@ class Run:
                 self.aspects = [replace(woven, aspect=copies.of(woven.aspect)) for woven in model.aspects]
                 listeners = self._listeners()
                 self._ways = Ways(
-                    model.graph, self.actors, self.aspects, self.director, self.log, listeners, self.signals
+                    model.graph, self.actors, self.aspects, self.director, self.log, listeners, self.signals, self.acts
                 )
         except ActorError as error:  # from a clock whose error cannot be computed
             raise self._placed(error) from _cause(error)
@@ -88,9 +95,15 @@ class Run:
         for name, signal in self.signals.items():
             found.setdefault(name, []).append(Recording(signal.samples, self.director))
         for metric in self.model.metrics:
-            for path in metric.ports:
+            for path in metric.ports if not metric.monitor else ():
                 measuring = Measuring(self._measurements[metric.name], path, self.director)
                 found.setdefault(path, []).append(measuring)
+        for monitor in self.model.monitors:
+            for path in monitor.ports:
+                listening = Listening(self._monitorings[monitor.name], path, self.director)
+                found.setdefault(path, []).append(listening)
+        if any(monitor.requirement.stop for monitor in self.model.monitors):
+            self.director.watch = self._stop_if_broken
         for path in self.model.stop_ports:
             found.setdefault(path, []).append(partial(self._ask_to_stop, path))
         return found
@@ -101,6 +114,17 @@ class Run:
                 self.director.stop("stop_when")
         except ValueError as error:  # arrays are neither true nor false
             raise ActorError("stop_when", self.director.tag, f"asking {path}", describe(error)) from error
+
+    def _stop_if_broken(self, upcoming: int) -> bool:
+        """Before the time advances: end the run if a monitor that asks for it is broken."""
+        found = False
+        for name, monitoring in self._monitorings.items():
+            if monitoring.monitor.requirement.stop:
+                monitoring.settle(upcoming)
+                if monitoring.is_broken:
+                    self.director.stop(f"monitor {name}")
+                    found = True
+        return found
 
     # -- running --------------------------------------------------------------------------------------------------
 
@@ -178,7 +202,13 @@ class Run:
         if stopped == "stop time" and self._stop is not None:
             end = max(end, self._stop)  # the values at the last event last until then
         # Of copies, because reading a measurement ends it.
-        outcomes = {name: Copies().of(each).outcome(end) for name, each in self._measurements.items()}
+        verdicts = {name: Copies().of(each).verdict(end) for name, each in self._monitorings.items()}
+        outcomes = {}
+        for metric in self.model.metrics:
+            if (verdict := verdicts.get(metric.monitor)) is None:
+                outcomes[metric.name] = Copies().of(self._measurements[metric.name]).outcome(end)
+            else:
+                outcomes[metric.name] = verdict.outcome(metric.name == metric.monitor)
         return Results(
             model=self.model.name,
             seed=self.seed,
@@ -194,6 +224,8 @@ class Run:
             units=dict(self._units),
             outcomes=outcomes,
             figures=dict(self.model.figures),
+            monitors=verdicts,
+            acts=[] if self.acts is None else self.acts.noted,
         )
 
     def _call(self, actor: Actor, method: str) -> None:

@@ -14,6 +14,7 @@ from ..collection import without_collection
 from ..graph import WovenAspect
 from ..results import EventLog, Record, Results, Signal
 from ..tables import Table, Tabled
+from .acts import Acts
 from .copies import Copies
 from .director import Director
 from .log_filter import LogFilter
@@ -41,12 +42,15 @@ class Snapshot:
         has_processes = run.is_begun and any(isinstance(actor, Process) for actor in run.actors.values())
         self.run = None if has_processes else _copy(run)  # a copy that does not run
         self._keeps = run.keeps
+        self._named = run.acts is not None
+        self._exactly = None if run.acts is None else run.acts.exactly
 
     def again(self) -> Run:
         """A run that continues from here; raises ``SnapshotError``."""
         if self.run is not None:
             return _copy(self.run)
-        run = Run(self.model, self.seed, self._keeps)
+        acts = Acts(self._exactly) if self._named else None
+        run = Run(self.model, self.seed, self._keeps, acts=acts)
         run.go(None, most=self._steps)
         if (run.director.last, run.log.digest) != (self.tag, self._digest):
             raise SnapshotError(
@@ -71,7 +75,8 @@ class Simulation(Tabled):
     The model is compiled into actors, aspects and ways of this run alone: any number of simulations of a model can run
     at once, in turn or in threads.  ``simulation["sink"]``, or ``simulation[sink]`` with the object that was added to
     the model, is the actor of this run.  ``keep_log`` keeps the records of the event log, all or those that pass a
-    ``LogFilter``; ``log_to``, such as ``LogFile.add``, receives them instead.
+    ``LogFilter``; ``log_to``, such as ``LogFile.add``, receives them instead.  With ``acts``, the acts of aspects on
+    single tokens have names, and some of them can be left out.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
@@ -84,6 +89,7 @@ class Simulation(Tabled):
         keep_log: bool | LogFilter = False,
         log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
+        acts: Acts | None = None,
     ) -> None:
         model.check()
         if keep_log is True:
@@ -96,7 +102,7 @@ class Simulation(Tabled):
         self.model = model
         self._is_told_of = log_to is not None or tracer is not None
         self._parts = _parts(model.graph.actors, model.aspects)
-        self._run = Run(model, seed, keep_log.keeps if keep_log else None, log_to, tracer)
+        self._run = Run(model, seed, keep_log.keeps if keep_log else None, log_to, tracer, acts)
 
     def __repr__(self) -> str:
         return f"<Simulation of {self._caption()}>"

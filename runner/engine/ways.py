@@ -31,6 +31,7 @@ from epicycle.aspects import (
 from ..graph import Clock, Hop, ModelGraph, WovenAspect
 from ..results import EventLog, Signal
 from ..text import describe
+from .acts import Acts, Named
 from .aspect_context import EngineContext
 from .director import Director
 from .directors import Directors
@@ -53,7 +54,8 @@ class Ways:
     """The effect of ``send`` at each port of a run: through delays, borders and join points to the receivers.
 
     ``actors`` and ``aspects`` are those of the run; the ``graph`` is not changed.  ``listeners`` get every token that
-    leaves the port with their path, of an actor or a composite.  ``signals`` is where aspects record what they see.
+    leaves the port with their path, of an actor or a composite.  ``signals`` is where aspects record what they see,
+    ``acts`` what they do if that is to have names.
     """
 
     def __init__(
@@ -65,8 +67,10 @@ class Ways:
         log: EventLog,
         listeners: dict[str, list[Deliver | Way]],
         signals: dict[str, Signal],
+        acts: Acts | None = None,
     ) -> None:
         self.graph = graph
+        self.acts = acts
         self.actors = actors
         self.director = director
         self.log = log
@@ -286,7 +290,7 @@ class Ways:
         aspect = woven.aspect
         assert isinstance(aspect, PortAspect)
         point = self._point(JoinPoint, woven, aspect, path, onward.go, place or path, source)
-        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()")
+        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()", place or path)
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
         """``onward`` preceded by the aspects at an actor, the first declared outermost."""
@@ -295,15 +299,22 @@ class Ways:
             assert isinstance(aspect, ExecutionAspect)
             point = self._point(ActorPoint, woven, aspect, path, onward, path)
             self._join(point, woven, aspect)
-            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()").go
+            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()", path).go
         return onward
 
     def _guarded(
-        self, woven: WovenAspect, aspect: JoinPointAspect[T, P], act: Callable[[T, P], None], point: P, name: str
-    ) -> Guarded:
+        self,
+        woven: WovenAspect,
+        aspect: JoinPointAspect[T, P],
+        act: Callable[[T, P], None],
+        point: P,
+        name: str,
+        place: str,
+    ) -> Way:
         """The act of an aspect on what comes to a join point; an error in it is reported with its ``name``."""
         holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
-        return Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
+        guarded = Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
+        return guarded if self.acts is None else Named(guarded, self.acts, place)
 
     def _is_active(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
         return aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)

@@ -1,17 +1,20 @@
 """The frozen model: actors, composites, ports and connections, aspects at their places, what is watched, and ranks."""
 
+from .acts import Act, ActName
 from .clock import Clock
 from .digraph import find_loop, in_order
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
 from .ranks import Postings, Region, dependencies, firing_order, postings
 from .rules import LIKE, PTOLEMY, TIES, Like, Rules, Ties
-from .watched import Metric, Watched
+from .watched import Metric, Monitor, Watched
 from .woven import AspectModel, WovenAspect, check_processors, extent
 
 __all__ = [
     "LIKE",
     "PTOLEMY",
     "TIES",
+    "Act",
+    "ActName",
     "AspectModel",
     "Clock",
     "Detour",
@@ -20,6 +23,7 @@ __all__ = [
     "Metric",
     "Modal",
     "ModelGraph",
+    "Monitor",
     "PortNode",
     "Postings",
     "Region",

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from epicycle.aspects import Reading
+
 from ..catalogue import Measure
+from ..temporal import Property, Requirement
 from ..text import Position
 from .model_graph import is_within
 
@@ -16,6 +19,7 @@ class Metric:
     name: str
     ports: list[str]
     measure: Measure
+    monitor: str = ""  # whose verdict it is, or whose robustness
 
     def without(self, path: str) -> Metric:
         """The metric when a part of the model is taken out that it watched, too."""
@@ -27,6 +31,33 @@ class Metric:
         return self.measure.to or self.measure.own_unit
 
 
+@dataclass(frozen=True)
+class Monitor:
+    """A property that a run is to have; ``readings`` are what each of its conditions asks for: ports, and fields."""
+
+    name: str
+    requirement: Requirement
+    tree: Property
+    readings: list[list[Reading]]
+
+    @property
+    def ports(self) -> list[str]:
+        """The ports that it listens to."""
+        return list(dict.fromkeys(port for condition in self.readings for port, _ in condition))
+
+    @property
+    def metrics(self) -> list[Metric]:
+        """What a run leaves of it beside other numbers: whether the property holds, and its robustness."""
+        said = self.requirement
+        label = said.label or self.name
+        verdict = Measure(doc=said.doc or said.property, label=said.label, unit="1")
+        margin = Measure(doc=f"robustness of {self.name}", label=f"robustness of {label}", unit=said.unit)
+        return [
+            Metric(self.name, self.ports, verdict, self.name),
+            Metric(f"{self.name}_robustness", self.ports, margin, self.name),
+        ]
+
+
 @dataclass
 class Watched:
     """What is said about a run of a model: when it ends, and what is kept of it."""
@@ -36,4 +67,5 @@ class Watched:
     recorded: list[str] = field(default_factory=list)
     stop_ports: list[str] = field(default_factory=list)
     metrics: list[Metric] = field(default_factory=list)
+    monitors: list[Monitor] = field(default_factory=list)
     stop_position: Position | None = None  # of what was said of ``stop_ports`` last

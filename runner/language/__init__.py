@@ -2,10 +2,12 @@
 
 from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Selection
 from .declarations import (
+    ActText,
     CompositeText,
     ConnectionText,
     MetricText,
     ModelText,
+    MonitorText,
     ParameterText,
     PartText,
     PointcutText,
@@ -44,6 +46,7 @@ __all__ = [
     "RESERVED",
     "RISES",
     "SIGNALS",
+    "ActText",
     "Claim",
     "CompositeText",
     "ConnectionText",
@@ -53,6 +56,7 @@ __all__ = [
     "Level",
     "MetricText",
     "ModelText",
+    "MonitorText",
     "ParameterText",
     "PartText",
     "PointcutText",

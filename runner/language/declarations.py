@@ -109,6 +109,25 @@ class MetricText:
 
 
 @dataclass(frozen=True)
+class MonitorText:
+    """A property that a run is to have; ``values`` are those of a ``Requirement``."""
+
+    name: str
+    values: dict[str, Entry]
+    position: Position
+
+
+@dataclass(frozen=True)
+class ActText:
+    """A single act of an aspect: at which token, counted from 1, that passes it at a place."""
+
+    aspect: Text
+    at: Text
+    token: int
+    position: Position
+
+
+@dataclass(frozen=True)
 class CompositeText:
     """A composite class, or the model itself, which is the outermost one."""
 
@@ -142,4 +161,6 @@ class ModelText:
     composites: dict[str, CompositeText] = field(default_factory=dict)
     run: dict[str, Entry] = field(default_factory=dict)
     metrics: tuple[MetricText, ...] = ()
+    monitors: tuple[MonitorText, ...] = ()
+    exactly: tuple[ActText, ...] | None = None  # the only acts of aspects that happen
     figures: dict[str, PartText] = field(default_factory=dict)

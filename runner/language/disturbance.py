@@ -8,8 +8,8 @@ from typing import TypeVar
 
 from ..catalogue import find
 from ..text import Mapping, Node, NodeReader, Problems, read
-from .declarations import CompositeText, ModelText, ParameterText
-from .fields import NAMED, Construct, Key
+from .declarations import ActText, CompositeText, ModelText, ParameterText
+from .fields import AT, NAMED, Construct, Key, Shape, number, ref
 from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, parts
 from .settings import Setting, put_aspect, settings_like
 from .usage import check_own_usage
@@ -22,10 +22,40 @@ class Disturbance:
     text: CompositeText
     composites: dict[str, CompositeText] = field(default_factory=dict)
     settings: tuple[Setting, ...] = ()
+    exactly: tuple[ActText, ...] | None = None
 
 
 T = TypeVar("T", CompositeText, ParameterText)
 PARAMETER_THERE, COMPOSITE_THERE = "the model has a parameter {!r} already", "there is a composite {!r} already"
+
+ACT = Construct(
+    "A single act of an aspect.",
+    {
+        "aspect": Key(AT, "The name of the aspect.", missing=("an act names no aspect", "add 'aspect: NAME'")),
+        "at": Key(
+            AT,
+            "Where it stands: a port, a connection or an actor.",
+            missing=("an act names no place", "add 'at: PATH'"),
+        ),
+        "token": Key(
+            number(int, 1),
+            "Which of the tokens, or firings, that pass it there: 1 is the first.",
+            missing=("an act does not say which token it concerns", "add 'token: 1' for the first"),
+        ),
+    },
+    type="object",
+)
+
+
+def _acts(reader: NodeReader, node: Node, what: str) -> tuple[ActText, ...]:
+    found = []
+    for each in reader.items(node, what) or ():
+        before = len(reader.problems)
+        said = ACT.read(reader, each, f"an act of {what!r}")
+        if said is not None and len(reader.problems) == before:
+            found.append(ActText(**said, position=each.position))
+    return tuple(found)
+
 
 # Its aspects may take over the ports of those whose places they take.
 DISTURBANCE = Construct(
@@ -46,6 +76,10 @@ DISTURBANCE = Construct(
         "parameters": PARAMETERS,
         "composites": COMPOSITES,
         "aspects": Key(parts("aspect", "added_aspect"), ASPECTS.doc),
+        "exactly": Key(
+            Shape({"type": ["array", "null"], "items": ref("act")}, _acts),
+            "The only acts of aspects that happen, these and the model's own: a list of {aspect, at, token}.",
+        ),
     },
 )
 
@@ -69,11 +103,11 @@ def _declared(node: Node, problems: Problems) -> Disturbance | None:
         return None
     before = len(problems)
     said = DISTURBANCE.values(reader, entries, "the disturbance", node.position)
-    composites, settings = said.pop("composites", {}), said.pop("set", ())
+    composites, settings, exactly = said.pop("composites", {}), said.pop("set", ()), said.pop("exactly", None)
     text = CompositeText(said.pop("name", "disturbance"), node.position, **said)
     if len(problems) == before:
         check_own_usage(text, problems)
-    return Disturbance(text, composites, settings)
+    return Disturbance(text, composites, settings, exactly)
 
 
 def load_disturbances(names: Iterable[str], problems: Problems) -> list[Disturbance]:
@@ -102,6 +136,8 @@ def add_disturbances(
         for part in disturbance.text.aspects.values():
             text = put_aspect(text, part)
         settings += disturbance.settings
+        if disturbance.exactly is not None:
+            text = replace(text, exactly=(*(text.exactly or ()), *disturbance.exactly))
     return text, settings
 
 

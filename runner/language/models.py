@@ -52,6 +52,7 @@ from .fields import (
 )
 from .fields import NAME as NAME_PATTERN
 from .modes import OF_MODES, machine_of
+from .monitors import MONITORS
 from .places import CONNECTIONS, PATTERN_SCHEMA, PATTERNS, POINTCUTS
 
 # -- ports and parameters -----------------------------------------------------------------------------------------
@@ -428,6 +429,10 @@ MODEL = Construct(
         "metrics": Key(
             Shape(METRICS.schema, lambda reader, node, what: tuple(METRICS.read(reader, node, what).values())),
             "Numbers taken from what ports send: 'name: {of, take, after, unit, ...}'.",
+        ),
+        "monitors": Key(
+            Shape(MONITORS.schema, lambda reader, node, what: tuple(MONITORS.read(reader, node, what).values())),
+            "Properties that a run is to have: 'name: always port >= 2 m', or 'name: {property, between, stop, ...}'.",
         ),
         "figures": Key(parts("figure"), "Pictures of a run: 'name: {type, ...}'."),
     },

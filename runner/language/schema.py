@@ -15,7 +15,7 @@ from epicycle.aspects import FiringTimeParameter
 
 from ..catalogue import Catalogue, doc_of, first_sentence, parts_of
 from .dimensions import HYPERCUBE, RANGE, dimension_schema
-from .disturbance import DISTURBANCE
+from .disturbance import ACT, DISTURBANCE
 from .fields import (
     EXPRESSION,
     LABEL,
@@ -43,6 +43,7 @@ from .models import (
     RUN,
     composite_schema,
 )
+from .monitors import MONITOR
 from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
 from .questions import CLAIM, GUIDELINE
 from .study import METRIC as METRIC_OF_STUDY
@@ -61,7 +62,9 @@ CONSTRUCTS = {
     "A pointcut": POINTCUT,
     "Beside the parameters of an actor or aspect": Construct("", BESIDE),
     "A run": RUN,
+    "A monitor": MONITOR,
     "A disturbance": DISTURBANCE,
+    "An act of an aspect": ACT,
     "A study": STUDY,
     "A range": RANGE,
     "A Latin hypercube": HYPERCUBE,
@@ -97,6 +100,8 @@ def json_schema(
         "parameter": PARAMETER.schema,
         "connection": connection_schema(),
         "metric": METRIC.schema,
+        "monitor": MONITOR.schema,
+        "act": ACT.schema,
         "run": RUN.schema,
         "claim": CLAIM.schema,
         "dimension": dimension_schema(),

@@ -41,7 +41,7 @@ def check_usage(
         if not composite.spoilt:
             _add_unused(composite, declared[name].parameters, used[name], composites, actor_types, problems)
     if not text.root.spoilt:
-        names = _names(_nodes((text.root, text.run, text.metrics, text.figures)))
+        names = _names(_nodes((text.root, text.run, text.metrics, text.monitors, text.figures)))
         _add_unused(text.root, text.root.parameters, names, composites, actor_types, problems)
 
 

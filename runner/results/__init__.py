@@ -8,6 +8,7 @@ from .outcome import Interval, Outcome
 from .results import Results
 from .samples import Past, Samples
 from .signal import Signal, SignalError
+from .verdict import Verdict
 
 __all__ = [
     "EventLog",
@@ -23,6 +24,7 @@ __all__ = [
     "Signal",
     "SignalError",
     "TokenError",
+    "Verdict",
     "Writer",
     "canonical",
     "cell",

@@ -35,7 +35,7 @@ class Outcome:
     """The outcome of a metric.
 
     ``missing`` says why there is no value, ``unsure`` why there is no interval although one was requested; ``after``
-    is the time (s) before which nothing counted.
+    is the time (s) before which nothing counted; ``note`` is for people.
     """
 
     value: Any = None
@@ -43,6 +43,7 @@ class Outcome:
     interval: Interval | None = None
     unsure: str = ""
     after: float = 0.0
+    note: str = ""
 
     def shown(self, show: Callable[[Any], str]) -> str:
         """The value with its interval, as ``show`` writes numbers."""
@@ -61,7 +62,7 @@ class Outcome:
         """Notes on the value, for people."""
         if self.missing:
             return [f"no value, because {self.missing}"]
-        found = []
+        found = [self.note] if self.note else []
         if self.interval is not None:
             found.append(
                 f"{100 * self.interval.level:.6g} % interval, autocorrelation {self.interval.autocorrelation:.2f}"

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, did_you_mean, to_seconds
 
+from ..graph import Act
 from ..shown import short
 from ..tables import Table, Tabled, pandas_module
 from .encoding import cell, leaves
 from .log import EventLog
 from .outcome import Interval, Outcome
 from .signal import Signal, SignalError
+from .verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas
@@ -45,6 +47,8 @@ class Results(Tabled):
     wall_time: float  # s
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
     outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
+    monitors: dict[str, Verdict] = field(default_factory=dict)
+    acts: list[Act] = field(default_factory=list)  # of aspects, if they were to be noted
     figures: dict[str, Any] = field(default_factory=dict)  # as the model declares them
 
     @property

@@ -35,6 +35,7 @@ def summary_object(results: Results) -> dict[str, Any]:
             "seed": results.seed,
             "parameters": {name: plain(value) for name, value in results.parameters.items()},
             "metrics": {name: plain(value) for name, value in results.metrics.items()},
+            "monitors": {name: plain(each.plain()) for name, each in results.monitors.items()},
             "outcomes": {name: said for name, each in results.outcomes.items() if (said := each.plain())},
             "aspects": results.aspects,
             "stopped": results.stopped,

@@ -32,6 +32,7 @@ from ..catalogue import (
 )
 from ..language import CONSTRUCTS
 from ..printing import columns
+from ..temporal import Requirement
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
@@ -172,6 +173,11 @@ def _metrics() -> list[str]:
         METRICS,
         _rows(("take", "counts", "what it is", "options", "unit"), takes),
         _rows(("option", "type", "unit", "default", "what it is"), options),
+        "## Monitors\n\nWhat a model file, or `Model.monitor`, says of a property that runs are to have.\n",
+        _rows(
+            ("key", "type", "unit", "default", "what it is"),
+            [_parameter_row(each) for each in describe("monitor", Requirement).parameters],
+        ),
     ]
 
 

@@ -1,0 +1,78 @@
+"""Monitors of a model: their properties, and the ports that these ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from epicycle.actors import ParameterError, declared_parameters, did_you_mean
+from epicycle.aspects import Reading
+
+from ..graph import Monitor
+from ..temporal import Condition, PropertyError, Requirement, Sends, leaves, property_of
+from ..text import Position, Problems, Text, within
+from .draft import Draft
+from .looks import Looks
+from .paths import Paths
+
+
+def monitor_of(
+    draft: Draft,
+    name: str,
+    values: Mapping[str, object],
+    places: Mapping[str, Position],
+    at: Position,
+    problems: Problems,
+) -> Monitor | None:
+    """A monitor with these values of a ``Requirement``; None if something is wrong with it.
+
+    ``places`` are where the values stand, ``at`` where the monitor does.
+    """
+    what = f"monitor {name}"
+    before = len(problems)
+    said: dict[str, Any] = {}
+    declared = declared_parameters(Requirement)
+    for key, value in values.items():
+        if key not in declared:
+            problems.add(f"{what}: there is no option {key!r}{did_you_mean(key, declared)}", at)
+            continue
+        try:
+            said[key] = declared[key].convert(value)
+        except ParameterError as error:
+            problems.add(f"{what}, {key}: {error}", places.get(key, at))
+    if len(problems) > before:
+        return None
+    requirement = Requirement(**said)
+    source = requirement.property
+    place = places.get("property", at)
+    try:
+        found = property_of(source)
+    except PropertyError as error:
+        wrong = source[error.offset : error.offset + error.length]
+        # The part that is wrong, where the text stands in the file as it is.
+        whole = within(Text(source, place), source)
+        part = whole if whole.length != len(source) or "\n" in source else _part(whole, error.offset, len(wrong))
+        problems.add(f"{what}: {error}", part, *([error.hint] if error.hint else []))
+        return None
+    looks = Looks(draft, Paths(draft), name, "", problems, called="monitor")
+    readings = [_readings(looks, each, place) for each in leaves(found)]
+    return Monitor(name, requirement, found, readings) if len(problems) == before else None
+
+
+def _part(whole: Position, offset: int, length: int) -> Position:
+    return replace(whole, column=whole.column + offset, length=length)
+
+
+def _readings(looks: Looks, condition: Condition | Sends, place: Position) -> list[Reading]:
+    """What a condition asks for."""
+    if isinstance(condition, Sends):
+        port, fields = looks.reading("property", condition.port, within(Text("", place), condition.port))
+        if fields:
+            message = f"monitor {looks.name}: 'sends {condition.port}' names a part of what {port} sends"
+            looks.problems.add(message, place, f"write 'sends {port}'")
+        return [(port, ())]
+    found = []
+    for reference in condition.references:
+        found.append(looks.reading("property", reference, within(Text("", place), reference)))
+    return found

@@ -1,0 +1,136 @@
+"""Acts of aspects one by one: they are noted by name, and all but some of them can be left out.
+
+Where an act is left out, the aspect is told of the token as ever: it draws the same random numbers and remembers the
+same, so that its other acts stay what they are.  But whatever it does with this token is lost, now and later, and the
+token goes on at once.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Container
+from typing import Any
+
+from epicycle.actors import Tag, Way
+from epicycle.aspects import AspectContext
+
+from ..graph import Act, ActName
+from .way import Guarded
+
+
+class Acts:
+    """The acts of a run: those that happen, if ``exactly`` names some, and those that have been ``noted``."""
+
+    def __init__(self, exactly: Container[ActName] | None = None) -> None:
+        self.exactly = exactly
+        self._noted: dict[ActName, Act] = {}
+        self._passed: dict[tuple[str, str], int] = {}
+
+    @property
+    def noted(self) -> list[Act]:
+        """All acts so far, in the order in which they began."""
+        return list(self._noted.values())
+
+    def next(self, aspect: str, place: str) -> ActName:
+        """The name of what an aspect does next at a place."""
+        number = self._passed[aspect, place] = self._passed.get((aspect, place), 0) + 1
+        return ActName(aspect, place, number)
+
+    def note(self, name: ActName, source: str, time: int, event: str) -> None:
+        """An act has left something in the event log."""
+        before = self._noted.get(name)
+        events = (event,) if before is None else (*before.events, event)
+        self._noted[name] = Act(name, source, time if before is None else before.time, events)
+
+
+class Named(Way):
+    """An aspect at a place, whose acts have names."""
+
+    __slots__ = ("acts", "guarded", "key")
+
+    def __init__(self, guarded: Guarded, acts: Acts, place: str) -> None:
+        self.guarded = guarded
+        self.acts = acts
+        self.key = guarded.point.aspect, place
+
+    def go(self, token: Any) -> None:
+        name, point = self.acts.next(*self.key), self.guarded.point
+        happens = self.acts.exactly is None or name in self.acts.exactly
+        seen = copy.copy(point)  # what the aspect keeps of this token, it keeps with it
+        seen._context = _Noting(point._context, self.acts, name, point.source) if happens else _Silent(point._context)
+        if not happens:
+            point.random  # noqa: B018 (or the copy would have a stream of its own)
+            seen.counts = {}
+            seen._forward = seen.enter = _lose
+        guarded = self.guarded
+        Guarded(guarded.act, guarded.doing, seen, guarded.holds, guarded.pass_by, guarded.tell).go(token)
+        if not happens:
+            point._forward(token)
+
+
+def _lose(token: Any) -> None:
+    """What becomes of a token that has gone on already."""
+
+
+class _Context:
+    """What the engine offers to a join point, for one token."""
+
+    def __init__(self, context: AspectContext) -> None:
+        self._context = context
+
+    @property
+    def tag(self) -> Tag:
+        return self._context.tag
+
+    @property
+    def seed(self) -> int:
+        return self._context.seed
+
+    def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
+        self._context.later(delay, deliver, token)
+
+    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
+        return self._context.hold(deliver, token)
+
+    def latest(self, port: str) -> Any:
+        return self._context.latest(port)
+
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        self._context.note(aspect, owner, port, event, token)
+
+    def record(self, signal: str, token: Any) -> None:
+        self._context.record(signal, token)
+
+    def stop(self, reason: str) -> None:
+        self._context.stop(reason)
+
+
+class _Noting(_Context):
+    """Notes what is done to a token under its name."""
+
+    def __init__(self, context: AspectContext, acts: Acts, name: ActName, source: str) -> None:
+        super().__init__(context)
+        self._acts = acts
+        self._name = name
+        self._source = source
+
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        self._acts.note(self._name, self._source, self._context.tag.time, event)
+        self._context.note(aspect, owner, port, event, token)
+
+
+class _Silent(_Context):
+    """Lets nothing come of what is done to a token."""
+
+    def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
+        if deliver is not _lose:
+            self._context.later(delay, deliver, token)
+
+    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
+        pass
+
+    def record(self, signal: str, token: Any) -> None:
+        pass
+
+    def stop(self, reason: str) -> None:
+        pass

@@ -1,0 +1,191 @@
+"""Monitoring: a monitor while the run goes on, and its verdict."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from epicycle.actors import EpicycleError, Way, to_seconds
+from epicycle.actors.expression import operand, value_at
+from epicycle.aspects import Reading
+
+from ..graph import Monitor
+from ..results import Verdict
+from ..temporal import LINEAR, TINY, Condition, Finding, Judge, Line, Piece, Source, leaves
+
+if TYPE_CHECKING:
+    from .director import Director
+
+_KEPT = 1_000  # instants of which it is known what the ports had sent
+
+
+class _Margin:
+    """The margin of a condition from instant to instant; it holds until the next, or is linear in between."""
+
+    __slots__ = ("_condition", "_found", "_is_linear", "_next", "_readings", "_since", "_source", "is_new")
+
+    def __init__(self, condition: Condition, readings: list[Reading], source: Source, linear: bool) -> None:
+        self._condition = condition
+        self._readings = readings
+        self._source = source
+        self._is_linear = linear and condition.difference is not None
+        self._found: float | None = None
+        self._since = 0  # of a linear margin: when it was found
+        self._next = 0  # and from when on it is not known
+        self.is_new = False  # whether one of its ports has sent at this instant
+
+    def settle(self, now: int, upcoming: int, latest: dict[str, Any]) -> None:
+        """What had been sent by ``now`` stands until ``upcoming``; raises ``EpicycleError``."""
+        if self.is_new:
+            self.is_new = False
+            if all(port in latest for port, _ in self._readings):
+                found = self._condition.margin([operand(value_at(latest[port], path)) for port, path in self._readings])
+                if self._is_linear:
+                    self._add_line(now, found)
+                self._found = found
+        if not self._is_linear:
+            self._source.pieces.append(Piece(now, upcoming - 1, self._found))
+
+    def _add_line(self, now: int, found: float) -> None:
+        before = self._found
+        if before is None or not (math.isfinite(before) and math.isfinite(found)):
+            if now > self._next:
+                self._source.pieces.append(Piece(self._next, now - 1, before))
+            self._source.pieces.append(Piece(now, now, found))
+        else:
+            line = Line(self._since, before, now, found, self._condition.zero)
+            self._source.pieces.append(Piece(self._next, now, line))
+        self._since, self._next = now, now + 1
+
+    def close(self, upcoming: int) -> None:
+        """Nothing comes any more before ``upcoming``."""
+        if self._is_linear and self._next < upcoming:
+            self._source.pieces.append(Piece(self._next, upcoming - 1, self._found))
+
+
+class _Pulse:
+    """True at the instants at which a port sends."""
+
+    __slots__ = ("_source", "is_new")
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.is_new = False
+
+    def settle(self, now: int, upcoming: int, latest: dict[str, Any]) -> None:
+        """The same as of a margin."""
+        if self.is_new:
+            self._source.pieces.append(Piece(now, now, math.inf))
+            self.is_new = False
+            now += 1
+        if now < upcoming:
+            self._source.pieces.append(Piece(now, upcoming - 1, -math.inf))
+
+    def close(self, upcoming: int) -> None:
+        """The same as of a margin."""
+
+
+class Monitoring:
+    """Judges what the ports of a monitor send.
+
+    What stands at the end of an instant counts: a token that is followed by another one at the same time does not.
+    """
+
+    __slots__ = (
+        "_conditions", "_finding", "_judge", "_latest", "_listening", "_missing", "_past", "_time", "_values",
+        "monitor",
+    )  # fmt: skip
+
+    def __init__(self, monitor: Monitor) -> None:
+        self.monitor = monitor
+        self._judge = Judge(monitor.tree)
+        linear = monitor.requirement.between == LINEAR
+        self._conditions: list[_Margin | _Pulse] = [
+            _Margin(each, readings, source, linear) if isinstance(each, Condition) else _Pulse(source)
+            for each, readings, source in zip(leaves(monitor.tree), monitor.readings, self._judge.sources, strict=True)
+        ]
+        self._listening: dict[str, list[_Margin | _Pulse]] = {port: [] for port in monitor.ports}
+        for condition, readings in zip(self._conditions, monitor.readings, strict=True):
+            for port in dict.fromkeys(port for port, _ in readings):
+                self._listening[port].append(condition)
+        self._latest: dict[str, Any] = {}
+        self._time = 0  # the instant that is not settled yet
+        self._finding = Finding()
+        self._missing = ""  # why it cannot be judged
+        self._past: deque[tuple[int, dict[str, Any]]] = deque(maxlen=_KEPT)
+        self._values: dict[str, Any] = {}  # of its ports where it broke first
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether it is certain that the run does not have the property."""
+        return self._finding.holds is False
+
+    def add(self, port: str, time: int, token: Any) -> None:
+        """Take in what a port sends at a time (ns)."""
+        if time > self._time:
+            self.settle(time)
+        self._latest[port] = token
+        for each in self._listening[port]:
+            each.is_new = True
+
+    def settle(self, upcoming: int) -> None:
+        """What was sent by now stands until a later time (ns)."""
+        now, self._time = self._time, upcoming
+        if self._missing or upcoming <= now:
+            return
+        try:
+            for each in self._conditions:
+                each.settle(now, upcoming, self._latest)
+        except EpicycleError as error:
+            self._missing = f"{error}, at {to_seconds(now):.9g} s"
+            return
+        self._past.append((now, dict(self._latest)))
+        self._find(over=False)
+
+    def _find(self, over: bool) -> None:
+        was_broken = self.is_broken
+        self._finding = self._judge.finding(over)
+        if self.is_broken and not was_broken and self._finding.time is not None:
+            self._values = self._at(self._finding.time)
+
+    def _at(self, time: int) -> dict[str, Any]:
+        """What the conditions asked for at a time, if that is still known."""
+        known: dict[str, Any] = next((latest for start, latest in reversed(self._past) if start <= time), {})
+        asked = dict.fromkeys(each for readings in self._asked() for each in readings)
+        return {".".join((port, *path)): value_at(known[port], path) for port, path in asked if port in known}
+
+    def _asked(self) -> Iterable[list[Reading]]:
+        pairs = zip(leaves(self.monitor.tree), self.monitor.readings, strict=True)
+        return (readings for condition, readings in pairs if isinstance(condition, Condition))
+
+    def verdict(self, end: int) -> Verdict:
+        """What it comes to when the run ends at a time (ns); nothing may be added any more."""
+        self.settle(end + 1)
+        if self._missing:
+            return Verdict(missing=self._missing)
+        for each in self._conditions:
+            each.close(end + 1)
+        self._find(over=True)
+        found, margin = self._finding, self._finding.robustness
+        if margin is not None and abs(margin) == TINY:
+            margin = 0.0
+        time = None if found.time is None else to_seconds(found.time)
+        if found.holds is None:
+            return Verdict(missing="the run was too short to tell")
+        return Verdict(found.holds, margin, time, self._values)
+
+
+class Listening(Way):
+    """Hands the tokens of a port to a monitor."""
+
+    __slots__ = ("director", "monitoring", "port")
+
+    def __init__(self, monitoring: Monitoring, port: str, director: Director) -> None:
+        self.monitoring = monitoring
+        self.port = port
+        self.director = director
+
+    def go(self, token: Any) -> None:
+        self.monitoring.add(self.port, self.director.now().time, token)

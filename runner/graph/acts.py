@@ -1,0 +1,27 @@
+"""Acts: what aspects do to single tokens and firings, by names that are the same in every run of a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class ActName(NamedTuple):
+    """What an aspect does to the n-th token, or firing, that passes it at a place; the first is number 1."""
+
+    aspect: str
+    place: str  # a port, a connection 'a.out -> b.in', an actor or a parameter
+    token: int
+
+    def __str__(self) -> str:
+        return f"{self.aspect} at {self.place}, token {self.token}"
+
+
+@dataclass(frozen=True)
+class Act:
+    """An act as it happened: the port that the token comes from, when (ns), and what is in the event log of it."""
+
+    name: ActName
+    source: str
+    time: int
+    events: tuple[str, ...]

@@ -1,0 +1,43 @@
+"""Monitors: what a model file says of the properties that its runs are to have."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from epicycle.actors import Parameter, declared_parameters
+
+from ..temporal import Requirement
+from ..text import Entry, Mapping, NodeReader
+from .declarations import MonitorText
+from .fields import Construct, Key, about, named, node_as, ref, schema_of
+
+_WRITTEN = ("property", "unit", "doc", "label")  # texts, in which numbers need no quotes
+
+
+def _of_monitor(key: str, parameter: Parameter[Any]) -> Key:
+    schema = ref("text") if key in _WRITTEN else schema_of(parameter)
+    missing = ("{what} has no property", "add 'property: always ...'") if parameter.required else ()
+    return Key(node_as(schema), about(parameter), missing=missing)
+
+
+MONITOR = Construct(
+    "A property that a run is to have: its text, or this.",
+    {key: _of_monitor(key, each) for key, each in declared_parameters(Requirement).items()},
+    type=["object", "string"],
+    required=["property"],
+)
+
+
+def _monitor(reader: NodeReader, name: str, entry: Entry) -> MonitorText | None:
+    """``name: always ...`` or ``name: {property: always ..., between: linear, unit: m, doc: ...}``."""
+    if not isinstance(entry.value, Mapping):
+        return MonitorText(name, {"property": entry}, entry.key.position)
+    entries = MONITOR.entries(reader, entry.value, f"monitor {name!r}")
+    if entries is None:
+        return None
+    before = len(reader.problems)
+    MONITOR.values(reader, entries, f"monitor {name!r}", entry.key.position)
+    return MonitorText(name, entries, entry.key.position) if len(reader.problems) == before else None
+
+
+MONITORS = named(ref("monitor"), _monitor)

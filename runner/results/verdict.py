@@ -1,0 +1,44 @@
+"""Verdict: whether a run has a property that a monitor asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..shown import short
+from .outcome import Outcome
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a property holds, and its robustness: above 0 by how much it holds, below 0 by how much it does not.
+
+    Both are None if that cannot be told, for the reason in ``missing``.  ``time`` (s) is when it broke first, and
+    ``values`` are what its ports had sent by then, if that was kept.
+    """
+
+    holds: bool | None = None
+    robustness: float | None = None
+    time: float | None = None
+    values: Mapping[str, Any] = field(default_factory=dict)
+    missing: str = ""
+
+    @property
+    def remark(self) -> str:
+        """What people should know of it."""
+        if self.holds is not False or self.time is None:
+            return ""
+        seen = ", ".join(f"{name} = {short(value)}" for name, value in self.values.items())
+        return f"broken at {self.time:.9g} s" + (f", where {seen}" if seen else "")
+
+    def outcome(self, whether: bool) -> Outcome:
+        """The same as of a metric: whether the property holds, or by how much."""
+        if self.missing:
+            return Outcome(missing=self.missing)
+        return Outcome(self.holds, note=self.remark) if whether else Outcome(self.robustness)
+
+    def plain(self) -> dict[str, Any]:
+        """The same for programs."""
+        found = {"holds": self.holds, "robustness": self.robustness, "time": self.time, "values": dict(self.values)}
+        return {**found, **({"missing": self.missing} if self.missing else {})}

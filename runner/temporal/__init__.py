@@ -1,0 +1,16 @@
+"""Properties over time: their text, and whether signals have them.
+
+``property_of`` reads one.  A ``Judge`` is given the signals of its conditions; it says as soon as it can whether it holds.
+"""
+
+from .judge import Finding, Judge
+from .operators import Source
+from .property import Condition, Property, Sends, leaves
+from .requirement import HOLD, LINEAR, Requirement, RequirementOptions
+from .signal import TINY, Line, Piece
+from .syntax import WORDS, PropertyError, property_of
+
+__all__ = [
+    "HOLD", "LINEAR", "TINY", "WORDS", "Condition", "Finding", "Judge", "Line", "Piece", "Property", "PropertyError",
+    "Requirement", "RequirementOptions", "Sends", "Source", "leaves", "property_of",
+]  # fmt: skip

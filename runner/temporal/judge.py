@@ -1,0 +1,132 @@
+"""Judges: whether a property holds from the beginning of a run, as soon as that is certain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from .operators import Operator, Source, operator_of
+from .property import Junction, Not, Property, Quantified, leaves
+from .signal import Line, Piece, at, by_sign
+
+
+class Finding(NamedTuple):
+    """Whether a property holds (None if that cannot be told), by how much, and when it broke first (ns)."""
+
+    holds: bool | None = None
+    robustness: float | None = None
+    time: int | None = None
+
+
+class Judge:
+    """Takes in the conditions of a property, as pieces of ``sources`` in their order."""
+
+    __slots__ = ("_root", "sources")
+
+    def __init__(self, tree: Property) -> None:
+        self.sources = [Source() for _ in leaves(tree)]
+        self._root = _root(tree, iter(self.sources))
+
+    def finding(self, over: bool) -> Finding:
+        """What is certain by now; with ``over``, nothing comes after this."""
+        return self._root.finding(over)
+
+
+class _Throughout:
+    """``always``, or ``eventually`` if ``any``, at the beginning."""
+
+    __slots__ = ("_any", "_end", "_extreme", "_known", "_of", "_start", "_time")
+
+    def __init__(self, tree: Quantified, of: Operator) -> None:
+        self._any = tree.any
+        self._of = of
+        self._start = tree.start
+        self._end = tree.end
+        self._extreme = -math.inf if tree.any else math.inf
+        self._known = -1
+        self._time: int | None = None  # when it was decided
+
+    def finding(self, over: bool) -> Finding:
+        for piece in self._of.take(over):
+            self._known = piece.end
+            start = max(piece.start, self._start)
+            end = piece.end if self._end is None else min(piece.end, self._end)
+            if piece.value is not None and start <= end:
+                self._add(start, end, piece.value)
+        is_decided = self._time is not None
+        is_whole = over if self._end is None else self._known >= self._end
+        if not (is_decided or is_whole):
+            return Finding()
+        holds = self._any == is_decided
+        when = self._time if not self._any else self._known if self._end is None else self._end
+        return Finding(holds, self._extreme, None if holds else when)
+
+    def _add(self, start: int, end: int, value: float | Line) -> None:
+        both = (self._extreme, at(value, start), at(value, end))
+        self._extreme = max(both) if self._any else min(both)
+        if self._time is None:
+            deciding = (each.start for each in by_sign(start, end, value) if (at(value, each.start) > 0.0) == self._any)
+            self._time = next(deciding, None)
+
+
+class _Both:
+    """``and``, or ``or`` if ``any``, at the beginning."""
+
+    __slots__ = ("_any", "_left", "_right")
+
+    def __init__(self, any: bool, left: _Root, right: _Root) -> None:
+        self._any = any
+        self._left = left
+        self._right = right
+
+    def finding(self, over: bool) -> Finding:
+        both = self._left.finding(over), self._right.finding(over)
+        deciding = [each for each in both if each.holds == self._any]
+        found = deciding or ([] if None in (both[0].holds, both[1].holds) else both)
+        if not found:
+            return Finding()
+        margins = [each.robustness for each in found if each.robustness is not None]
+        times = [each.time for each in found if each.time is not None]
+        when = None if not times else max(times) if self._any else min(times)
+        return Finding(found[0].holds, max(margins) if self._any else min(margins), when)
+
+
+class _Once:
+    """Anything else, at the beginning; it becomes certain when its own value there does."""
+
+    __slots__ = ("_first", "_of")
+
+    def __init__(self, of: Operator) -> None:
+        self._of = of
+        self._first: Piece | None = None
+
+    def finding(self, over: bool) -> Finding:
+        found = self._of.take(over)
+        if found and self._first is None:
+            self._first = found[0]
+        value = None if self._first is None else self._first.value
+        if value is None:
+            return Finding()
+        margin = at(value, 0)
+        return Finding(margin > 0.0, margin, None)
+
+
+_Root = _Throughout | _Both | _Once
+
+
+def _root(tree: Property, sources: Iterator[Source]) -> _Root:
+    match tree:
+        case Not(of=Not() as of):
+            return _root(of.of, sources)
+        case Not(of=Junction() as of):
+            return _root(Junction(not of.any, Not(of.left), Not(of.right)), sources)
+        case Not(of=Quantified() as of):
+            return _root(Quantified(not of.any, Not(of.of), of.start, of.end), sources)
+        case Junction():
+            left = _root(tree.left, sources)
+            return _Both(tree.any, left, _root(tree.right, sources))
+        case Quantified():
+            return _Throughout(tree, operator_of(tree.of, sources))
+        case _:
+            return _Once(operator_of(tree, sources))

@@ -1,0 +1,175 @@
+"""Monitors in a run: what they say of it, and that they change nothing in it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from epicycle.actors import Actor, OutputPort, Parameter
+from epicycle.runner.build import Model
+from epicycle.runner.cli import main
+from epicycle.runner.engine import Simulation
+from epicycle.runner.results import Results, Verdict
+from epicycle.runner.text import ModelError
+from tests.engine.engine_parts import load
+
+
+class Steps(Actor):
+    """Sends values at their times."""
+
+    is_source = True
+    output = OutputPort(object)
+    values = Parameter(object, doc="pairs of a time in s and what is sent then")
+
+    def initialize(self) -> None:
+        self._left = [(float(time), value) for time, value in self.values]
+        for time in dict.fromkeys(time for time, _ in self._left):
+            self.wake_in(time)
+
+    def fire(self) -> None:
+        while self._left and self._left[0][0] <= self.now:
+            self.output.send(self._left.pop(0)[1])
+
+
+def model(values: list[Any], monitors: str, more: str = "") -> Model:
+    text = f"""
+actors:
+  a: {{type: Steps, values: {json.dumps(values)}}}
+  b: {{type: Steps, values: [[1, 10], [6, 20]]}}
+run: {{stop: 10 s}}
+{more}
+monitors:
+  {monitors}
+"""
+    return load(text, types=[Steps])
+
+
+def run(values: list[Any], monitors: str, more: str = "") -> Results:
+    return Simulation(model(values, monitors, more)).run()
+
+
+def broken(robustness: float, time: float) -> Verdict:
+    return Verdict(False, robustness, time, {"a.output": 7})
+
+
+RISING = [[0, 1], [2, 3], [4, 7], [7, 2]]
+
+
+@pytest.mark.parametrize(
+    ("source", "verdict"),
+    [
+        ("always a.output < 6", Verdict(False, -1.0, 4.0, {"a.output": 7})),
+        ("always a.output < 8", Verdict(True, 1.0)),
+        ("always after 5 s a.output < 6", Verdict(False, -1.0, 5.0, {"a.output": 7})),
+        ("always within 3999 ms a.output < 6", Verdict(True, 3.0)),
+        ("always within 4 s a.output < 6", Verdict(False, -1.0, 4.0, {"a.output": 7})),
+        ("eventually a.output > 7", Verdict(False, 0.0, 7.0, {"a.output": 2})),  # the end of the run
+        ("eventually within 3 s a.output > 3.5", Verdict(False, -0.5, 3.0, {"a.output": 3})),
+        ("eventually (a.output > 5 for 3 s)", Verdict(False, -2.0, 7.0, {"a.output": 2})),
+        ("eventually (a.output > 5 for 2999 ms)", Verdict(True, 2.0)),
+        ("eventually within 12 s a.output > 9", Verdict(missing="the run was too short to tell")),
+        ("a.output < 4 until a.output == 7", Verdict(True, 0.0)),
+        ("always (a.output > 5 implies eventually within 3 s a.output < 3)", Verdict(True, 1.0)),
+        (
+            "always (a.output > 5 implies eventually within 2 s a.output < 3)",
+            Verdict(False, -2.0, 4.0, {"a.output": 7}),
+        ),
+        ("always b.output < 15", Verdict(False, -5.0, 6.0, {"b.output": 20})),
+        ("always a.output < b.output", Verdict(True, 3.0)),  # from 1 s on
+        ("always (sends b.output implies a.output < 6)", Verdict(False, -1.0, 6.0, {"a.output": 7})),
+        ("eventually from 1 s to 1 s sends b.output", Verdict(True, float("inf"))),
+        ("eventually from 2 s to 3 s sends b.output", Verdict(False, float("-inf"), 3.0)),
+        ("always a.output < 6 or always b.output < 30", Verdict(True, 10.0)),
+        ("not eventually a.output > 6", Verdict(False, -1.0, 4.0, {"a.output": 7})),
+    ],
+)
+def test_verdicts(source: str, verdict: Verdict) -> None:
+    assert run(RISING, f"it: {source}").monitors["it"] == verdict
+
+
+def test_margins_that_are_linear_between_tokens() -> None:
+    results = run([[0, 8], [4, 0]], "low: {property: always a.output >= 2, between: linear}")
+    assert results.monitors["low"] == Verdict(False, -2.0, 3.000000001, {"a.output": 8})
+    results = run([[0, 8], [4, 0]], "low: {property: always a.output > 2, between: linear}")
+    assert results.monitors["low"] == Verdict(False, -2.0, 3.0, {"a.output": 8})
+
+
+def test_what_is_sent_last_at_a_time_counts() -> None:
+    assert run([[0, 1], [2, 9], [2, 3]], "low: always a.output < 5").monitors["low"] == Verdict(True, 2.0)
+
+
+def test_a_condition_that_cannot_be_judged() -> None:
+    results = run([[0, 1], [2, "three"]], "low: always a.output < 5")
+    reason = "'a.output < 5' cannot be judged: 'three' < 5, at 2 s"
+    assert results.monitors["low"] == Verdict(missing=reason)
+    assert results.outcomes["low"].missing == results.outcomes["low_robustness"].missing == reason
+
+
+def test_a_verdict_is_two_metrics() -> None:
+    results = run(RISING, "low: {property: always a.output < 6, unit: m, label: low enough, doc: as it should be}")
+    assert results.metrics == {"low": False, "low_robustness": -1.0}
+    assert results.units == {"low": "1", "low_robustness": "m"}
+    assert results.outcomes["low"].remarks == ["broken at 4 s, where a.output = 7"]
+
+
+def test_a_monitor_ends_a_run_when_it_is_broken() -> None:
+    found = run(RISING, "low: {property: always a.output < 6, stop: true}")
+    assert (found.stopped, found.end) == ("monitor low", 4.0)
+    found = run(RISING, "fast: {property: eventually within 5 s a.output > 9, stop: true}")
+    assert (found.stopped, found.end) == ("monitor fast", 4.0)  # nothing happens at 5 s
+    assert found.monitors["fast"] == broken(-2.0, 5.0)
+    found = run(RISING, "linear: {property: always a.output < 6, stop: true, between: linear}")
+    assert (found.stopped, found.end) == ("monitor linear", 4.0)
+
+
+def test_monitors_change_nothing() -> None:
+    monitors = "low: {property: always a.output < 6, between: linear}\n  other: sends a.output until b.output > 15"
+    watched, plain = run(RISING, monitors), run(RISING, "{}")
+    assert (watched.digest, watched.firings) == (plain.digest, plain.firings)
+
+
+@pytest.mark.parametrize("between", ["hold", "linear"])
+def test_snapshots_know_how_far_a_monitor_is(between: str) -> None:
+    source = "always (a.output > 5 implies eventually within 3 s a.output < 2)"
+    made = model(RISING, f"it: {{property: {source}, between: {between}}}")
+    whole = Simulation(made).run()
+    simulation = Simulation(made)
+    simulation.advance(5.0)
+    snapshot = simulation.snapshot()
+    assert simulation.run().monitors == whole.monitors
+    again = Simulation(made)
+    again.restore(snapshot)
+    assert again.run().monitors == whole.monitors
+
+
+def test_monitors_of_a_model_built_in_python() -> None:
+    built = Model("m", stop=10.0)
+    steps = built.add(Steps("a", values=[[0, 1], [3, 5]]))
+    built.monitor("low", "always a.output < 4", unit="m")
+    assert Simulation(built).run().monitors["low"] == Verdict(False, -1.0, 3.0, {"a.output": 5})
+    with pytest.raises(ModelError, match="there is a metric 'low' already"):
+        built.monitor("low", "always a.output < 4")
+    with pytest.raises(ModelError, match=r"monitor high: property: 'a\.input' names no output port"):
+        built.monitor("high", "always a.input < 4")
+    built.forget(steps.path)
+    assert (built.monitors, built.metrics) == ([], [])
+
+
+def test_a_broken_monitor_is_an_exit_code_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "m.yaml"
+    file.write_text(
+        "model: m\nactors: {clock: {type: Clock, period: 1}}\nrun: {stop: 10 s}\n"
+        "monitors: {early: always within 3 s clock.output < 2, late: eventually clock.output > 8}\n",
+        encoding="utf-8",
+    )
+    assert main(["run", str(file), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    early = {"holds": False, "robustness": -1.0, "time": 2.0, "values": {"clock.output": 2}}
+    assert printed["monitors"]["early"] == early
+    assert main(["run", str(file), "--json", "--check"]) == 3
+    assert main(["run", str(file), "--json", "--check", "--until", "1"]) == 3  # as it is not late yet
+    file.write_text(file.read_text(encoding="utf-8").replace("< 2", "< 9"), encoding="utf-8")
+    assert main(["run", str(file), "--json", "--check"]) == 0

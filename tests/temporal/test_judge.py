@@ -1,0 +1,126 @@
+"""What a judge says of random properties and signals, against the definition and against another library."""
+
+from __future__ import annotations
+
+import random  # noqa: TID251 (what to try, and not what a model draws)
+from typing import Any
+
+import pytest
+
+from epicycle.runner.temporal import Finding, Judge, Piece, Property, Sends, leaves
+from epicycle.runner.temporal.property import Junction, Not, Quantified, Until
+from tests.temporal.definition import random_property, random_signal, robustness, values_of
+
+
+def judged(tree: Property, signals: list[list[Piece]], draw: random.Random) -> Finding:
+    """What is found when the pieces come in in any order; what is said early must be said in the end."""
+    judge, left, said = Judge(tree), [list(pieces) for pieces in signals], set()
+    while any(left):
+        number = draw.choice([number for number, pieces in enumerate(left) if pieces])
+        judge.sources[number].pieces.append(left[number].pop(0))
+        said.add(judge.finding(False).holds)
+    found = judge.finding(True)
+    assert said <= {None, found.holds}
+    return found
+
+
+def compare(seed: str, *, lines: bool) -> None:
+    draw = random.Random(seed)
+    last = draw.randrange(14)
+    tree = random_property(draw, draw.randrange(1, 4))
+    signals = [random_signal(draw, last, lines=lines) for _ in leaves(tree)]
+    wanted = robustness(tree, iter([values_of(each, last) for each in signals]))[0]
+    found = judged(tree, signals, draw)
+    about = (seed, tree, signals)
+    assert found.holds == (None if wanted is None else wanted > 0), about
+    if lines and wanted is not None:  # where lines cross, the last digit may be another one
+        assert found.robustness == pytest.approx(wanted, abs=1e-9), about
+    else:
+        assert found.robustness == wanted, about
+
+
+@pytest.mark.parametrize("lines", [False, True], ids=["steps", "lines"])
+def test_a_judge_agrees_with_the_definition(lines: bool) -> None:
+    for number in range(2_000):
+        compare(f"{lines} {number}", lines=lines)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lines", [False, True], ids=["steps", "lines"])
+def test_a_judge_agrees_with_the_definition_100_000_times(lines: bool) -> None:
+    for number in range(50_000):
+        compare(f"many {lines} {number}", lines=lines)
+
+
+def written(tree: Property, names: Any) -> str:
+    """The property in the language of the other library."""
+    match tree:
+        case Not():
+            return f"not({written(tree.of, names)})"
+        case Junction():
+            return f"(({written(tree.left, names)}) {'or' if tree.any else 'and'} ({written(tree.right, names)}))"
+        case Quantified():
+            return f"{'eventually' if tree.any else 'always'}[{tree.start}:{tree.end}]({written(tree.of, names)})"
+        case Until():
+            left = written(tree.left, names)
+            return f"(({left}) until[{tree.start}:{tree.end}] ({written(tree.right, names)}))"
+        case _:
+            return f"{next(names)} >= 0"
+
+
+def horizon(tree: Property) -> int:
+    """For how long the value of a property depends on what comes."""
+    match tree:
+        case Not():
+            return horizon(tree.of)
+        case Junction():
+            return max(horizon(tree.left), horizon(tree.right))
+        case Quantified():
+            return (tree.end or 0) + horizon(tree.of)
+        case Until():
+            return (tree.end or 0) + max(horizon(tree.left), horizon(tree.right))
+        case _:
+            return 0
+
+
+def test_a_judge_agrees_with_rtamt() -> None:
+    """Discrete time, bounded operators, signals that are there all the time: where both mean the same."""
+    rtamt = pytest.importorskip("rtamt")
+    for number in range(150):
+        draw = random.Random(f"rtamt {number}")
+        tree = random_property(draw, 3, unbounded=False)
+        last = max(horizon(tree), 1)
+        names = [f"x{place}" for place in range(len(leaves(tree)))]
+        signals = {
+            name: [float(draw.randrange(1, 5) * draw.choice([-1, 1])) for _ in range(last + 1)] for name in names
+        }
+        monitor = rtamt.StlDiscreteTimeSpecification()
+        for name in names:
+            monitor.declare_var(name, "float")
+        monitor.spec = written(tree, iter(names))
+        monitor.parse()
+        theirs = monitor.evaluate({"time": list(range(last + 1)), **signals})[0][1]
+        pieces = [[Piece(time, time, value) for time, value in enumerate(signal)] for signal in signals.values()]
+        assert judged(tree, pieces, draw).robustness == theirs, tree
+
+
+def test_when_a_property_broke() -> None:
+    always = Quantified(False, Sends("a.b"))
+    signal = [Piece(0, 4, 1.0), Piece(5, 5, -2.0), Piece(6, 9, 1.0)]
+    assert judged(always, [signal], random.Random(1)) == Finding(False, -2.0, 5)
+    assert judged(Not(always), [signal], random.Random(1)) == Finding(True, 2.0, None)
+    within = Quantified(True, Not(Sends("a.b")), 0, 3)
+    assert judged(within, [signal], random.Random(1)) == Finding(False, -1.0, 3)
+    both = Junction(False, always, Quantified(False, Sends("a.c"), 0, 2))
+    assert judged(both, [signal, [Piece(0, 1, 1.0), Piece(2, 9, -1.0)]], random.Random(1)) == Finding(False, -2.0, 2)
+    assert judged(within, [signal[:1]], random.Random(1)) == Finding(False, -1.0, 3)
+    assert judged(within, [[Piece(0, 2, 1.0)]], random.Random(1)) == Finding()  # too short to tell
+
+
+def test_a_break_is_known_at_once() -> None:
+    judge = Judge(Quantified(False, Junction(True, Sends("a.b"), Quantified(True, Sends("a.c"), 0, 3))))
+    judge.sources[0].pieces += [Piece(0, 0, -1.0), Piece(1, 9, 1.0)]
+    judge.sources[1].pieces.append(Piece(0, 2, -5.0))
+    assert judge.finding(False) == Finding()
+    judge.sources[1].pieces.append(Piece(3, 3, -4.0))
+    assert judge.finding(False) == Finding(False, -1.0, 0)
