@@ -57,8 +57,8 @@ def whole(first: int, last: int | None = None, most: str = "") -> Callable[[str]
     def read(text: str) -> int:
         number = int(text) if text.isdecimal() and len(text) <= 20 else -1
         if number < first or (last is not None and number > last):
-            end = "on" if last is None else f"to {most or last}"
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {first} {end}")
+            bounds = f"of at least {first}" if last is None else f"from {first} to {most or last}"
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number {bounds}")
         return number
 
     return read

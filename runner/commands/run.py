@@ -17,7 +17,7 @@ def factor(text: str) -> float:
     if not SLOWEST <= (found := number(text)) < math.inf:
         # Perhaps the model, which follows the option.
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a number of {SLOWEST:g} or more (write MODEL before --realtime)"
+            f"{text!r} is not a number of at least {SLOWEST:g} (write MODEL before --realtime)"
         )
     return found
 

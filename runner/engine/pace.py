@@ -35,7 +35,7 @@ class Pace:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         if not SLOWEST <= factor < math.inf:
-            raise ValueError(f"a pace is a number of model seconds per second, {SLOWEST:g} or more, not {factor:g}")
+            raise ValueError(f"a pace is a number of model seconds per second, at least {SLOWEST:g}, not {factor:g}")
         self.factor = factor
         self.behind = 0.0
         self.worst = 0.0

@@ -1,4 +1,4 @@
-"""Runs that would take hours, on a terminal: they say so, show how far they are, and end at Ctrl-C."""
+"""Runs that would take hours, on a terminal: they report it, show their progress, and end at Ctrl-C."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def on_a_terminal(arguments: list[str], folder: Path, is_over: Callable[[str], b
         while select.select([ours], [], [], 60.0)[0]:
             try:
                 piece = os.read(ours, 65_536)
-            except OSError:  # there is nobody any more
+            except OSError:  # the process has ended
                 break
             printed += piece.decode()
             if not typed and is_over(printed):

@@ -38,7 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def count(path: Path) -> int:
-    """How many records there are in a log; each has to be readable."""
+    """The number of records in a log, each of which must be readable."""
     if path.suffix == ".parquet":
         return int(pq.read_table(path).num_rows)
     with path.open(encoding="utf-8", newline="") as file:
@@ -82,7 +82,7 @@ def test_a_model_that_may_end_is_not_warned_of(
 
 @pytest.mark.parametrize("ending", ["jsonl", "csv", "parquet"])
 def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> None:
-    """What was recorded and logged until then is there, whole."""
+    """What was recorded and logged before is complete."""
     process = subprocess.Popen(
         [sys.executable, "-m", "epicycle.runner.cli", "run", "tick.yaml", "--out", "out", "--log", f"log.{ending}"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

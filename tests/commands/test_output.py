@@ -1,4 +1,4 @@
-"""What is printed: text of models is neither obeyed nor taken for style, and no stream is too poor or too short."""
+"""Printing: text of models is never obeyed or read as markup, and every stream will do, however limited."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_display_and_tables_outside_of_the_command_line(caplog: pytest.LogCaptur
 
 
 class Ascii(io.TextIOWrapper):
-    """A terminal that knows nothing but ASCII."""
+    """A terminal with only ASCII."""
 
     def __init__(self) -> None:
         super().__init__(io.BytesIO(), encoding="ascii")

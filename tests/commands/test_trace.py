@@ -60,7 +60,7 @@ def test_trace_in_columns(model: str, capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_trace_as_json(model: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """A composite stands for all that is in it; the end is the model's."""
+    """A composite selects everything in it; the end is the model's."""
     arguments = ["--actor", "room", "--actor", "sink", "--from", "600 ms", "--to", "9", "--json"]
     assert main(["trace", model, *arguments]) == 0
 
@@ -97,7 +97,7 @@ def test_wrong_options(arguments: list[str], message: str, model: str, capsys: p
 
 
 def test_a_run_in_real_time(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It takes its time, and sends what it sends otherwise."""
+    """It takes its time, and sends the same as otherwise."""
     digests = []
     for arguments in ([], ["--realtime", "4"]):
         began = time.perf_counter()

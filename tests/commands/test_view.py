@@ -1,4 +1,4 @@
-"""`epicycle view`: of a model, of results, of two; and what it says when something is wrong."""
+"""`epicycle view` of a model, of results, of two; and its errors."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_results_are_made_again_as_their_manifest_says(line: str, capsys: pytest
     assert main(["run", line, "--set", "clock.period=0.25", "--until", "2", "--out", "made"]) == 0
     capsys.readouterr()
     assert said(capsys, "made", "-o", "page.html") == "wrote page.html\n"
-    # Other settings make another run, of which nothing is said; another model gives itself away.
+    # Other settings make another run, without a warning; another model is noticed.
     assert said(capsys, "made", "--set", "clock.period=1", "-o", "page.html") == "wrote page.html\n"
     Path(line).write_text(MODEL.replace("Clock, period", "Clock, offset: 0.1, period"), encoding="utf-8")
     assert said(capsys, "made", "-o", "page.html") == (

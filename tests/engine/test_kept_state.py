@@ -1,4 +1,4 @@
-"""What snapshots keep of actors and aspects of one's own, and what they refuse."""
+"""What snapshots keep of user-defined actors and aspects, and what they refuse."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.engine.test_snapshots import assert_goes_on
 
 
 class Gatherer(Actor):
-    """Keeps what comes in many ways."""
+    """Keeps tokens in many ways."""
 
     input: InputPort[Any] = InputPort(Any)
     output: OutputPort[Any] = OutputPort(Any)

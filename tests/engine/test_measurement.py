@@ -1,4 +1,4 @@
-"""Metrics are what their definitions say, over tokens and over time; where there is no value, the reason is told."""
+"""Metrics follow their definitions, over tokens and over time; where there is no value, the reason is given."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SEQUENCES = st.lists(st.tuples(GAPS, NUMBERS), min_size=1, max_size=40)
 
 
 def measured(tokens: list[tuple[str, int, Any]], end: int, ports: tuple[str, ...] = ("a.out",), **said: Any) -> Outcome:
-    """What a metric comes to over tokens of ports at times in ns."""
+    """The value of a metric over tokens of ports at times in ns."""
     measurement = Measurement(Metric("m", list(ports), Measure(**said)))
     for port, time, token in tokens:
         measurement.add(port, time, token)
@@ -43,7 +43,7 @@ def timed(sequence: list[tuple[int, Any]]) -> list[tuple[str, int, Any]]:
 
 
 def spells(tokens: list[tuple[str, int, Any]], start: int, end: int) -> list[tuple[Any, int]]:
-    """Each value with the ns for which it stands between start and end."""
+    """Each value with its duration in ns between start and end."""
     edges = [time for _, time, _ in tokens[1:]] + [end]
     return [
         (value, min(edge, end) - max(time, start))

@@ -1,4 +1,4 @@
-"""What a study has found: its table, means, differences, and how far it is."""
+"""The results of a study: its table, means, differences, and progress."""
 
 from __future__ import annotations
 

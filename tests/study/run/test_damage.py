@@ -1,4 +1,4 @@
-"""Damage to the files of a results folder: it is told, and what is lost is made anew; no row is ever another one."""
+"""Damage to the files of a results folder is reported, and lost runs are repeated; no row ever changes."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def are_among(found: Iterable[dict[str, Any]], whole: dict[str, dict[str, Any]])
 
 
 def test_flipped_bits_are_told_or_repaired(done: Path, tmp_path: Path) -> None:
-    """300 bits, each in a folder of its own; some of the folders are resumed."""
+    """300 bits, each in its own folder; some of the folders are resumed."""
     plan = plan_of(done / "walks.yaml")
     whole = {row["run"]: row for row in open_study(done / "out").table(times=True).to_pylist()}
     kept = {row["run"]: row for batch in Store(done / "out").rows() for row in batch.to_pylist()}
@@ -198,7 +198,7 @@ VALUES: tuple[Any, ...] = (
 
 
 def edits(value: Any) -> Iterator[Any]:
-    """A manifest with one thing changed, at any depth."""
+    """A manifest with one change, at any depth."""
     yield from VALUES
     if isinstance(value, dict):
         for name in value:
@@ -214,7 +214,7 @@ def edits(value: Any) -> Iterator[Any]:
 
 
 def test_every_edit_of_a_manifest_gives_a_message(copied: Path) -> None:
-    """Of any field to any type: by hand, and by somebody who makes the checksum right."""
+    """Of any field to any type: by hand, and by somebody who corrects the checksum."""
     out = Path("out")
     path = out / "manifest.json"
     manifest = read_manifest(out)

@@ -1,4 +1,4 @@
-"""Studies on Dask: a real scheduler and real workers on loopback, which start in folders of their own."""
+"""Studies on Dask: a real scheduler and real workers on loopback, which start in separate folders."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def table_of(folder: Path) -> bytes:
 
 
 def without_progress(text: str) -> str:
-    """What was said, without the line a minute that a slow machine may add."""
+    """The messages, without the line per minute that a slow machine may add."""
     return re.sub(r"^\d\d:\d\d:\d\d walks: .*\n", "", text, flags=re.M)
 
 
@@ -62,7 +62,7 @@ def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, caps
     assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
     statuses = Counter(pq.read_table(tmp_path / "dask" / "table.parquet")["status"].to_pylist())
     assert statuses.keys() == {"ok", "failed", "timeout", "killed"}
-    # Where there is nothing to do, no scheduler is asked.
+    # If there is nothing to do, no scheduler is contacted.
     assert main(["resume", str(tmp_path / "dask"), "--executor", "dask", "--scheduler", "127.0.0.1:9"]) == 1
     assert f"0 new runs, {statuses.total()} already there" in capsys.readouterr().out
 
@@ -230,7 +230,7 @@ def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def error_of(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """What a study that cannot be run says, whole, without the folder."""
+    """The whole error of a study that cannot be run, without the folder."""
     try:
         code = study(folder, "--executor", "dask", *arguments)
     except SystemExit as error:
@@ -253,7 +253,7 @@ def test_what_cannot_be(
         expected = f"2: error: argument --scheduler: {bad!r} is not an address such as tcp://localhost:8786\n"
         assert error_of(tmp_path, capsys, "--scheduler", bad) == expected
     monkeypatch.setattr(cluster_module, "CONNECT", 1.0)
-    with socket.create_server(("127.0.0.1", 0)) as nobody:  # who takes calls and says nothing
+    with socket.create_server(("127.0.0.1", 0)) as nobody:  # accepts connections and never answers
         for port in (9, nobody.getsockname()[1]):
             assert error_of(tmp_path, capsys, "--scheduler", f"127.0.0.1:{port}") == (
                 f"1: error: no scheduler answers at tcp://127.0.0.1:{port}\n"
@@ -278,7 +278,7 @@ def test_what_cannot_be(
 
 
 def test_the_code_that_has_to_be_the_same_is_all_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also what is compiled; not what is made of it, which differs between machines."""
+    """Including the sources of compiled modules; not the compiled files, which differ between machines."""
     monkeypatch.setattr(parcel, "import_module", lambda name: SimpleNamespace(__path__=[str(tmp_path)]))
     (tmp_path / "core").mkdir()
     seen = [parcel._code()]
@@ -312,7 +312,7 @@ def test_workers_that_are_missing_or_have_no_epicycle(
             " does not have this version of Epicycle: No module named 'epicycle.runner'; 'epicycle' is not a package\n"
             "   help: install it there\n"
         )
-        # While it is just coming, its name is not always known.
+        # While it is joining, its name is not always known.
         first, then = (error_of(tmp_path, capsys, *address) for _ in range(2))
         assert re.sub(r"(a|the) Dask worker( tcp://[0-9.:]+)?", "WORKER", first) == f"1: error: WORKER{expected}"
         assert re.sub(r"tcp://[0-9.:]+", "ADDRESS", then) == f"1: error: the Dask worker ADDRESS{expected}"

@@ -1,4 +1,4 @@
-"""`kill -9` of a study and of its workers, at any moment: nothing is lost, the table is as if nothing had been."""
+"""`kill -9` of a study and of its workers, at any moment: nothing is lost, the table is as without the kill."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def rows(folder: Path) -> set[str]:
 
 
 def written(folder: Path) -> int:
-    """How many bytes of rows there are; it changes when something happens."""
+    """The number of bytes of all rows, which changes with progress."""
     total = 0
     for path in (*folder.glob("journals/*"), *folder.glob("parts/*")):
         with suppress(FileNotFoundError):
